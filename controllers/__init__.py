@@ -1,0 +1,23 @@
+"""Controllers of the rig: plain functions of (settings, state, input) that run as Python or compiled, on twin or rig.
+
+They know nothing of the twin. `update` is one tick of the whole controller.
+"""
+
+from controllers.mil import State, initial_state, update
+from controllers.settings import Compensator, Mode, Settings, Skyhook, Structure, Travel
+from controllers.signals import Commands, Demand, Measurements
+
+__all__ = [
+    "Commands",
+    "Compensator",
+    "Demand",
+    "Measurements",
+    "Mode",
+    "Settings",
+    "Skyhook",
+    "State",
+    "Structure",
+    "Travel",
+    "initial_state",
+    "update",
+]

@@ -1,0 +1,23 @@
+"""The experiments of the rig, by name. One module a study."""
+
+from experiments import imposed, quarter_car, single_mass, vehicles
+from experiments.experiment import Experiment
+from rigtwin.errors import RigtwinError
+
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment
+    for module in (quarter_car, single_mass, imposed, vehicles)
+    for experiment in module.EXPERIMENTS
+}
+
+
+
+def find(name: str) -> Experiment:
+    """The experiment of that name. Raises RigtwinError listing what there is."""
+    try:
+        return EXPERIMENTS[name]
+    except KeyError:
+        raise RigtwinError(f"unknown experiment {name!r}; there are {', '.join(EXPERIMENTS)}") from None
+
+
+__all__ = ["EXPERIMENTS", "Experiment", "find"]

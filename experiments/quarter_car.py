@@ -1,0 +1,45 @@
+"""Chapter 6 and 7: the quarter car of Tables 6.2 and 7.1, dropped and driven over roads; passive, semi-active, active."""
+
+from __future__ import annotations
+
+from controllers import Settings, Skyhook
+from experiments.experiment import Experiment, flat_ground, road_ground
+from rigtwin.configuration import Configuration, Road, Timing
+
+PASSIVE = Settings()
+SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
+ACTIVE = Settings(skyhook=Skyhook.ACTIVE, skyhook_damping=200.0)
+
+ROAD_1_6 = Road(speed=25 / 3.6, lowest=0.02, highest=1.6, spacing=0.02)
+ROAD_10 = Road(speed=15 / 3.6, lowest=0.01, highest=10.0, spacing=0.01)
+ROAD_CHAPTER_7 = Road(speed=25 / 3.6, lowest=0.2, highest=1.6, spacing=0.2)
+
+_LONG = Timing(duration=45.0)
+
+EXPERIMENTS = (
+    Experiment("drop", "passive quarter car dropped, ground at rest", "thesis §6.3.1", Configuration(), flat_ground),
+    Experiment(
+        "road1.6",
+        "passive quarter car, motorway at 25 km/h, 0.02-1.6 Hz",
+        "thesis §6.3.2",
+        Configuration(timing=_LONG, road=ROAD_1_6),
+        road_ground,
+    ),
+    Experiment(
+        "road10",
+        "passive quarter car, motorway at 15 km/h, 0.01-10 Hz",
+        "thesis §6.3.3",
+        Configuration(timing=_LONG, road=ROAD_10),
+        road_ground,
+    ),
+    *(
+        Experiment(
+            name,
+            f"{name} suspension, motorway at 25 km/h, 0.2-1.6 Hz",
+            "thesis §7.1",
+            Configuration(controller=settings, timing=_LONG, road=ROAD_CHAPTER_7),
+            road_ground,
+        )
+        for name, settings in (("passive", PASSIVE), ("semi-active", SEMI_ACTIVE), ("active", ACTIVE))
+    ),
+)

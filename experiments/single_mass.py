@@ -1,0 +1,46 @@
+"""Chapter 3 and 4: a single mass on spring and damper, whose travel is measured from the ground, not from the wheel."""
+
+from __future__ import annotations
+
+from controllers import Settings, Travel
+from experiments.experiment import Experiment, flat_ground, road_ground
+from rigtwin.configuration import Configuration, Road, Timing
+
+CHAPTER_3 = Settings(
+    travel=Travel.GROUND,
+    start=-220.0 / 50_000.0,
+    suspension_stiffness=350.0,
+    suspension_damping=30.0,
+    preload=220.0,
+    filter_position=0.004,
+    filter_velocity=0.0064,
+    filter_force=0.004,
+)
+CHAPTER_4 = CHAPTER_3._replace(suspension_damping=50.0)
+
+ROAD_CHAPTER_3 = Road(speed=65 / 3.6, lowest=0.0158, highest=0.576, spacing=0.0158)
+ROAD_CHAPTER_4 = Road(speed=225 / 3.6, lowest=0.1, highest=5.0, spacing=0.1)
+
+EXPERIMENTS = (
+    Experiment(
+        "single-mass",
+        "single mass dropped, ground at rest",
+        "thesis §3.6, Table 3.4",
+        Configuration(controller=CHAPTER_3, timing=Timing(duration=45.0)),
+        flat_ground,
+    ),
+    Experiment(
+        "single-mass-road",
+        "single mass dropped, motorway at 65 km/h, 0.0158-0.576 Hz",
+        "thesis §3.6, Fig. 3.15",
+        Configuration(controller=CHAPTER_3, timing=Timing(duration=45.0), road=ROAD_CHAPTER_3),
+        road_ground,
+    ),
+    Experiment(
+        "friction-road",
+        "single mass, road at 225 km/h, 0.1-5 Hz: motor friction at every reversal",
+        "thesis ch. 4",
+        Configuration(controller=CHAPTER_4, timing=Timing(duration=44.0), road=ROAD_CHAPTER_4),
+        road_ground,
+    ),
+)

@@ -1,0 +1,52 @@
+"""The vehicles of thesis Table 6.1, dropped on the rig as it is. All are unstable with its delays (thesis §6.2); the heavy
+ones exceed the motor's force at once and trip."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from controllers import Settings
+from experiments.experiment import Experiment, flat_ground
+from rigtwin.configuration import Configuration, Timing
+from rigtwin.parameters import Carriage, Plant, Tyre
+
+
+class Vehicle(NamedTuple):
+    """A quarter car: tyre stiffness N/m, unsprung mass kg, suspension stiffness N/m and damping Ns/m, sprung mass kg."""
+
+    tyre_stiffness: float
+    unsprung_mass: float
+    suspension_stiffness: float
+    suspension_damping: float
+    sprung_mass: float
+
+
+VEHICLES = {
+    "boeing-707": Vehicle(8_461_000.0, 1140.0, 11_250_000.0, 105_400.0, 68_210.0),
+    "truck": Vehicle(500_000.0, 420.0, 1_950_000.0, 94_300.0, 4450.0),
+    "car": Vehicle(250_000.0, 400.0, 20_000.0, 1300.0, 400.0),
+    "motorcycle": Vehicle(180_000.0, 25.0, 7600.0, 750.0, 72.5),
+}
+"""Thesis Table 6.1."""
+
+
+def configuration(vehicle: Vehicle) -> Configuration:
+    """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so that the body drops."""
+    preload = 0.9 * vehicle.sprung_mass * Settings().gravity
+    return Configuration(
+        plant=Plant(carriage=Carriage(vehicle.unsprung_mass), tyre=Tyre(vehicle.tyre_stiffness)),
+        controller=Settings(
+            start=-preload / vehicle.tyre_stiffness,
+            sprung_mass=vehicle.sprung_mass,
+            suspension_stiffness=vehicle.suspension_stiffness,
+            suspension_damping=vehicle.suspension_damping,
+            preload=preload,
+        ),
+        timing=Timing(duration=10.0),
+    )
+
+
+EXPERIMENTS = tuple(
+    Experiment(name, f"{name} dropped: unstable on this rig", "thesis Table 6.1", configuration(vehicle), flat_ground)
+    for name, vehicle in VEHICLES.items()
+)

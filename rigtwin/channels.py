@@ -1,0 +1,41 @@
+"""The channels of a recording: topic, field, unit, meaning. Defined once; the file format and every table follow them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from controllers import Commands, Measurements
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of a recording."""
+
+    topic: str
+    name: str
+    unit: str
+    meaning: str
+
+
+CHANNELS = (
+    Channel("/command", "ground", "m", "ground cylinder position demanded"),
+    Channel("/command", "structure", "m", "structure cylinder position demanded"),
+    Channel("/command", "force", "N", "suspension force demanded, positive in compression"),
+    Channel("/command", "voltage", "V", "to the motor amplifier"),
+    Channel("/sensor", "ground_lvdt", "m", "ground cylinder position"),
+    Channel("/sensor", "structure_lvdt", "m", "structure cylinder (plate) position"),
+    Channel("/sensor", "suspension_lvdt", "m", "suspension travel: plate minus carriage"),
+    Channel("/sensor", "load_cell", "N", "suspension force, positive in compression"),
+    Channel("/truth", "ground", "m", "ground plate position in the twin"),
+    Channel("/truth", "structure", "m", "structure plate position in the twin"),
+    Channel("/truth", "suspension", "m", "suspension travel in the twin"),
+    Channel("/truth", "load_cell", "N", "force in the load cell, without noise"),
+)
+
+
+def topic_fields(topic: str) -> tuple[str, ...]:
+    """Field names of a topic, in order."""
+    return tuple(channel.name for channel in CHANNELS if channel.topic == topic)
+
+
+assert topic_fields("/command") == Commands._fields and topic_fields("/sensor") == Measurements._fields

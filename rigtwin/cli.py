@@ -1,0 +1,113 @@
+"""The command line. Parsing only; each command's work is imported when it is asked for, so that help is instant."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from rigtwin.errors import RigtwinError
+
+OVERVIEW = """\
+The digital twin of a hybrid suspension rig, and the tool that says why the twin and the rig disagree.
+
+a first session:
+  rigtwin list                                  what can be run
+  rigtwin run drop --out drop.mcap              run it on the twin, record it
+  rigtwin info drop.mcap                        what is in a recording
+  rigtwin plot drop.mcap -o drop.png            look at it
+  rigtwin video drop.mcap -o drop.mp4           watch it
+  rigtwin compare rig.mcap                      where a recording of the rig and the twin disagree
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter)
+    commands = top.add_subparsers(dest="command", metavar="command", required=True)
+
+    def command(name: str, summary: str, more: str = "") -> argparse.ArgumentParser:
+        return commands.add_parser(
+            name, help=summary, description=f"{summary}.\n\n{more}", formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+
+    def settings(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override one setting, e.g. rail.coulomb=60")
+        parser.add_argument("--config", type=Path, metavar="F.toml", help="override settings from a TOML file, before --set")
+
+    listing = command("list", "list the experiments, or the settings", "rigtwin list --settings drop prints every setting of an experiment with unit, bounds and source.")
+    listing.add_argument("--settings", metavar="NAME", help="the settings of that experiment instead")
+
+    run = command(
+        "run",
+        "run an experiment on the twin and record it",
+        "examples:\n  rigtwin run drop --out drop.mcap\n  rigtwin run road10 --seed 3 --set controller.kp=0.5 --set timing.duration=10",
+    )
+    run.add_argument("name", help="an experiment of rigtwin list")
+    run.add_argument("--seed", type=int, default=0, help="of noise and road (default 0); the same seed gives the same bytes")
+    run.add_argument("--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)")
+    settings(run)
+
+    info = command("info", "say what is in a recording")
+    info.add_argument("recording", type=Path)
+
+    plot = command("plot", "draw a recording: motions, force, wheel and voltage over time")
+    plot.add_argument("recording", type=Path)
+    plot.add_argument("--out", "-o", type=Path, metavar="F.png", help="png, svg or pdf (default: beside the recording)")
+    _stretch(plot)
+
+    video = command("video", "film a recording: the rig moving, its force and travel drawn beneath")
+    video.add_argument("recording", type=Path)
+    video.add_argument("--out", "-o", type=Path, metavar="F.mp4", help="default: beside the recording")
+    video.add_argument("--camera", default="overview", help="overview, side or wheel (default overview)")
+    video.add_argument("--magnify", type=float, default=1.0, metavar="X", help="draw motions X times as large (default 1)")
+    _stretch(video)
+
+    export = command("export", "write a recording as CSV or MAT for other programs")
+    export.add_argument("recording", type=Path)
+    export.add_argument("--out", "-o", type=Path, required=True, metavar="F.csv|F.mat")
+
+    compare = command(
+        "compare",
+        "replay each component of a recording on the twin and say what is left",
+        "One recording: motor, carriage, mechanics, both cylinders, controller and closed loop, each driven by measured\n"
+        "signals. A ratio of 1 means that noise is all that is left. Two recordings: of one test, channel by channel.\n"
+        "--set and --config change the twin that it is compared with.",
+    )
+    compare.add_argument("recording", type=Path)
+    compare.add_argument("other", type=Path, nargs="?", help="a second recording of the same test")
+    compare.add_argument("--json", type=Path, metavar="J", help="also write the figures to a file")
+    settings(compare)
+
+    reproduce = command("reproduce", "run a study of the thesis and print its figures beside ours", "studies: table-3.5, chapter-6")
+    reproduce.add_argument("study", help="table-3.5 or chapter-6")
+    reproduce.add_argument("--seeds", type=int, default=16, help="noise seeds to take the median over (default 16)")
+    reproduce.add_argument("--out", "-o", type=Path, metavar="F.png", help="where to draw the figure, if the study has one")
+    return top
+
+
+def _stretch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="start at this time (default 0)")
+    parser.add_argument("--until", type=float, metavar="S", help="stop at this time (default: the end)")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a test that tripped,
+    130 interrupted."""
+    parsed = _parser().parse_args(arguments)
+    try:
+        return import_module("rigtwin.commands").COMMANDS[parsed.command](parsed)
+    except RigtwinError as error:
+        print(f"rigtwin: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 1
+    except KeyboardInterrupt:
+        print("rigtwin: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

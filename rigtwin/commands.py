@@ -1,0 +1,216 @@
+"""What each command does. Imports stay inside the commands: none waits for what only another needs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin.configuration import Configuration
+    from rigtwin.diagnosis.compare import Residual
+
+
+def _configured(configuration: Configuration, parsed: Namespace) -> Configuration:
+    from rigtwin.configuration import from_assignments, from_toml
+
+    if parsed.config is not None:
+        configuration = from_toml(configuration, parsed.config)
+    return from_assignments(configuration, parsed.set)
+
+
+def _table(rows: list[tuple[str, ...]]) -> str:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def list_experiments(parsed: Namespace) -> int:
+    from controllers.quantity import Quantity
+    from experiments import EXPERIMENTS, find
+    from rigtwin.configuration import parameters
+
+    if parsed.settings is None:
+        rows = [("experiment", "what", "source", "seconds")]
+        for experiment in EXPERIMENTS.values():
+            duration = f"{experiment.configuration.timing.duration:g}"
+            rows.append((experiment.name, experiment.summary, experiment.source, duration))
+        print(_table(rows))
+        return 0
+    rows = [("setting", "value", "unit", "allowed", "source")]
+    for key, value, meaning in parameters(find(parsed.settings).configuration):
+        if isinstance(meaning, Quantity):
+            rows.append((key, f"{value:g}", meaning.unit, f"{meaning.low:g} to {meaning.high:g}", meaning.source))
+        else:
+            rows.append((key, value.label, "", " | ".join(meaning.labels()), ""))
+    print(_table(rows))
+    return 0
+
+
+def run(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from experiments import find
+    from rigtwin.runner import record
+
+    if parsed.seed < 0:
+        raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
+    experiment = find(parsed.name)
+    configuration = _configured(experiment.configuration, parsed)
+    demands = experiment.demands(configuration, parsed.seed)
+    path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
+    with tqdm(total=len(demands), unit="tick", unit_scale=True, disable=None, desc=experiment.name, leave=False) as bar:
+        outcome = record(path, experiment.name, configuration, demands, parsed.seed, bar.update)
+    seconds = outcome.ticks * configuration.timing.period
+    print(f"{experiment.name}: {seconds:.3f} s recorded in {outcome.path}; {outcome.reason}")
+    return 3 if outcome.tripped else 0
+
+
+def _fresh(stem: str) -> Path:
+    """A file name that is not taken."""
+    path, number = Path(f"{stem}.mcap"), 1
+    while path.exists():
+        number += 1
+        path = Path(f"{stem}-{number}.mcap")
+    return path
+
+
+def info(parsed: Namespace) -> int:
+    from rigtwin.channels import CHANNELS
+    from rigtwin.recording import load
+
+    recording = load(parsed.recording)
+    print(f"{recording.path}: {recording.experiment} on {recording.machine}")
+    print(f"{recording.ticks} ticks of {recording.period:g} s, {recording.time[0]:g} to {recording.time[-1]:.3f} s")
+    print(f"ended: {recording.end or 'not said'}")
+    if recording.twin:
+        print(f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}")
+    for note in recording.notes:
+        print(f"note: {note}")
+    rows = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
+    for channel in CHANNELS:
+        if recording.has(channel.topic, channel.name):
+            values = recording.column(channel.topic, channel.name)
+            figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
+            rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
+    print(_table(rows))
+    if recording.controller:
+        print("controller: " + ", ".join(f"{key} {value}" for key, value in recording.controller.items()))
+    return 0
+
+
+def plot(parsed: Namespace) -> int:
+    from rigtwin.plot import draw
+    from rigtwin.recording import load
+
+    out = parsed.out or parsed.recording.with_suffix(".png")
+    draw(load(parsed.recording), out, parsed.start, parsed.until)
+    print(f"drawn in {out}")
+    return 0
+
+
+def video(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from rigtwin.recording import load
+    from rigtwin.video import film
+
+    out = parsed.out or parsed.recording.with_suffix(".mp4")
+    recording = load(parsed.recording)
+    with tqdm(unit="frame", disable=None, desc="filming", leave=False) as bar:
+
+        def progress(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        film(recording, out, parsed.camera, parsed.start, parsed.until, parsed.magnify, progress)
+    print(f"filmed in {out}")
+    return 0
+
+
+def export(parsed: Namespace) -> int:
+    from rigtwin.recording import load
+    from rigtwin.recording.export import export as write
+
+    write(load(parsed.recording), parsed.out)
+    print(f"written to {parsed.out}")
+    return 0
+
+
+def compare(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from rigtwin.configuration import Configuration
+    from rigtwin.diagnosis.compare import REPLAYS, compare_recordings, configuration_of
+    from rigtwin.diagnosis.compare import compare as replay_all
+    from rigtwin.recording import load
+
+    recording = load(parsed.recording)
+    if parsed.other is not None:
+        if parsed.config is not None or parsed.set:
+            raise RigtwinError("--set and --config change the twin; two recordings are compared without one")
+        results, left_out, notes = compare_recordings(recording, load(parsed.other)), {}, recording.notes
+        print(f"{recording.path} against {parsed.other}")
+    else:
+        configuration = configuration_of(recording, _configured(Configuration(), parsed))
+        with tqdm(total=len(REPLAYS), disable=None, desc="replaying", leave=False) as bar:
+            comparison = replay_all(recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name))
+        results, left_out, notes = comparison.replays, comparison.left_out, comparison.notes
+        print(f"{recording.path} against the twin; a ratio of 1 is noise alone")
+    for note in notes:
+        print(f"note: {note}")
+    rows = [("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")]
+    for name, result in results.items():
+        rows.append(_row(name, result))
+        rows += [_row(f"  {output}", part) for output, part in result.outputs.items()]
+    print(_table(rows))
+    for name, reason in left_out.items():
+        print(f"{name}: left out; {reason}")
+    if parsed.json is not None:
+        document = {"recording": str(recording.path), "replays": {name: asdict(result) for name, result in results.items()}}
+        _write_json(parsed.json, {**document, "left_out": left_out, "notes": list(notes)})
+    return 0
+
+
+def _row(name: str, result: Residual) -> tuple[str, ...]:
+    unit = "floors" if result.unit == "1" else result.unit
+    low, high = result.band_hz
+    return name, f"{result.residual:.3g} {unit}", f"{result.noise_floor:.3g} {unit}", f"{result.ratio:.3f}", f"{low:.3g} to {high:.3g}"
+
+
+def _write_json(path: Path, document: object) -> None:
+    try:
+        path.write_text(json.dumps(document, indent=1) + "\n")
+    except OSError as error:
+        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+
+
+def reproduce(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from experiments.studies import STUDIES
+
+    if parsed.study not in STUDIES:
+        raise RigtwinError(f"unknown study {parsed.study!r}; there are {', '.join(STUDIES)}")
+    if parsed.seeds < 1:
+        raise RigtwinError(f"--seeds {parsed.seeds}: expected 1 or more")
+    with tqdm(total=parsed.seeds, disable=None, desc=parsed.study, leave=False, file=sys.stderr) as bar:
+        print(STUDIES[parsed.study](parsed.seeds, parsed.out, bar.update))
+    return 0
+
+
+COMMANDS: dict[str, Callable[[Namespace], int]] = {
+    "list": list_experiments,
+    "run": run,
+    "info": info,
+    "plot": plot,
+    "video": video,
+    "export": export,
+    "compare": compare,
+    "reproduce": reproduce,
+}

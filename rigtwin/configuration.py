@@ -1,0 +1,152 @@
+"""Everything a test needs to know, by name: the plant's components, the controller, safety limits, road, simulation.
+
+`overridden` is the one way in from outside: TOML files, `--set`, recordings. Every key and value is checked.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+from controllers import Settings
+from controllers.quantity import Choice, Quantity, fields
+from rigtwin.errors import RigtwinError
+from rigtwin.parameters import Plant
+
+
+class Safety(NamedTuple):
+    """Limits on raw measurements that end a test."""
+
+    structure: Annotated[float, Quantity("m", 1e-3, 10.0, "trip of the lab: |structure_lvdt|")] = 0.15
+    force: Annotated[float, Quantity("N", 1.0, 1e7, "trip of the lab: |load_cell|")] = 1500.0
+    travel: Annotated[float, Quantity("m", 1e-3, 10.0, "the motor's stroke: |suspension_lvdt|")] = 0.21
+
+
+class Timing(NamedTuple):
+    """Clocks of a test."""
+
+    duration: Annotated[float, Quantity("s", 0.01, 86_400.0, "the experiment")] = 20.0
+    period: Annotated[float, Quantity("s", 1e-4, 0.1, "1 kHz, assumed")] = 1e-3
+    timestep: Annotated[float, Quantity("s", 1e-5, 0.01, "integration step, docs/architecture.md")] = 2.5e-4
+
+
+class Road(NamedTuple):
+    """Pseudo-random road: spectral density roughness / wavenumber^exponent, thesis Eq. 6.3."""
+
+    roughness: Annotated[float, Quantity("m^2/(cycle/m)", 0.0, 1e-2, "motorway, thesis Eq. 6.3")] = 7e-8
+    exponent: Annotated[float, Quantity("1", 0.0, 5.0, "thesis Eq. 6.3")] = 2.5
+    speed: Annotated[float, Quantity("m/s", 0.1, 150.0, "thesis §6.3")] = 25.0 / 3.6
+    lowest: Annotated[float, Quantity("Hz", 1e-3, 50.0, "thesis §6.3.2")] = 0.02
+    highest: Annotated[float, Quantity("Hz", 1e-3, 50.0, "thesis §6.3.2")] = 1.6
+    spacing: Annotated[float, Quantity("Hz", 1e-3, 50.0, "the lowest frequency where not given")] = 0.02
+
+
+class Configuration(NamedTuple):
+    """All settings of one test. Keys are `group.name`, e.g. `rail.coulomb`, `controller.kp`, `timing.duration`."""
+
+    plant: Plant = Plant()
+    controller: Settings = Settings()
+    safety: Safety = Safety()
+    timing: Timing = Timing()
+    road: Road = Road()
+
+    @property
+    def substeps(self) -> int:
+        """Integration steps a tick. Raises RigtwinError unless the period is a whole multiple of the timestep."""
+        ratio = self.timing.period / self.timing.timestep
+        if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6:
+            raise RigtwinError(
+                f"timing.period = {self.timing.period:g} s must be a whole multiple of "
+                f"timing.timestep = {self.timing.timestep:g} s; here it is {ratio:.4g} times"
+            )
+        return round(ratio)
+
+    @property
+    def ticks(self) -> int:
+        """Ticks in the test, at least one."""
+        return max(1, round(self.timing.duration / self.timing.period))
+
+
+def groups(configuration: Configuration) -> dict[str, Any]:
+    """Group name → its NamedTuple: the plant's components side by side with the rest."""
+    return {**configuration.plant._asdict(), **{n: v for n, v in configuration._asdict().items() if n != "plant"}}
+
+
+def flattened(configuration: Configuration) -> dict[str, dict[str, float | str]]:
+    """Group → name → number or label, as TOML and recordings hold it."""
+    return {
+        name: {key: value.label if isinstance(value, Choice) else float(value) for key, value in group._asdict().items()}
+        for name, group in groups(configuration).items()
+    }
+
+
+def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantity | type[Choice]]]:
+    """(key, value, what it means) of every setting."""
+    for name, group in groups(configuration).items():
+        for key, meaning in fields(type(group)).items():
+            yield f"{name}.{key}", getattr(group, key), meaning
+
+
+def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
+    """The value, if it is allowed. Raises RigtwinError naming the key and what is allowed."""
+    if not isinstance(meaning, Quantity):
+        try:
+            return meaning.parse(str(value))
+        except ValueError as error:
+            raise RigtwinError(f"{key}: {error}") from None
+    try:
+        number = float(value) if isinstance(value, str | int | float) and not isinstance(value, bool) else math.nan
+    except ValueError:
+        number = math.nan
+    if not (meaning.low <= number <= meaning.high):
+        raise RigtwinError(f"{key} = {value}: expected a number from {meaning.low:g} to {meaning.high:g} {meaning.unit}")
+    return number
+
+
+def overridden(configuration: Configuration, changes: Mapping[str, Mapping[str, object]]) -> Configuration:
+    """The configuration with `changes` (group → name → value) applied. Raises RigtwinError for any key or value not allowed."""
+    plant, rest = configuration.plant, configuration
+    known = groups(configuration)
+    for group_name, values in changes.items():
+        if group_name not in known:
+            raise RigtwinError(f"unknown group {group_name!r}; there are {', '.join(known)}")
+        if not isinstance(values, Mapping):
+            raise RigtwinError(f"{group_name} = {values!r}: expected a table of settings, such as [{group_name}]")
+        group = known[group_name]
+        meanings = fields(type(group))
+        for key, value in values.items():
+            if key not in meanings:
+                raise RigtwinError(f"unknown setting {group_name}.{key}; {group_name} has {', '.join(meanings)}")
+            group = group._replace(**{key: checked(f"{group_name}.{key}", value, meanings[key])})
+        if group_name in plant._fields:
+            plant = plant._replace(**{group_name: group})
+        else:
+            rest = rest._replace(**{group_name: group})
+    return rest._replace(plant=plant)
+
+
+def from_toml(configuration: Configuration, path: Path) -> Configuration:
+    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
+    try:
+        with path.open("rb") as file:
+            return overridden(configuration, tomllib.load(file))
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RigtwinError(f"{path} is not valid TOML: {error}") from None
+    except RigtwinError as error:
+        raise RigtwinError(f"{path}: {error}") from None
+
+
+def from_assignments(configuration: Configuration, assignments: list[str]) -> Configuration:
+    """The configuration with `group.name=value` texts applied, as `--set` takes them."""
+    for text in assignments:
+        key, equals, value = text.partition("=")
+        group, dot, name = key.strip().partition(".")
+        if not (equals and dot):
+            raise RigtwinError(f"--set {text}: expected group.name=value, such as rail.coulomb=60")
+        configuration = overridden(configuration, {group: {name: value.strip()}})
+    return configuration

@@ -1,0 +1,283 @@
+"""The first look at a gap: every component replayed alone from measured signals, the mechanics together, the closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers import Commands, Measurements
+from rigtwin.configuration import Configuration, Safety, overridden
+from rigtwin.diagnosis.noise import Motion, band, motion, rms, white_noise, without_mains
+from rigtwin.diagnosis.replay import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
+from rigtwin.errors import RigtwinError
+from rigtwin.loop import run, run_compiled
+from rigtwin.recording import Recording
+from rigtwin.replay import Replay
+from rigtwin.twin import Twin
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT_DIGITS = 8
+"""Digits to which recordings in text keep a command; a controller that agrees to them is exact."""
+RESOLVED_OVER = 0.03
+"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""
+CERTAIN = 3.0
+"""Standard deviations of a velocity beyond which its sign is certain."""
+CLOSED_LOOP_SEED = 2**31 - 1
+"""Of the twin's noise in the closed loop: not one that a recording of a twin is likely to have."""
+SHORTEST = 200
+"""Ticks below which a noise floor cannot be estimated."""
+
+
+class Undetermined(Exception):
+    """The recorded signals do not determine what a replay would compare. The message says why."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor: what the sensors' white
+    noise alone would leave; ratio: of the two; band_hz: where the middle 80 % of the residual's power lies. unit "1": several
+    outputs together, each in units of its own noise floor, and `outputs` has them apart."""
+
+    residual: float
+    noise_floor: float
+    ratio: float
+    unit: str
+    band_hz: tuple[float, float]
+    outputs: dict[str, Residual] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All replays of a recording, by name, and what could not be replayed and why."""
+
+    replays: dict[str, Residual]
+    left_out: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def configuration_of(recording: Recording, base: Configuration | None = None) -> Configuration:
+    """The operator's settings of a recording over `base` (the nominal rig). Raises RigtwinError for settings unknown here."""
+    start = base or Configuration()
+    duration = recording.ticks * recording.period
+    timing = {"period": recording.period, "duration": duration, "timestep": recording.period / start.substeps}
+    try:
+        return overridden(start, {"controller": recording.controller, "timing": timing})
+    except RigtwinError as error:
+        raise RigtwinError(f"{recording.path}: {error}") from None
+
+
+def single(difference: Array, floor: float, unit: str, period: float) -> Residual:
+    """The residual of one output."""
+    left = rms(difference)
+    return Residual(left, floor, left / floor if floor > 0 else math.inf, unit, band(difference, period))
+
+
+def together(outputs: dict[str, Residual], differences: dict[str, Array], period: float) -> Residual:
+    """Several outputs as one, each in units of its own noise floor."""
+    ratio = math.sqrt(sum(output.ratio**2 for output in outputs.values()) / len(outputs))
+    loudest = max(outputs, key=lambda name: outputs[name].ratio)
+    return Residual(ratio, 1.0, ratio, "1", band(differences[loudest], period), outputs)
+
+
+class Replays:
+    """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
+
+    Raises RigtwinError if a channel is missing or the recording is too short.
+    """
+
+    def __init__(self, recording: Recording, configuration: Configuration) -> None:
+        if recording.ticks < SHORTEST:
+            raise RigtwinError(f"{recording.path} has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
+        self.recording = recording
+        self.configuration = configuration
+        self.period = recording.period
+        for topic, names in (("/sensor", Measurements._fields), ("/command", Commands._fields)):
+            for name in names:
+                column = recording.column(topic, name)
+                if not np.isfinite(column).all():
+                    tick = int(np.nonzero(~np.isfinite(column))[0][0])
+                    raise RigtwinError(f"{recording.path}: {topic}.{name} is not a number at {recording.time[tick]:.3f} s")
+        self.preload = configuration.controller.preload
+        self.wheel = self._sensor("structure_lvdt") - self._sensor("suspension_lvdt")
+
+    def _sensor(self, name: str) -> Array:
+        return self.recording.column("/sensor", name)
+
+    def _command(self, name: str) -> Array:
+        return self.recording.column("/command", name)
+
+    def _clean(self, signal: Array) -> Array:
+        return without_mains(signal, self.period, self.configuration.plant.mains.frequency)
+
+    def _motion(self, measured: Array, expected: Array) -> Motion:
+        return motion(measured, expected, self.period, self.configuration.plant.mains.frequency)
+
+    @cached_property
+    def ground_cylinder_output(self) -> Array:
+        command = self._command("ground")
+        return replay_cylinder(self.configuration.plant.ground_cylinder, self.configuration, command, float(command[0]))
+
+    @cached_property
+    def structure_cylinder_output(self) -> Array:
+        start = self.configuration.controller.start
+        cylinder = self.configuration.plant.structure_cylinder
+        return replay_cylinder(cylinder, self.configuration, self._command("structure"), start)
+
+    @cached_property
+    def ground_motion(self) -> Motion:
+        return self._motion(self._sensor("ground_lvdt"), self.ground_cylinder_output)
+
+    @cached_property
+    def structure_motion(self) -> Motion:
+        return self._motion(self._sensor("structure_lvdt"), self.structure_cylinder_output)
+
+    @cached_property
+    def carriage_output(self) -> Array:
+        force = self._clean(self._sensor("load_cell"))
+        return replay_carriage(self.configuration, self.ground_motion.position, force, self.preload)
+
+    @cached_property
+    def wheel_motion(self) -> Motion:
+        return self._motion(self.wheel, self.carriage_output)
+
+    @cached_property
+    def mechanics_output(self) -> Output:
+        return replay_mechanics(
+            self.configuration,
+            self.ground_motion.position,
+            self.structure_motion.position,
+            self._command("voltage"),
+            self.preload,
+        )
+
+    def _residual(self, measured: Array, output: Array, unit: str) -> tuple[Residual, Array]:
+        difference = self._clean(measured - output)
+        return single(difference, white_noise(measured), unit, self.period), difference
+
+    def motor(self) -> Residual:
+        """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
+        measured = self._sensor("load_cell")
+        travel = self.structure_motion.position - self.wheel_motion.position
+        output = replay_motor(self.configuration, travel, self._command("voltage"), self.preload)
+        resolved = white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER + CERTAIN * math.hypot(
+            self.structure_motion.velocity_error, self.wheel_motion.velocity_error
+        )
+        slides = np.abs(np.gradient(travel, self.period)) > resolved
+        if not slides.any():
+            raise Undetermined("the motor never slides fast enough for its friction to be known")
+        difference = self._clean(measured - output)
+        left = rms(difference[slides])
+        floor = white_noise(measured)
+        return Residual(left, floor, left / floor, "N", band(difference * slides, self.period))
+
+    def carriage(self) -> Residual:
+        return self._residual(self.wheel, self.carriage_output, "m")[0]
+
+    def mechanics(self) -> Residual:
+        pairs = {
+            "load_cell": self._residual(self._sensor("load_cell"), self.mechanics_output.load_cell, "N"),
+            "wheel": self._residual(self.wheel, self.mechanics_output.wheel, "m"),
+        }
+        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+
+    def structure_cylinder(self) -> Residual:
+        return self._residual(self._sensor("structure_lvdt"), self.structure_cylinder_output, "m")[0]
+
+    def ground_cylinder(self) -> Residual:
+        return self._residual(self._sensor("ground_lvdt"), self.ground_cylinder_output, "m")[0]
+
+    def _demands(self) -> Array:
+        return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
+
+    def controller(self) -> Residual:
+        unlimited = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+        replay = Replay(self.recording)
+        for _ in run(replay, unlimited, self._demands()):
+            pass
+        outputs: dict[str, Residual] = {}
+        differences: dict[str, Array] = {}
+        for number, (name, unit) in enumerate(zip(Commands._fields, ("m", "m", "N", "V"), strict=True)):
+            recorded = self._command(name)
+            differences[name] = np.array([commands[number] for commands in replay.written]) - recorded
+            outputs[name] = single(differences[name], rounding(recorded), unit, self.period)
+        return together(outputs, differences, self.period)
+
+    def closed_loop(self) -> Residual:
+        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
+        quiet = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+        demands = self._demands()
+        twin = Twin(quiet, float(demands[0, 0]), CLOSED_LOOP_SEED)
+        truth = np.concatenate([block.truth for block in run_compiled(twin, quiet, demands) if block.truth is not None])
+        units = ("m", "m", "m", "N")
+        pairs = {
+            name: self._residual(self._sensor(name), truth[:, number], unit)
+            for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
+        }
+        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+
+
+REPLAYS: dict[str, Callable[[Replays], Residual]] = {
+    "motor": Replays.motor,
+    "carriage": Replays.carriage,
+    "mechanics": Replays.mechanics,
+    "structure_cylinder": Replays.structure_cylinder,
+    "ground_cylinder": Replays.ground_cylinder,
+    "controller": Replays.controller,
+    "closed_loop": Replays.closed_loop,
+}
+"""Every replay by name, in the order in which they are reported."""
+
+
+def rounding(recorded: Array) -> float:
+    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit for a column of zeros."""
+    largest = float(np.max(np.abs(recorded)))
+    if largest == 0.0:
+        return 1e-12
+    return float(10.0 ** (math.floor(math.log10(largest)) + 1 - SIGNIFICANT_DIGITS) / math.sqrt(12.0))
+
+
+def compare(
+    recording: Recording, configuration: Configuration, progress: Callable[[str], object] = lambda name: None
+) -> Comparison:
+    """Replays everything. configuration: of the twin, see `configuration_of`; progress is called with each replay's name."""
+    replays = Replays(recording, configuration)
+    left_out: dict[str, str] = {}
+    if not recording.controller:
+        reason = "the recording does not say what the controller was told to do"
+        left_out = {"controller": reason, "closed_loop": reason}
+    results: dict[str, Residual] = {}
+    for name, replay in REPLAYS.items():
+        if name not in left_out:
+            progress(name)
+            try:
+                results[name] = replay(replays)
+            except Undetermined as reason:
+                left_out[name] = str(reason)
+    return Comparison(results, left_out, recording.notes)
+
+
+def compare_recordings(first: Recording, second: Recording) -> dict[str, Residual]:
+    """Two recordings of one test, channel by channel over their common length. The floor is both sensors' noise together.
+
+    Raises RigtwinError if their periods differ or they share no channel.
+    """
+    if first.period != second.period:
+        raise RigtwinError(f"periods differ: {first.path} has {first.period:g} s, {second.path} has {second.period:g} s")
+    ticks = min(first.ticks, second.ticks)
+    if ticks < SHORTEST:
+        raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")
+    results: dict[str, Residual] = {}
+    for name, unit in zip(Measurements._fields, ("m", "m", "m", "N"), strict=True):
+        if first.has("/sensor", name) and second.has("/sensor", name):
+            one, other = first.column("/sensor", name)[:ticks], second.column("/sensor", name)[:ticks]
+            difference = without_mains(one - other, first.period, 50.0)
+            results[name] = single(difference, math.hypot(white_noise(one), white_noise(other)), unit, first.period)
+    if not results:
+        raise RigtwinError(f"{first.path} and {second.path} share no sensor")
+    return results

@@ -1,0 +1,159 @@
+"""Component replays: recorded signals drive one component alone, and its output is put beside what was measured.
+
+All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces than a test does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rigtwin.compiling import forward, integrate, kernel
+from rigtwin.configuration import Configuration
+from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
+from rigtwin.model import Handles, build, handles
+from rigtwin.parameters import Carriage, Cylinder, Rail
+from rigtwin.plant import drive, true_measurements
+
+Array = NDArray[np.float64]
+
+FIXED = 1e6
+"""kg; a carriage this heavy goes where it is driven."""
+AWAY = 1.0
+"""m; a ground plate this far back does not touch the tyre."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m; shape (ticks,)."""
+
+    load_cell: Array
+    wheel: Array
+
+
+@kernel
+def _cylinder(model: CylinderModel, state: CylinderState, commands: Array, substeps: int, out: Array) -> None:
+    for tick in range(len(commands)):
+        out[tick] = state.position[0]
+        for _ in range(substeps):
+            advance_cylinder(model, state, commands[tick])
+
+
+def replay_cylinder(cylinder: Cylinder, configuration: Configuration, commands: Array, start: float) -> Array:
+    """Command → plate position at every tick, m, from rest at `start`."""
+    out = np.empty(len(commands))
+    model = sampled(cylinder, configuration.timing.timestep)
+    _cylinder(model, settled(cylinder, start), np.ascontiguousarray(commands), configuration.substeps, out)
+    return out
+
+
+@kernel
+def _mechanics(
+    mechanics: Handles,
+    substeps: int,
+    ground: Array,
+    structure: Array,
+    carriage: Array,
+    voltage: Array,
+    force: Array,
+    load_cell_out: Array,
+    wheel_out: Array,
+) -> None:
+    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage free."""
+    driven = len(carriage) > 0
+    ticks = len(voltage)
+    for tick in range(ticks):
+        mechanics.control[0] = voltage[tick]
+        following = force[min(tick + 1, ticks - 1)]
+        for substep in range(substeps):
+            now = tick * substeps + substep
+            drive(mechanics, mechanics.ground, ground[now], ground[now + 1])
+            drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
+            if driven:
+                drive(mechanics, mechanics.carriage, carriage[now], carriage[now + 1])
+                # Holds what is driven against the motor, or its friction would be asked to.
+                motor = mechanics.motor_constant * mechanics.activation[0]
+                mechanics.applied[mechanics.carriage] = motor
+                mechanics.applied[mechanics.structure] = -motor
+            else:
+                share = substep / substeps
+                mechanics.applied[mechanics.carriage] = -((1.0 - share) * force[tick] + share * following)
+            forward(mechanics.model, mechanics.data, 0, 1 if substep else 0)
+            if substep == 0:
+                true = true_measurements(mechanics)
+                load_cell_out[tick] = true.load_cell
+                wheel_out[tick] = true.structure_lvdt - true.suspension_lvdt
+                if tick == ticks - 1:
+                    return
+            integrate(mechanics.model, mechanics.data)
+
+
+def _between(motion: Array, substeps: int) -> Array:
+    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity must not jump, or a motor
+    that sticks would have to pass on the blow."""
+    ticks = len(motion)
+    spline = CubicSpline(np.arange(ticks), motion)
+    fine = spline(np.arange(substeps * (ticks - 1) + 1) / substeps)
+    return np.append(fine, 2 * fine[-1] - fine[-2])
+
+
+def _run(
+    model: mujoco.MjModel,
+    configuration: Configuration,
+    ground: Array,
+    structure: Array,
+    carriage: Array | None,
+    voltage: Array,
+    force: Array,
+    preload: float,
+    wheel: float,
+) -> Output:
+    """preload: motor force at the start, N; wheel: carriage position at the start, m."""
+    data = mujoco.MjData(model)
+    view = handles(model, data)
+    view.qpos[view.carriage] = wheel
+    view.activation[0] = preload / view.motor_constant
+    substeps = configuration.substeps
+    out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
+    _mechanics(
+        view,
+        substeps,
+        _between(ground, substeps),
+        _between(structure, substeps),
+        np.empty(0) if carriage is None else _between(carriage, substeps),
+        np.ascontiguousarray(voltage),
+        np.ascontiguousarray(force),
+        out.load_cell,
+        out.wheel,
+    )
+    return out
+
+
+def replay_carriage(configuration: Configuration, ground: Array, force: Array, preload: float) -> Array:
+    """Ground motion and measured suspension force → wheel position, m. The motor is out of it."""
+    plant = configuration.plant
+    alone = plant._replace(motor=plant.motor._replace(coulomb=0.0))
+    nothing = np.zeros_like(force)
+    wheel = float(ground[0]) - preload / plant.tyre.stiffness
+    model = build(alone, configuration.timing.timestep)
+    return _run(model, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
+
+
+def replay_mechanics(configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float) -> Output:
+    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
+    plant = configuration.plant
+    wheel = float(ground[0]) - preload / plant.tyre.stiffness
+    model = build(plant, configuration.timing.timestep)
+    return _run(model, configuration, ground, structure, None, voltage, np.zeros_like(voltage), preload, wheel)
+
+
+def replay_motor(configuration: Configuration, travel: Array, voltage: Array, preload: float) -> Array:
+    """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
+    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(0.0))
+    model = build(alone, configuration.timing.timestep)
+    nothing = np.zeros_like(travel)
+    return _run(model, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0).load_cell

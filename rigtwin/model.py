@@ -1,0 +1,92 @@
+"""The mechanics: the MJCF model with a plant's values written into it, and the views of it that compiled code needs."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from rigtwin.parameters import Plant
+
+Array = NDArray[np.float64]
+
+SCENE = files("models") / "xml" / "scene.xml"
+"""The rig with lights and cameras."""
+MECHANICS = files("models") / "xml" / "suspension_rig.xml"
+"""The rig alone."""
+
+
+class Handles(NamedTuple):
+    """Addresses of MuJoCo's structures, live views of their arrays, and where each part stands in them."""
+
+    model: int
+    data: int
+    timestep: float
+    qpos: Array
+    qvel: Array
+    activation: Array
+    control: Array
+    applied: Array
+    sensors: Array
+    ground: int
+    carriage: int
+    structure: int
+    load_cell: int
+    motor_constant: float
+
+
+def build(plant: Plant, timestep: float) -> mujoco.MjModel:
+    """The mechanics of that plant. timestep in s."""
+    model = mujoco.MjModel.from_xml_path(str(MECHANICS))
+    model.opt.timestep = timestep
+    model.body("carriage").mass = plant.carriage.mass
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    model.dof_frictionloss[model.joint("carriage").dofadr[0]] = plant.rail.coulomb
+    model.tendon_frictionloss[model.tendon("motor").id] = plant.motor.coulomb
+    # Two timesteps: the fastest friction constraint MuJoCo takes as it is, so the least creep.
+    model.dof_solref[:, 0] = 2 * timestep
+    model.tendon_solref_fri[:, 0] = 2 * timestep
+    write_tyre(model, plant.tyre.stiffness)
+    motor = model.actuator("motor")
+    motor.gainprm[0] = plant.motor.constant
+    motor.dynprm[0] = plant.motor.time_constant
+    limit = min(plant.motor.voltage_limit, plant.motor.force_limit / plant.motor.constant)
+    motor.ctrlrange[:] = (-limit, limit)
+    return model
+
+
+def write_tyre(model: mujoco.MjModel, stiffness: float) -> None:
+    """Makes the tyre's contact a spring of `stiffness` N/m.
+
+    MuJoCo solves f·(A + R) = −k·r with R = (1 − d)/d·D and k = −solref/d, where d is the impedance, A the contact's exact
+    inverse mass and D its approximate one (MuJoCo documentation, computation, "Parameters"). Solved for solref here.
+    """
+    pair = model.pair("tyre")
+    impedance = float(pair.solimp[0])
+    bodies = [int(model.geom_bodyid[geom]) for geom in (pair.geom1[0], pair.geom2[0])]
+    exact = sum(1.0 / float(model.body_mass[body]) for body in bodies)
+    approximate = sum(float(model.body_invweight0[body, 0]) for body in bodies)
+    pair.solref[:] = (-stiffness * (impedance * exact + (1.0 - impedance) * approximate), 0.0)
+
+
+def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
+    """Views of one simulation. They live as long as `model` and `data` do."""
+    return Handles(
+        model=model._address,
+        data=data._address,
+        timestep=float(model.opt.timestep),
+        qpos=data.qpos,
+        qvel=data.qvel,
+        activation=data.act,
+        control=data.ctrl,
+        applied=data.qfrc_applied,
+        sensors=data.sensordata,
+        ground=int(model.joint("ground").qposadr[0]),
+        carriage=int(model.joint("carriage").qposadr[0]),
+        structure=int(model.joint("structure").qposadr[0]),
+        load_cell=int(model.sensor("load_cell").adr[0]),
+        motor_constant=float(model.actuator("motor").gainprm[0]),
+    )

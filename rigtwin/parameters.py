@@ -1,0 +1,93 @@
+"""The nominal rig: every physical value with its unit, bounds and source. One NamedTuple a component.
+
+Compiled code reads these tuples as they are; `rigtwin.configuration` overrides them by name, e.g. `rail.coulomb`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from controllers.quantity import Quantity
+
+_H = "identified closed loop H(s), thesis Eq. 6.2"
+
+
+class Carriage(NamedTuple):
+    """Rail-guided carriage with wheel and tyre."""
+
+    mass: Annotated[float, Quantity("kg", 1.0, 1e4, "34 kg with wheel and tyre; thesis ch. 3")] = 34.0
+
+
+class Rail(NamedTuple):
+    """Dry friction of the rail guide, with true stiction: static = kinetic."""
+
+    coulomb: Annotated[float, Quantity("N", 0.0, 1000.0, "breakaway, thesis §6.1.3")] = 50.0
+
+
+class Tyre(NamedTuple):
+    """Tyre: a compliant contact that only pushes."""
+
+    stiffness: Annotated[float, Quantity("N/m", 1e3, 1e7, "best match of the tests, thesis §6.3")] = 50_000.0
+
+
+class Motor(NamedTuple):
+    """Linear motor Dunkermotoren STB3810 and its amplifier."""
+
+    constant: Annotated[float, Quantity("N/V", 1.0, 1e3, "±10 V ↔ ±1860 N, assumed linear")] = 186.0
+    time_constant: Annotated[float, Quantity("s", 2e-4, 0.1, "data sheet: 1.26 ms")] = 1.26e-3
+    force_limit: Annotated[float, Quantity("N", 1.0, 1e4, "data sheet: peak force")] = 1860.0
+    voltage_limit: Annotated[float, Quantity("V", 0.1, 10.0, "amplifier input ±10 V")] = 10.0
+    coulomb: Annotated[float, Quantity("N", 0.0, 500.0, "0.15 V step is 2·F_c, thesis §4.4: 0.15·186/2")] = 14.0
+    stroke: Annotated[float, Quantity("m", 0.01, 2.0, "data sheet: 0.21 m")] = 0.21
+
+
+class Cylinder(NamedTuple):
+    """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s + a0), scaled to unit
+    static gain, then a limit of the speed."""
+
+    b2: Annotated[float, Quantity("1/s^2", -1e6, 1e6, _H)] = 1817.0
+    b1: Annotated[float, Quantity("1/s^3", -1e8, 1e8, _H)] = 7.719e4
+    b0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, _H)] = 6.243e5
+    a3: Annotated[float, Quantity("1/s", 0.0, 1e5, _H)] = 165.9
+    a2: Annotated[float, Quantity("1/s^2", 0.0, 1e8, _H)] = 6674.0
+    a1: Annotated[float, Quantity("1/s^3", 0.0, 1e10, _H)] = 8.598e4
+    a0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, _H)] = 6.281e5
+    speed_limit: Annotated[float, Quantity("m/s", 0.001, 10.0, "Vickers cylinder, thesis §3.2")] = 0.3
+
+
+class Lvdt(NamedTuple):
+    """Position sensor as the DAQ reads it."""
+
+    white: Annotated[float, Quantity("m", 0.0, 0.01, "rms, thesis §3.4 (±5e-4 m in all)")] = 6e-5
+    hum: Annotated[float, Quantity("m", 0.0, 0.01, "amplitude of the mains line, thesis §3.4")] = 2e-4
+    resolution: Annotated[float, Quantity("m", 0.0, 0.01, "16 bit")] = 4.6e-6
+
+
+class LoadCell(NamedTuple):
+    """Force sensor Interface 1010AF between motor rod and plate, as the DAQ reads it."""
+
+    white: Annotated[float, Quantity("N", 0.0, 500.0, "rms, thesis §3.4 (±12 N in all)")] = 1.5
+    hum: Annotated[float, Quantity("N", 0.0, 500.0, "amplitude of the mains line, thesis §3.4")] = 5.0
+    resolution: Annotated[float, Quantity("N", 0.0, 100.0, "16 bit of ±2.5 kN")] = 0.076
+
+
+class Mains(NamedTuple):
+    """The hum that all sensors pick up, each with a phase of its own."""
+
+    frequency: Annotated[float, Quantity("Hz", 1.0, 400.0, "mains, thesis §3.4")] = 50.0
+
+
+class Plant(NamedTuple):
+    """The whole nominal rig."""
+
+    carriage: Carriage = Carriage()
+    rail: Rail = Rail()
+    tyre: Tyre = Tyre()
+    motor: Motor = Motor()
+    ground_cylinder: Cylinder = Cylinder()
+    structure_cylinder: Cylinder = Cylinder()
+    ground_lvdt: Lvdt = Lvdt()
+    structure_lvdt: Lvdt = Lvdt()
+    suspension_lvdt: Lvdt = Lvdt()
+    load_cell: LoadCell = LoadCell()
+    mains: Mains = Mains()

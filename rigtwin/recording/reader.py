@@ -1,0 +1,220 @@
+"""Reads recordings, whoever wrote them: JSON or protobuf messages, whole files or what is left of them."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zstandard
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from google.protobuf.message import DecodeError
+from mcap.exceptions import InvalidMagic, McapError
+from mcap.records import Channel, Message, Metadata, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader
+from numpy.typing import NDArray
+
+from rigtwin.channels import topic_fields
+from rigtwin.errors import RigtwinError
+from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
+
+Array = NDArray[np.float64]
+
+_DAMAGE = (McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, EOFError, UnicodeDecodeError, ValueError)
+"""What the mcap package raises on a file that ends or breaks in the middle."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One test as recorded.
+
+    columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since the start, shape (ticks,).
+    controller: the operator's settings, empty if the recording does not say. notes: what is wrong or missing, for people.
+    """
+
+    path: Path
+    machine: str
+    experiment: str
+    period: float
+    time: Array
+    columns: Mapping[str, Mapping[str, Array]]
+    controller: Mapping[str, object]
+    twin: Mapping[str, str] = field(default_factory=dict)
+    end: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def ticks(self) -> int:
+        return len(self.time)
+
+    def has(self, topic: str, name: str) -> bool:
+        return name in self.columns.get(topic, {})
+
+    def column(self, topic: str, name: str) -> Array:
+        """One channel. Raises RigtwinError naming what is there if it is missing."""
+        try:
+            return self.columns[topic][name]
+        except KeyError:
+            there = ", ".join(f"{t}.{n}" for t, names in self.columns.items() for n in names) or "none"
+            raise RigtwinError(f"{self.path}: channel {topic}.{name} is missing; it has {there}") from None
+
+
+def load(path: Path) -> Recording:
+    """Reads a recording. Raises RigtwinError if it is none, is empty, or is of a format this version does not read."""
+    metadata: dict[str, dict[str, str]] = {}
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    raw: dict[int, tuple[list[int], list[bytes]]] = {}
+    notes: list[str] = []
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                raise RigtwinError(f"{path} is empty; expected an MCAP recording")
+            file.seek(0)
+            try:
+                for record in StreamReader(file, validate_crcs=True).records:
+                    if isinstance(record, Message):
+                        times, data = raw.setdefault(record.channel_id, ([], []))
+                        times.append(record.log_time)
+                        data.append(record.data)
+                    elif isinstance(record, Metadata):
+                        metadata[record.name] = record.metadata
+                    elif isinstance(record, Schema):
+                        schemas[record.id] = record
+                    elif isinstance(record, Channel):
+                        channels[record.id] = record
+            except (InvalidMagic, struct.error):
+                if not channels and not metadata:
+                    raise RigtwinError(f"{path} is not an MCAP file") from None
+                notes.append("damaged or cut off")
+            except _DAMAGE:
+                notes.append("damaged or cut off")
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+
+    about = metadata.get(RECORD)
+    if about is None:
+        raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
+    period = _period(path, about)
+    controller = _controller(path, about)
+    tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
+    for number, (times, data) in raw.items():
+        channel = channels.get(number)
+        if channel is None or channel.topic not in known_topics():
+            continue
+        values = _decoded(path, channel, schemas.get(channel.schema_id), data)
+        tables[channel.topic] = (np.array(times, np.int64), values)
+    if not tables:
+        raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}")
+    time, columns = _aligned(tables, notes)
+    _look_at_times(time, period, notes)
+    if notes and "cut off" in notes[0]:
+        notes[0] += f"; readable up to {time[-1]:.3f} s"
+    return Recording(
+        path=path,
+        machine=about.get("machine", ""),
+        experiment=about.get("experiment", ""),
+        period=period,
+        time=time,
+        columns=columns,
+        controller=controller,
+        twin=metadata.get(TWIN_RECORD, {}),
+        end=metadata.get(END_RECORD, {}).get("reason", ""),
+        notes=tuple(notes),
+    )
+
+
+def _period(path: Path, about: Mapping[str, str]) -> float:
+    if about.get("format") != WRITTEN_FORMAT:
+        raise RigtwinError(f"{path}: format {about.get('format')!r}; this version reads {WRITTEN_FORMAT!r}")
+    try:
+        period = float(about.get("period", ""))
+    except ValueError:
+        period = math.nan
+    if not 0.0 < period < 10.0:
+        raise RigtwinError(f"{path}: period {about.get('period')!r}; expected seconds above 0 and below 10")
+    return period
+
+
+def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
+    try:
+        config = json.loads(about.get("config", "{}"))
+        controller = config.get("controller", {})
+        if not isinstance(controller, dict):
+            raise ValueError
+    except (ValueError, AttributeError):
+        raise RigtwinError(f"{path}: metadata config is not a JSON object with an object 'controller'") from None
+    return controller
+
+
+def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes]) -> dict[str, Array]:
+    names = topic_fields(channel.topic)
+    if channel.message_encoding == "json":
+        decode: Callable[[bytes], Mapping[str, Any]] = json.loads
+    elif channel.message_encoding == "protobuf":
+        if schema is None:
+            raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
+        present, numbers, decode = _protobuf(path, schema)
+        block = b"".join(data)
+        ours = [name for name in names if name in present]
+        if numbers == list(range(1, len(present) + 1)) and len(block) == len(data) * len(present) * FIELD.itemsize:
+            fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
+            if (fields["tag"] == tags(len(present))).all():
+                return {name: fields["value"][:, present.index(name)].copy() for name in ours}
+    else:
+        raise RigtwinError(f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; expected json or protobuf")
+    try:
+        rows = [decode(item) for item in data]
+        ours = [name for name in names if name in rows[0]]
+        return {name: np.array([row[name] for row in rows], np.float64) for name in ours}
+    except (ValueError, KeyError, TypeError, DecodeError) as error:
+        raise RigtwinError(f"{path}: a message on {channel.topic} cannot be read: {error!r}") from None
+
+
+def _protobuf(path: Path, schema: Schema) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
+    """Field names and numbers of a message type, and a decoder that takes anything of that type."""
+    try:
+        files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+        pool = descriptor_pool.DescriptorPool()
+        for file in files.file:
+            pool.Add(file)
+        found = pool.FindMessageTypeByName(schema.name)
+    except (KeyError, TypeError, DecodeError) as error:
+        raise RigtwinError(f"{path}: schema {schema.name!r} cannot be read: {error}") from None
+    names = [item.name for item in found.fields]
+    doubles = all(item.type == item.TYPE_DOUBLE for item in found.fields)
+    kind = message_factory.GetMessageClass(found)
+
+    def decode(item: bytes) -> Mapping[str, Any]:
+        message = kind.FromString(item)
+        return {name: getattr(message, name) for name in names}
+
+    return names, [item.number for item in found.fields] if doubles else [], decode
+
+
+def _aligned(
+    tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
+) -> tuple[Array, dict[str, dict[str, Array]]]:
+    """The ticks that every topic has, in order."""
+    common = np.unique(next(iter(tables.values()))[0])
+    for times, _ in tables.values():
+        common = np.intersect1d(common, times)
+    columns: dict[str, dict[str, Array]] = {}
+    for topic, (times, values) in tables.items():
+        _, first = np.unique(times, return_index=True)
+        keep = first[np.isin(times[first], common)]
+        if len(keep) < len(times):
+            notes.append(f"{len(times) - len(keep)} messages on {topic} left out: repeated, or without their like on another topic")
+        columns[topic] = {name: column[keep] for name, column in values.items()}
+    return common * 1e-9, columns
+
+
+def _look_at_times(time: Array, period: float, notes: list[str]) -> None:
+    gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
+    if len(gaps):
+        notes.append(f"{len(gaps)} gaps in time, the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s")

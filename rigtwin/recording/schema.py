@@ -1,0 +1,56 @@
+"""Protobuf message types of the topics, made from the channel table. All fields are doubles, so every message of a topic
+has the same length and whole blocks are encoded and decoded at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from google.protobuf import descriptor_pb2
+from numpy.typing import NDArray
+
+from rigtwin.channels import CHANNELS, topic_fields
+
+Array = NDArray[np.float64]
+
+WRITTEN_FORMAT = "1"
+"""Format number in the metadata of the recordings that this version reads and writes."""
+RECORD = "rigtwin"
+"""Name of the metadata record that says what the test was."""
+TWIN_RECORD = "rigtwin.twin"
+"""Name of the metadata record that says how a twin made the recording."""
+END_RECORD = "rigtwin.end"
+"""Name of the metadata record that says why the test ended."""
+
+_DOUBLE_WIRE_TYPE = 1
+
+
+def type_name(topic: str) -> str:
+    """Full name of a topic's message type, e.g. `rigtwin.Command`."""
+    return "rigtwin." + topic.strip("/").capitalize()
+
+
+def descriptor(topic: str) -> bytes:
+    """Serialized FileDescriptorSet of a topic's message type, as an MCAP schema holds it."""
+    file = descriptor_pb2.FileDescriptorProto(name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3")
+    message = file.message_type.add(name=type_name(topic).partition(".")[2])
+    for number, name in enumerate(topic_fields(topic), start=1):
+        message.field.add(
+            name=name,
+            number=number,
+            type=descriptor_pb2.FieldDescriptorProto.TYPE_DOUBLE,
+            label=descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL,
+        )
+    return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
+
+
+FIELD = np.dtype([("tag", "u1"), ("value", "<f8")])
+"""An encoded field; a message is one of these for each channel of its topic."""
+
+
+def tags(count: int) -> NDArray[np.uint8]:
+    """Protobuf tags of fields 1 … count."""
+    return ((np.arange(1, count + 1) << 3) | _DOUBLE_WIRE_TYPE).astype(np.uint8)
+
+
+def known_topics() -> tuple[str, ...]:
+    """Topics of the channel table, in order."""
+    return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))

@@ -1,0 +1,56 @@
+"""Runs one test on the twin and records it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigtwin import __version__
+from rigtwin.configuration import Configuration, flattened
+from rigtwin.loop import run_compiled
+from rigtwin.recording import Writer
+from rigtwin.safety import Trip, explained
+from rigtwin.twin import Twin
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it early."""
+
+    path: Path
+    ticks: int
+    reason: str
+    tripped: bool
+
+
+def record(
+    path: Path,
+    experiment: str,
+    configuration: Configuration,
+    demands: Array,
+    seed: int,
+    progress: Callable[[int], object] = lambda ticks: None,
+) -> Outcome:
+    """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
+
+    progress is called with the ticks done since its last call. A trip, an interruption or an exception leaves a readable
+    recording that says why it ended. Raises RigtwinError before anything is written if the configuration is at fault.
+    """
+    twin = Twin(configuration, float(demands[0, 0]), seed)
+    settings = flattened(configuration)
+    ticks, trip = 0, Trip.NONE
+    with Writer(path, experiment, configuration.timing.period, settings["controller"]) as writer:
+        writer.add_twin(seed, settings, (), __version__)
+        for block in run_compiled(twin, configuration, demands):
+            writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
+            ticks, trip = ticks + len(block.commands), block.trip
+            progress(len(block.commands))
+        reason = explained(trip, configuration.safety)
+        writer.finish(reason)
+    return Outcome(path, ticks, reason, trip != Trip.NONE)
