@@ -12,6 +12,8 @@ from rigtwin.configuration import Configuration
 from rigtwin.excitation import road_profile
 
 Array = NDArray[np.float64]
+Progress = Callable[[int], object]
+"""Called with the steps done since its last call."""
 
 
 @dataclass(frozen=True)

@@ -80,8 +80,8 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--json", type=Path, metavar="J", help="also write the figures to a file")
     settings(compare)
 
-    reproduce = command("reproduce", "run a study of the thesis and print its figures beside ours", "studies: table-3.5, chapter-6")
-    reproduce.add_argument("study", help="table-3.5 or chapter-6")
+    reproduce = command("reproduce", "run a study of the thesis and print its figures beside ours", "studies: table-3.5 (single mass), identification (Eq. 6.1, 6.2), chapter-6 (drop and road; draws)")
+    reproduce.add_argument("study", help="table-3.5, identification or chapter-6")
     reproduce.add_argument("--seeds", type=int, default=16, help="noise seeds to take the median over (default 16)")
     reproduce.add_argument("--out", "-o", type=Path, metavar="F.png", help="where to draw the figure, if the study has one")
     return top

@@ -56,6 +56,12 @@ def drive(mechanics: Handles, joint: int, here: float, there: float) -> None:
 
 
 @compilable
+def brace(mechanics: Handles) -> None:
+    """Holds the structure plate against the motor, so that its friction is not asked to."""
+    mechanics.applied[mechanics.structure] = -mechanics.motor_constant * mechanics.activation[0]
+
+
+@compilable
 def true_measurements(mechanics: Handles) -> Measurements:
     """What ideal sensors read of the state last computed by `forward` with its sensors."""
     ground, structure = mechanics.qpos[mechanics.ground], mechanics.qpos[mechanics.structure]
@@ -79,6 +85,7 @@ def sense(machine: Machine, ground_command: float, structure_command: float) -> 
         structure,
         next_position(machine.structure, machine.structure_state, structure_command),
     )
+    brace(mechanics)
     forward(mechanics.model, mechanics.data, 0, 0)
     return true_measurements(mechanics)
 
@@ -94,5 +101,6 @@ def advance(machine: Machine, ground_command: float, structure_command: float, v
         advance_cylinder(machine.structure, machine.structure_state, structure_command)
         drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0])
         drive(mechanics, mechanics.structure, structure, machine.structure_state.position[0])
+        brace(mechanics)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)

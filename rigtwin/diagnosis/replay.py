@@ -17,7 +17,7 @@ from rigtwin.configuration import Configuration
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
 from rigtwin.model import Handles, build, handles
 from rigtwin.parameters import Carriage, Cylinder, Rail
-from rigtwin.plant import drive, true_measurements
+from rigtwin.plant import brace, drive, true_measurements
 
 Array = NDArray[np.float64]
 
@@ -75,13 +75,11 @@ def _mechanics(
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
                 drive(mechanics, mechanics.carriage, carriage[now], carriage[now + 1])
-                # Holds what is driven against the motor, or its friction would be asked to.
-                motor = mechanics.motor_constant * mechanics.activation[0]
-                mechanics.applied[mechanics.carriage] = motor
-                mechanics.applied[mechanics.structure] = -motor
+                mechanics.applied[mechanics.carriage] = mechanics.motor_constant * mechanics.activation[0]
             else:
                 share = substep / substeps
                 mechanics.applied[mechanics.carriage] = -((1.0 - share) * force[tick] + share * following)
+            brace(mechanics)
             forward(mechanics.model, mechanics.data, 0, 1 if substep else 0)
             if substep == 0:
                 true = true_measurements(mechanics)

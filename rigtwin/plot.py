@@ -1,0 +1,128 @@
+"""Draws a recording: what moved, what pushed, and what the controller asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from rigtwin.errors import RigtwinError
+from rigtwin.recording import Recording
+
+Array = NDArray[np.float64]
+
+COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
+KINDS = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One line of a panel. needs: its channels; value: of them, in the panel's unit."""
+
+    label: str
+    colour: str
+    needs: tuple[tuple[str, str], ...]
+    value: Callable[..., Array]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Lines that share an axis."""
+
+    title: str
+    traces: tuple[Trace, ...]
+
+
+def _millimetres(position: Array) -> Array:
+    return 1e3 * position
+
+
+def _wheel(structure: Array, travel: Array) -> Array:
+    return 1e3 * (structure - travel)
+
+
+def _plain(signal: Array) -> Array:
+    return signal
+
+
+SENSED, ASKED = COLOURS["measured"], COLOURS["commanded"]
+PANELS = (
+    Panel(
+        "ground, mm",
+        (
+            Trace("measured", SENSED, (("/sensor", "ground_lvdt"),), _millimetres),
+            Trace("commanded", ASKED, (("/command", "ground"),), _millimetres),
+        ),
+    ),
+    Panel(
+        "plate (sprung mass), mm",
+        (
+            Trace("measured", SENSED, (("/sensor", "structure_lvdt"),), _millimetres),
+            Trace("commanded", ASKED, (("/command", "structure"),), _millimetres),
+        ),
+    ),
+    Panel("suspension travel, mm", (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),)),
+    Panel(
+        "wheel, mm",
+        (Trace("plate − travel", SENSED, (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")), _wheel),),
+    ),
+    Panel(
+        "suspension force, N",
+        (
+            Trace("measured", SENSED, (("/sensor", "load_cell"),), _plain),
+            Trace("demanded", ASKED, (("/command", "force"),), _plain),
+        ),
+    ),
+    Panel("motor voltage, V", (Trace("commanded", ASKED, (("/command", "voltage"),), _plain),)),
+)
+"""What is drawn, from top to bottom; a panel without data is left out."""
+
+
+def stretch(recording: Recording, start: float, until: float | None) -> slice:
+    """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
+    end = float(recording.time[-1]) if until is None else until
+    first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
+    if last - first < 2:
+        span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
+        raise RigtwinError(f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}")
+    return slice(int(first), int(last))
+
+
+def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
+    """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
+    if out.suffix.lower() not in KINDS:
+        raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
+    ticks = stretch(recording, start, until)
+    time = recording.time[ticks]
+    there = [
+        (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
+        for panel in PANELS
+    ]
+    there = [(title, traces) for title, traces in there if traces]
+    figure = Figure(figsize=(11, 1.9 * len(there) + 0.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (title, traces) in zip(axes, there, strict=True):
+        for trace in traces:
+            signal = trace.value(*(recording.column(*channel)[ticks] for channel in trace.needs))
+            axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
+        axis.set_ylabel(title, fontsize=9)
+        axis.grid(alpha=0.3)
+        axis.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
+    axes[-1].set_xlabel("time, s")
+    ending = f" · {recording.end}" if recording.end else ""
+    figure.suptitle(f"{recording.path.name} · {recording.experiment}{ending}", fontsize=11)
+    save(figure, out)
+
+
+def save(figure: Figure, out: Path) -> None:
+    """Writes a figure. Raises RigtwinError if the file cannot be written."""
+    try:
+        figure.savefig(out, dpi=110)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {out}: {error.strerror}") from None

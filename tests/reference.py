@@ -1,0 +1,32 @@
+"""Independent integrations that the twin is checked against. They share no code with it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@njit
+def coulomb_carriage(
+    ground: Array, force: Array, step: float, mass: float, stiffness: float, friction: float, start: float, every: int
+) -> Array:
+    """Carriage with set-valued dry friction on a tyre that only pushes; Moreau's time stepping.
+
+    ground (m) and force (N, against +x) at every step; returns the position at every `every`-th step.
+    """
+    out = np.empty((len(ground) + every - 1) // every)
+    position, velocity = start, 0.0
+    for number in range(len(ground)):
+        if number % every == 0:
+            out[number // every] = position
+        midpoint = position + 0.5 * step * velocity
+        tyre = max(stiffness * (ground[number] - midpoint), 0.0)
+        free = velocity + step * (tyre - force[number]) / mass
+        impulse = step * friction / mass
+        new = free - min(max(free, -impulse), impulse)
+        position = midpoint + 0.5 * step * new
+        velocity = new
+    return out

@@ -1,0 +1,104 @@
+"""Controllers against the equations of the thesis, and Python against compiled."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from controllers import Commands, Demand, Measurements, Mode, Settings, Skyhook, Travel, initial_state, update
+from controllers.filters import low_pass
+from controllers.force import MOTOR_CONSTANT, force_loop
+from controllers.skyhook import semi_active_damping
+from tests.conftest import rig_recording
+
+PERIOD = 1e-3
+EVERY = [
+    Settings(mode=mode, travel=travel, skyhook=skyhook, skyhook_damping=200.0, voltage_limit=limit)
+    for mode, travel, skyhook, limit in itertools.product(Mode, Travel, Skyhook, (10.0, 1.2))
+]
+
+
+def stream(count: int) -> list[tuple[Measurements, Demand]]:
+    """Measurements and demands of the size that the rig sees."""
+    random = np.random.default_rng(7)
+    walk = np.cumsum(random.standard_normal((count, 3)), axis=0) * 1e-4
+    force = 220 + 40 * random.standard_normal(count)
+    demand = np.cumsum(random.standard_normal((count, 2)), axis=0) * 1e-4
+    return [
+        (Measurements(*w.tolist(), float(f)), Demand(*d.tolist(), 230.0 + float(f) * 0.1))
+        for w, f, d in zip(walk, force, demand, strict=True)
+    ]
+
+
+@numba.njit
+def compiled_update(settings, state, measured, demand, period):  # type: ignore[no-untyped-def]
+    return update(settings, state, measured, demand, period)
+
+
+@pytest.mark.parametrize("settings", EVERY, ids=lambda s: f"{s.mode.label}-{s.travel.label}-{s.skyhook.label}-{s.voltage_limit:g}")
+def test_python_and_compiled_agree(settings):
+    plain = fast = initial_state(settings)
+    for measured, demand in stream(500):
+        plain, one = update(settings, plain, measured, demand, PERIOD)
+        fast, other = compiled_update(settings, fast, measured, demand, PERIOD)
+        assert np.max(np.abs(np.subtract(one, other))) < 1e-12
+    assert isinstance(one, Commands)
+
+
+def test_controllers_know_nothing_of_the_twin():
+    code = "import controllers, sys; assert not {'mujoco', 'rigtwin'} & set(sys.modules), sorted(sys.modules)"
+    root = Path(__file__).parents[1]
+    assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+def test_low_pass_is_backward_euler():
+    assert low_pass(1.0, 3.0, 0.01, 0.001) == pytest.approx(1.0 + 0.001 / 0.011 * 2.0)
+    assert low_pass(1.0, 3.0, 0.0, 0.001) == 3.0
+
+
+def test_integral_is_held_at_the_voltage_limit():
+    settings = Settings(voltage_limit=1.0)
+    integral, voltage = force_loop(settings, 5.0, 1000.0, 0.0, PERIOD)
+    assert (integral, voltage) == (5.0, 1.0)
+    integral, voltage = force_loop(settings, 0.0, 100.0, 90.0, PERIOD)
+    assert integral == pytest.approx(10.0 * 10.0 * PERIOD)
+    assert voltage == pytest.approx((100.0 + 0.3 * 10.0 + integral) / MOTOR_CONSTANT)
+
+
+def test_semi_active_damper_only_dissipates():
+    settings = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
+    for sprung, travel in itertools.product(np.linspace(-1, 1, 21), repeat=2):
+        damping = semi_active_damping(settings, sprung, travel)
+        assert settings.damping_min <= damping <= settings.damping_max
+        if sprung * travel <= 0:
+            assert damping == settings.damping_min
+
+
+def test_first_sample_sets_the_filters():
+    settings = Settings()
+    state, commands = update(settings, initial_state(settings), Measurements(0, 0, -0.01, 210.0), Demand(0, 0, 0), PERIOD)
+    assert (state.travel, state.velocity, state.force) == (-0.01, 0.0, 210.0)
+    assert commands.force == pytest.approx(200.0 + 10.0)
+    assert commands.structure == pytest.approx(-0.004 + (210.0 / 25 - 9.81) * 1e-6)
+
+
+@pytest.mark.parametrize("name", ["nominal-imposed", "nominal-road10", "nominal-drop"])
+def test_commands_of_the_stand_in_rig_reproduce(name):
+    recording = rig_recording(name)
+    settings = Settings(mode=Mode.parse(str(recording.controller["mode"])))
+    columns = [recording.column("/sensor", field) for field in Measurements._fields]
+    demands = [recording.column("/command", field) for field in Demand._fields]
+    state, commands = initial_state(settings), []
+    for row in range(recording.ticks):
+        measured, demand = Measurements(*(c[row] for c in columns)), Demand(*(d[row] for d in demands))
+        state, command = update(settings, state, measured, demand, recording.period)
+        commands.append(command)
+    for number, field in enumerate(Commands._fields):
+        recorded = recording.column("/command", field)
+        assert np.max(np.abs(np.array(commands)[:, number] - recorded)) <= 2e-7 * max(1.0, np.max(np.abs(recorded)))
