@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from controllers.compiled import compilable
@@ -15,11 +16,10 @@ from controllers.suspension import suspension_force
 
 
 class State(NamedTuple):
-    """What the controller remembers from tick to tick. Positions m, velocities m/s, forces N."""
+    """What the controller remembers from tick to tick, all floats. Positions m, velocities m/s, forces N."""
 
-    started: bool
     sample: float
-    """The last raw travel."""
+    """The last raw travel; not a number before the first tick."""
     travel: float
     velocity: float
     force: float
@@ -31,7 +31,7 @@ class State(NamedTuple):
 @compilable
 def initial_state(settings: Settings) -> State:
     """The state before the first tick: the structure model at rest at `start`."""
-    return State(False, 0.0, 0.0, 0.0, 0.0, 0.0, settings.start, 0.0)
+    return State(math.nan, 0.0, 0.0, 0.0, 0.0, settings.start, 0.0)
 
 
 @compilable
@@ -40,12 +40,12 @@ def update(settings: Settings, state: State, measured: Measurements, demand: Dem
     sample = measured.suspension_lvdt
     if settings.travel == Travel.GROUND:
         sample = measured.structure_lvdt - measured.ground_lvdt
-    if state.started:
+    if math.isnan(state.sample):
+        travel, velocity, force = sample, 0.0, measured.load_cell
+    else:
         travel = low_pass(state.travel, sample, settings.filter_position, period)
         velocity = low_pass(state.velocity, (sample - state.sample) / period, settings.filter_velocity, period)
         force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
-    else:
-        travel, velocity, force = sample, 0.0, measured.load_cell
 
     if settings.mode == Mode.IMPOSED:
         demanded = demand.force
@@ -58,5 +58,5 @@ def update(settings: Settings, state: State, measured: Measurements, demand: Dem
             settings, state.structure_position, state.structure_velocity, force, period
         )
     integral, voltage = force_loop(settings, state.integral, demanded, force, period)
-    after = State(True, sample, travel, velocity, force, integral, position, structure_velocity)
+    after = State(sample, travel, velocity, force, integral, position, structure_velocity)
     return after, Commands(demand.ground, position, demanded, voltage)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from controllers import Commands, Demand, Measurements, Settings, State, initial_state, update
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 
 BLOCK = 250
 """Ticks handed on at a time, so what is not yet in a recording is at most a quarter of a second."""
+
+
+STATE_SIZE = len(State._fields)
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def _ticks(
     settings: Settings,
     limits: Safety,
     resolution: Measurements,
-    state: State,
+    memory: Array,
     held: Commands,
     demands: Array,
     disturbance: Array,
@@ -86,7 +90,11 @@ def _ticks(
     commands_out: Array,
     measured_out: Array,
     truth_out: Array,
-) -> tuple[State, Commands, int, Trip]:
+) -> tuple[int, int]:
+    """Ticks done and the number of a Trip. Gives back plain numbers and arrays only: making any other Python object can run
+    into a pending Ctrl-C, which compiled code does not survive."""
+    state = State(*to_fixed_tuple(memory, STATE_SIZE))
+    done, trip = 0, Trip.NONE
     for tick in range(len(demands)):
         true = sense(machine, held.ground, held.structure)
         measured = sampled(true, disturbance[tick], resolution)
@@ -96,27 +104,30 @@ def _ticks(
             commands_out[tick, column] = commands[column]
             measured_out[tick, column] = measured[column]
             truth_out[tick, column] = true[column]
+        done = tick + 1
         trip = tripped(limits, measured, commands)
         if trip != Trip.NONE:
-            return state, held, tick + 1, trip
+            break
         advance(machine, commands.ground, commands.structure, commands.voltage)
         held = commands
-    return state, held, len(demands), Trip.NONE
+    for number in range(STATE_SIZE):
+        memory[number] = state[number]
+    return done, trip.value
 
 
 def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
     settings, period = configuration.controller, configuration.timing.period
-    state = initial_state(settings)
+    memory = np.array(initial_state(settings))
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
-        state, twin.held, done, trip = _ticks(
+        done, number = _ticks(
             twin.simulation.machine,
             settings,
             configuration.safety,
             twin.resolution,
-            state,
+            memory,
             twin.held,
             asked,
             twin.disturbance.take(len(asked)),
@@ -125,6 +136,8 @@ def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block
             measured,
             truth,
         )
-        yield Block(first, commands[:done], measured[:done], truth[:done], Trip(trip))
+        trip = Trip(number)
+        yield Block(first, commands[:done], measured[:done], truth[:done], trip)
         if trip != Trip.NONE:
             return
+        twin.held = Commands(*commands[-1].tolist())

@@ -9,12 +9,18 @@ from controllers import Commands, Measurements
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
 from rigtwin.converters import Disturbance, resolutions, sampled
-from rigtwin.plant import Simulation, advance, sense
+from rigtwin.plant import Machine, Simulation, advance, sense
 
 Array = NDArray[np.float64]
 
-_sense = kernel(sense)
 _advance = kernel(advance)
+
+
+@kernel
+def _sense(machine: Machine, ground_command: float, structure_command: float, out: Array) -> None:
+    true = sense(machine, ground_command, structure_command)
+    for number in range(4):
+        out[number] = true[number]
 
 
 class Twin:
@@ -43,7 +49,9 @@ class Twin:
         """Nothing to do: a twin is built at its start."""
 
     def read(self) -> Measurements:
-        self.truth = _sense(self.simulation.machine, self.held.ground, self.held.structure)
+        true = np.empty(4)
+        _sense(self.simulation.machine, self.held.ground, self.held.structure, true)
+        self.truth = Measurements(*true.tolist())
         return sampled(self.truth, self.disturbance.take(1)[0], self.resolution)
 
     def write(self, commands: Commands) -> None:

@@ -1,0 +1,155 @@
+"""The command line as a user meets it: what it prints, its exit codes, and one line for every fault."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import pty
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from pathlib import Path
+
+import pytest
+
+from experiments import EXPERIMENTS
+from rigtwin.cli import main
+from rigtwin.recording import load
+from tests.conftest import EXAMPLE
+
+QUICK = ["--set", "timing.duration=0.5"]
+
+
+def test_run_info_compare_export_plot(tmp_path, capsys):
+    path = tmp_path / "d.mcap"
+    assert main(["run", "drop", "--out", str(path), "--seed", "3", "--set", "timing.duration=1", "--set", "rail.coulomb=60"]) == 0
+    assert "1.000 s recorded" in capsys.readouterr().out
+    recording = load(path)
+    assert (recording.ticks, recording.twin["seed"]) == (1000, "3")
+    assert json.loads(recording.twin["parameters"])["rail"]["coulomb"] == 60.0
+    assert main(["info", str(path)]) == 0
+    assert "/sensor.load_cell" in capsys.readouterr().out
+    assert main(["compare", str(path), "--json", str(tmp_path / "j.json"), "--set", "rail.coulomb=60"]) == 0
+    replays = json.loads((tmp_path / "j.json").read_text())["replays"]
+    for name in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder", "controller"):
+        assert {"residual", "noise_floor", "ratio"} <= set(replays[name])
+    assert main(["export", str(path), "-o", str(tmp_path / "d.csv")]) == 0
+    assert main(["plot", str(path)]) == 0
+    assert (tmp_path / "d.png").exists()
+    assert main(["compare", str(path), str(path)]) == 0
+
+
+def test_list(capsys):
+    assert main(["list"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in EXPERIMENTS)
+    assert main(["list", "--settings", "drop"]) == 0
+    assert "rail.coulomb" in capsys.readouterr().out
+
+
+def test_a_trip_is_said_and_has_its_exit_code(tmp_path, capsys):
+    path = tmp_path / "t.mcap"
+    assert main(["run", "motorcycle", "--out", str(path)]) == 3
+    assert "trip: |load_cell| above 1500 N" in capsys.readouterr().out
+    assert load(path).end.startswith("trip")
+
+
+def bad(tmp_path: Path) -> dict[str, tuple[list[str], str]]:
+    toml, text, empty = tmp_path / "bad.toml", tmp_path / "text.mcap", tmp_path / "empty.mcap"
+    toml.write_text("[rail")
+    text.write_text("not a recording")
+    empty.write_bytes(b"")
+    out = ["--out", str(tmp_path / "o.mcap")]
+    return {
+        "experiment": (["run", "dorp", *out], "unknown experiment 'dorp'; there are drop"),
+        "toml": (["run", "drop", "--config", str(toml), *out], "not valid TOML"),
+        "nan": (["run", "drop", "--set", "carriage.mass=nan", *out], "carriage.mass = nan"),
+        "period": (["run", "drop", "--set", "timing.timestep=0.0003", *out], "whole multiple"),
+        "step above period": (["run", "drop", "--set", "timing.timestep=0.002", *out], "whole multiple"),
+        "seed": (["run", "drop", "--seed", "-1", *out], "--seed -1"),
+        "road": (["run", "road10", "--set", "road.lowest=20", *out], "road.highest"),
+        "out": (["run", "drop", "--out", str(tmp_path / "absent" / "o.mcap"), *QUICK], "cannot write"),
+        "empty": (["compare", str(empty)], "is empty"),
+        "foreign": (["info", str(text)], "is not an MCAP file"),
+        "absent": (["plot", str(tmp_path / "absent.mcap")], "cannot read"),
+        "folder": (["video", str(tmp_path)], "cannot read"),
+        "ending": (["export", str(EXAMPLE), "-o", str(tmp_path / "e.xyz")], ".csv or .mat"),
+        "json": (["compare", str(EXAMPLE), "--json", str(tmp_path / "absent" / "j.json")], "cannot write"),
+        "two and set": (["compare", str(EXAMPLE), str(EXAMPLE), "--set", "rail.coulomb=3"], "without one"),
+        "study": (["reproduce", "table-9.9"], "there are table-3.5"),
+        "seeds": (["reproduce", "table-3.5", "--seeds", "0"], "--seeds 0"),
+    }
+
+
+@pytest.mark.parametrize("case", bad(Path("/tmp")))
+def test_bad_input_gives_one_clear_line(tmp_path, capsys, case):
+    arguments, says = bad(tmp_path)[case]
+    before = set(tmp_path.iterdir())
+    assert main(arguments) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("rigtwin: ")
+    assert error.count("\n") == 1
+    assert says in error
+    assert set(tmp_path.iterdir()) == before, "nothing is half-written"
+
+
+def test_no_command_is_usage(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([])
+    assert stop.value.code == 2
+    assert "command" in capsys.readouterr().err
+
+
+def test_default_name_never_overwrites(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(3):
+        assert main(["run", "drop", *QUICK]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["drop-0-2.mcap", "drop-0-3.mcap", "drop-0.mcap"]
+
+
+def test_ctrl_c_leaves_a_readable_recording_and_one_line(tmp_path):
+    path = tmp_path / "c.mcap"
+    command = [sys.executable, "-m", "rigtwin.cli", "run", "drop", "--out", str(path), "--set", "timing.duration=3600"]
+    # A shell's background job may have handed down an ignored Ctrl-C; a user's terminal does not.
+    restored = signal.signal(signal.SIGINT, signal.default_int_handler)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGINT, restored)
+    deadline = time.monotonic() + 60
+    while (not path.exists() or path.stat().st_size < 100_000) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert process.returncode == 130, error
+    assert error.strip() == "rigtwin: interrupted"
+    recording = load(path)
+    assert recording.end == "interrupted: KeyboardInterrupt"
+    assert recording.notes == ()
+
+
+def test_progress_is_shown_on_a_terminal_only(tmp_path):
+    command = [sys.executable, "-m", "rigtwin.cli", "run", "drop", "--out", str(tmp_path / "p.mcap"), *QUICK]
+    quiet = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert quiet.stderr == ""
+    controller, terminal = pty.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    subprocess.run(command, stderr=terminal, stdout=subprocess.DEVNULL, check=True)
+    assert select.select([controller], [], [], 5)[0], "nothing was shown"
+    assert b"drop:" in os.read(controller, 65536)
+    os.close(terminal)
+    os.close(controller)
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys\nfrom rigtwin.cli import main\n"
+        "try: main(['--help'])\nexcept SystemExit: pass\n"
+        "heavy = {'numpy', 'mujoco', 'numba', 'scipy', 'matplotlib'} & set(sys.modules)\nassert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "a first session" in done.stdout

@@ -1,0 +1,146 @@
+"""Component replays: noise alone where twin and recording agree, and the guilty component where they do not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from controllers import Measurements
+from experiments import EXPERIMENTS
+from rigtwin.configuration import Configuration, Timing, from_assignments
+from rigtwin.diagnosis.compare import REPLAYS, compare, compare_recordings, configuration_of
+from rigtwin.errors import RigtwinError
+from rigtwin.recording import Recording, load
+from rigtwin.runner import record
+from tests.conftest import rig_recording
+
+LIMITS = {"motor": 3.0, "carriage": 1.1, "mechanics": 1.15, "structure_cylinder": 1.1, "ground_cylinder": 1.1, "controller": 5.0}
+COMPONENTS = tuple(LIMITS)
+
+
+def ratios(recording: Recording) -> dict[str, float]:
+    return {name: result.ratio for name, result in compare(recording, configuration_of(recording)).replays.items()}
+
+
+@pytest.fixture(scope="session")
+def nominal(example) -> dict[str, float]:
+    return ratios(example)
+
+
+def test_the_shipped_rig_recording_leaves_noise_alone(nominal):
+    assert set(nominal) == set(REPLAYS)
+    for name, limit in LIMITS.items():
+        assert nominal[name] <= limit, name
+    assert nominal["closed_loop"] < 1.1
+
+
+@pytest.mark.parametrize("name", ["nominal-road10", "nominal-drop"])
+def test_nominal_recordings_leave_noise_alone(name):
+    found = ratios(rig_recording(name))
+    for component, limit in LIMITS.items():
+        assert found[component] <= limit, component
+
+
+TOUCHED = {
+    "known-coulomb-motor": {"motor", "mechanics"},
+    "known-viscous-rail": {"carriage", "mechanics"},
+    "known-gain-load_cell": {"motor", "carriage", "mechanics"},
+    "known-delay-structure_cylinder": {"structure_cylinder"},
+}
+
+
+@pytest.mark.parametrize("name", TOUCHED)
+def test_faults_of_the_stand_in_rig_stand_out_where_they_are(name, nominal):
+    found = ratios(rig_recording(name))
+    for component in COMPONENTS:
+        times = found[component] / nominal[component]
+        if component in TOUCHED[name]:
+            assert times > 1.5, component
+        elif component != "controller":
+            assert times < 1.15, component
+
+
+OWN_FAULTS = {
+    "motor.coulomb=24": {"motor", "mechanics"},
+    "rail.coulomb=80": {"carriage", "mechanics"},
+    "carriage.mass=40": {"carriage", "mechanics"},
+    "tyre.stiffness=42000": {"carriage", "mechanics"},
+    "motor.constant=196": {"motor", "mechanics"},
+    "ground_cylinder.a1=110000": {"ground_cylinder"},
+    "structure_cylinder.a2=9000": {"structure_cylinder"},
+}
+
+
+@pytest.mark.parametrize("fault", OWN_FAULTS)
+@pytest.mark.parametrize("name", ["imposed"])
+def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, name, fault):
+    experiment = EXPERIMENTS[name]
+    faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=10.0)), [fault])
+    path = tmp_path / "f.mcap"
+    record(path, name, faulty, experiment.demands(faulty, 11), 11)
+    found = ratios(load(path))
+    for component in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder"):
+        if component in OWN_FAULTS[fault]:
+            assert found[component] > 1.5, component
+        else:
+            assert found[component] < 1.2, component
+    assert found["controller"] < 1e-3
+    # With the fault in the twin too, noise is left.
+    recording = load(path)
+    known = configuration_of(recording, from_assignments(Configuration(), [fault]))
+    assert all(result.ratio < 1.2 for result in compare(recording, known).replays.values())
+
+
+def without(recording: Recording, topic: str, name: str) -> Recording:
+    columns = {t: {n: v for n, v in fields.items() if (t, n) != (topic, name)} for t, fields in recording.columns.items()}
+    return dataclasses.replace(recording, columns=columns)
+
+
+@pytest.mark.parametrize("name", Measurements._fields)
+def test_a_missing_sensor_is_named(example, name):
+    with pytest.raises(RigtwinError, match=f"/sensor.{name} is missing"):
+        compare(without(example, "/sensor", name), Configuration())
+
+
+def test_a_value_that_is_no_number_is_named_with_its_time(example):
+    broken = example.column("/sensor", "load_cell").copy()
+    broken[1234] = np.nan
+    columns = {**example.columns, "/sensor": {**example.columns["/sensor"], "load_cell": broken}}
+    with pytest.raises(RigtwinError, match=r"/sensor.load_cell is not a number at 1.234 s"):
+        compare(dataclasses.replace(example, columns=columns), Configuration())
+
+
+def test_without_the_operators_settings_the_controller_is_left_out(example):
+    silent = dataclasses.replace(example, controller={})
+    comparison = compare(silent, configuration_of(silent))
+    assert set(comparison.left_out) == {"controller", "closed_loop"}
+    assert comparison.replays["carriage"].ratio < 1.1
+
+
+def test_settings_unknown_here_are_refused(example):
+    with pytest.raises(RigtwinError, match="unknown setting controller.kd"):
+        configuration_of(dataclasses.replace(example, controller={**example.controller, "kd": 1.0}))
+
+
+def test_too_short_a_recording_is_refused(example):
+    columns = {t: {n: v[:100] for n, v in fields.items()} for t, fields in example.columns.items()}
+    with pytest.raises(RigtwinError, match="at least 200"):
+        compare(dataclasses.replace(example, columns=columns, time=example.time[:100]), Configuration())
+
+
+def test_two_recordings_of_one_test(example, tmp_path):
+    experiment = EXPERIMENTS["imposed"]
+    configuration = experiment.configuration._replace(timing=Timing(duration=3.0))
+    demands = experiment.demands(configuration, 1)
+    recordings = []
+    for seed in (1, 2):
+        record(tmp_path / f"{seed}.mcap", "imposed", configuration, demands, seed)
+        recordings.append(load(tmp_path / f"{seed}.mcap"))
+    same = compare_recordings(*recordings)
+    assert all(0.8 < result.ratio < 1.3 for result in same.values())
+    different = compare_recordings(recordings[0], example)
+    assert different["load_cell"].ratio > 5
+    with pytest.raises(RigtwinError, match="periods differ"):
+        compare_recordings(example, dataclasses.replace(example, period=2e-3))
