@@ -34,7 +34,7 @@ demo: setup system
 	@echo "look at $(OUT)/drop.png and $(OUT)/drop.mp4"
 
 test: setup system
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto
 
 check: setup
 	$(BIN)/ruff check .

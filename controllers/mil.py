@@ -51,12 +51,8 @@ def update(settings: Settings, state: State, measured: Measurements, demand: Dem
         demanded = demand.force
         position, structure_velocity = demand.structure, 0.0
     else:
-        demanded = suspension_force(settings, travel, velocity) - skyhook_force(
-            settings, state.structure_velocity, velocity
-        )
-        position, structure_velocity = point_mass(
-            settings, state.structure_position, state.structure_velocity, force, period
-        )
+        demanded = suspension_force(settings, travel, velocity) - skyhook_force(settings, state.structure_velocity, velocity)
+        position, structure_velocity = point_mass(settings, state.structure_position, state.structure_velocity, force, period)
     integral, voltage = force_loop(settings, state.integral, demanded, force, period)
     after = State(sample, travel, velocity, force, integral, position, structure_velocity)
     return after, Commands(demand.ground, position, demanded, voltage)

@@ -5,11 +5,8 @@ from experiments.experiment import Experiment
 from rigtwin.errors import RigtwinError
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment
-    for module in (quarter_car, single_mass, imposed, vehicles)
-    for experiment in module.EXPERIMENTS
+    experiment.name: experiment for module in (quarter_car, single_mass, imposed, vehicles) for experiment in module.EXPERIMENTS
 }
-
 
 
 def find(name: str) -> Experiment:

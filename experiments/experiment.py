@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.excitation import road_profile
 
-Array = NDArray[np.float64]
 Progress = Callable[[int], object]
 """Called with the steps done since its last call."""
 

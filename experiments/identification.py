@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from controllers import Mode, Settings
 from controllers.filters import low_pass
 from experiments.experiment import Progress, time_of
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Timing
 from rigtwin.excitation import schroeder
 from rigtwin.loop import run_compiled
 from rigtwin.twin import Twin
 
-Array = NDArray[np.float64]
 Response = NDArray[np.complex128]
 
 HIGHEST = 10

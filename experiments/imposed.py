@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers import Mode, Settings
 from experiments.experiment import Experiment, random_of, time_of
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.excitation import multisine
 
@@ -14,7 +14,7 @@ FORCE_MEAN = 230.0
 """N; keeps the tyre pressed while the force swings."""
 
 
-def multisines(configuration: Configuration, seed: int) -> NDArray[np.float64]:
+def multisines(configuration: Configuration, seed: int) -> Array:
     """Ground and structure ∝ 1/f over 0.2–10 Hz, 5 and 9 mm rms; force ∝ 1/√f over 0.3–30 Hz, 35 N rms about its mean."""
     time, random = time_of(configuration), random_of(seed)
     ground = multisine(time, 0.2, 10.0, 0.1, 1.0, 0.005, random)

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from experiments import find
 from experiments.experiment import Progress
 from experiments.identification import identification
+from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.metrics import Ideal, Tracking, ideal, tracking
 from rigtwin.plot import ASKED, COLOURS, SENSED, save
 from rigtwin.recording import Recording, load
 from rigtwin.runner import record
-
-Array = NDArray[np.float64]
 
 TABLE_3_5 = {
     "position_e1": (0.00772, 0.00448, "m"),
@@ -55,7 +53,10 @@ def table_3_5(seeds: int, out: Path | None, progress: Progress) -> str:
     for seed in range(seeds):
         runs.append(tracking(run_once("single-mass", seed), configuration))
         progress(1)
-    lines = [f"Table 3.5, no ground input, 45 s: median of {seeds} seeds", "error            thesis    ours      lowest    highest   ours/thesis"]
+    lines = [
+        f"Table 3.5, no ground input, 45 s: median of {seeds} seeds",
+        "error            thesis    ours      lowest    highest   ours/thesis",
+    ]
     for name, (thesis, _, unit) in TABLE_3_5.items():
         values = np.array([getattr(run, name) for run in runs])
         middle = float(np.median(values))
@@ -107,7 +108,9 @@ def _draw_chapter_6(dropped: Recording, should_drop: Ideal, driven: Recording, s
     axes = figure.subplots(3, 2)
     ideal_colour, time = COLOURS["other"], dropped.time
 
-    def panel(axis: Axes, title: str, span: tuple[float, float], x: Array, lines: list[tuple[str, str, Array]], unit: str) -> None:
+    def panel(
+        axis: Axes, title: str, span: tuple[float, float], x: Array, lines: Sequence[tuple[str, str, Array]], unit: str
+    ) -> None:
         shown = (x >= span[0]) & (x <= span[1])
         for label, colour, values in lines:
             axis.plot(x[shown], values[shown], color=colour, linewidth=1.0, label=label)
@@ -116,7 +119,11 @@ def _draw_chapter_6(dropped: Recording, should_drop: Ideal, driven: Recording, s
         axis.legend(fontsize=8, frameon=False)
 
     load_cell, demanded = dropped.column("/truth", "load_cell"), dropped.column("/command", "force")
-    force = [("ideal", ideal_colour, should_drop.force), ("in the load cell", SENSED, load_cell), ("demanded", ASKED, demanded)]
+    force = [
+        ("ideal", ideal_colour, should_drop.force),
+        ("in the load cell", SENSED, load_cell),
+        ("demanded", ASKED, demanded),
+    ]
     panel(axes[0, 0], "drop: suspension force (Fig. 6.28)", (0, 6), time, force, "N")
     panel(axes[0, 1], "drop: limit cycle at rest", (15, 17), time, force, "N")
     wheel = [("ideal", ideal_colour, 1e3 * should_drop.wheel), ("twin", SENSED, 1e3 * _wheel(dropped))]

@@ -38,4 +38,5 @@ def topic_fields(topic: str) -> tuple[str, ...]:
     return tuple(channel.name for channel in CHANNELS if channel.topic == topic)
 
 
-assert topic_fields("/command") == Commands._fields and topic_fields("/sensor") == Measurements._fields
+assert topic_fields("/command") == Commands._fields
+assert topic_fields("/sensor") == Measurements._fields

@@ -33,20 +33,30 @@ def _parser() -> argparse.ArgumentParser:
         )
 
     def settings(parser: argparse.ArgumentParser) -> None:
-        parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override one setting, e.g. rail.coulomb=60")
+        parser.add_argument(
+            "--set", action="append", default=[], metavar="KEY=VALUE", help="override one setting, e.g. rail.coulomb=60"
+        )
         parser.add_argument("--config", type=Path, metavar="F.toml", help="override settings from a TOML file, before --set")
 
-    listing = command("list", "list the experiments, or the settings", "rigtwin list --settings drop prints every setting of an experiment with unit, bounds and source.")
+    listing = command(
+        "list",
+        "list the experiments, or the settings",
+        "rigtwin list --settings drop prints every setting of an experiment with unit, bounds and source.",
+    )
     listing.add_argument("--settings", metavar="NAME", help="the settings of that experiment instead")
 
     run = command(
         "run",
         "run an experiment on the twin and record it",
-        "examples:\n  rigtwin run drop --out drop.mcap\n  rigtwin run road10 --seed 3 --set controller.kp=0.5 --set timing.duration=10",
+        "examples:\n  rigtwin run drop --out drop.mcap\n"
+        "  rigtwin run road10 --seed 3 --set controller.kp=0.5 --set timing.duration=10\n\n"
+        "exit code 3: a limit tripped; the recording is kept.",
     )
     run.add_argument("name", help="an experiment of rigtwin list")
     run.add_argument("--seed", type=int, default=0, help="of noise and road (default 0); the same seed gives the same bytes")
-    run.add_argument("--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)")
+    run.add_argument(
+        "--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)"
+    )
     settings(run)
 
     info = command("info", "say what is in a recording")
@@ -80,7 +90,11 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--json", type=Path, metavar="J", help="also write the figures to a file")
     settings(compare)
 
-    reproduce = command("reproduce", "run a study of the thesis and print its figures beside ours", "studies: table-3.5 (single mass), identification (Eq. 6.1, 6.2), chapter-6 (drop and road; draws)")
+    reproduce = command(
+        "reproduce",
+        "run a study of the thesis and print its figures beside ours",
+        "studies: table-3.5 (single mass), identification (Eq. 6.1, 6.2), chapter-6 (drop and road; draws)",
+    )
     reproduce.add_argument("study", help="table-3.5, identification or chapter-6")
     reproduce.add_argument("--seeds", type=int, default=16, help="noise seeds to take the median over (default 16)")
     reproduce.add_argument("--out", "-o", type=Path, metavar="F.png", help="where to draw the figure, if the study has one")

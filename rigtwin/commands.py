@@ -92,7 +92,7 @@ def info(parsed: Namespace) -> int:
         print(f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}")
     for note in recording.notes:
         print(f"note: {note}")
-    rows = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
+    rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
     for channel in CHANNELS:
         if recording.has(channel.topic, channel.name):
             values = recording.column(channel.topic, channel.name)
@@ -164,7 +164,7 @@ def compare(parsed: Namespace) -> int:
         print(f"{recording.path} against the twin; a ratio of 1 is noise alone")
     for note in notes:
         print(f"note: {note}")
-    rows = [("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")]
+    rows: list[tuple[str, ...]] = [("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")]
     for name, result in results.items():
         rows.append(_row(name, result))
         rows += [_row(f"  {output}", part) for output, part in result.outputs.items()]
@@ -180,7 +180,13 @@ def compare(parsed: Namespace) -> int:
 def _row(name: str, result: Residual) -> tuple[str, ...]:
     unit = "floors" if result.unit == "1" else result.unit
     low, high = result.band_hz
-    return name, f"{result.residual:.3g} {unit}", f"{result.noise_floor:.3g} {unit}", f"{result.ratio:.3f}", f"{low:.3g} to {high:.3g}"
+    return (
+        name,
+        f"{result.residual:.3g} {unit}",
+        f"{result.noise_floor:.3g} {unit}",
+        f"{result.ratio:.3f}",
+        f"{low:.3g} to {high:.3g}",
+    )
 
 
 def _write_json(path: Path, document: object) -> None:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import mujoco
@@ -54,6 +54,8 @@ _CACHE = _cache_folder()
 _STRUCTURES = (types.intp, types.intp)
 forward = types.ExternalFunction("mj_forwardSkip", types.void(*_STRUCTURES, types.int32, types.int32))
 """mj_forwardSkip(model, data, stage to skip up to, whether to skip sensors)."""
+step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
+"""mj_step(model, data): a whole step."""
 integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
 """mj_implicit(model, data): the second half of a step with the implicit integrators."""
 
@@ -61,10 +63,10 @@ integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
 def kernel(function: Function) -> Function:
     """Compiles a function for speed: no Python objects inside, the interpreter lock released, cached on disk."""
     if _CACHE is None:
-        return numba.njit(nogil=True)(function)
+        return cast(Function, numba.njit(nogil=True)(function))
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     numba.config.CACHE_DIR = str(_CACHE)  # type: ignore[attr-defined]
     try:
-        return numba.njit(nogil=True, cache=True)(function)
+        return cast(Function, numba.njit(nogil=True, cache=True)(function))
     finally:
         numba.config.CACHE_DIR = before  # type: ignore[attr-defined]

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers import Measurements
 from controllers.compiled import compilable
+from rigtwin.arrays import Array
 from rigtwin.parameters import LoadCell, Lvdt, Plant
-
-Array = NDArray[np.float64]
 
 
 def sensors(plant: Plant) -> tuple[Lvdt | LoadCell, ...]:

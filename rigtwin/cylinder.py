@@ -3,16 +3,15 @@ limit of the speed. MJCF has no actuator of fourth order, so this runs beside Mu
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from controllers.compiled import compilable
+from rigtwin.arrays import Array
 from rigtwin.parameters import Cylinder
-
-Array = NDArray[np.float64]
 
 
 class CylinderModel(NamedTuple):
@@ -42,8 +41,12 @@ def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
     return a, b, c
 
 
+@lru_cache(maxsize=64)
 def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
-    """The cylinder sampled at `timestep` (s) with its command held."""
+    """The cylinder sampled at `timestep` (s) with its command held; not to be changed.
+
+    Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down rigs that run beside.
+    """
     a, b, c = continuous(cylinder)
     both = np.zeros((5, 5))
     both[:4, :4], both[:4, 4] = a, b

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.configuration import Road
 from rigtwin.errors import RigtwinError
-
-Array = NDArray[np.float64]
 
 FADE = 1.0
 """Seconds over which an excitation grows from nothing, so that the rig starts at rest."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
-from numpy.typing import NDArray
 
 from controllers import Commands, Demand, Measurements, Settings, State, initial_state, update
+from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.converters import sampled
@@ -21,8 +21,6 @@ from rigtwin.plant import Machine, advance, sense
 from rigtwin.rig import Rig
 from rigtwin.safety import Trip, tripped
 from rigtwin.twin import Twin
-
-Array = NDArray[np.float64]
 
 BLOCK = 250
 """Ticks handed on at a time, so what is not yet in a recording is at most a quarter of a second."""
@@ -93,7 +91,7 @@ def _ticks(
 ) -> tuple[int, int]:
     """Ticks done and the number of a Trip. Gives back plain numbers and arrays only: making any other Python object can run
     into a pending Ctrl-C, which compiled code does not survive."""
-    state = State(*to_fixed_tuple(memory, STATE_SIZE))
+    state = State(*to_fixed_tuple(memory, STATE_SIZE))  # type: ignore[call-arg]
     done, trip = 0, Trip.NONE
     for tick in range(len(demands)):
         true = sense(machine, held.ground, held.structure)

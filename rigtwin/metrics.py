@@ -8,16 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.signal import cont2discrete
+from scipy.linalg import expm
 
 from controllers import Skyhook, Travel
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.noise import rms
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,9 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
             [k / mu, (b + sky) / mu, -(k + kt) / mu, -b / mu],
         ]
     )
-    entry = np.array([[0.0, 0.0], [0.0, settings.preload / m - settings.gravity], [0.0, 0.0], [kt / mu, -settings.preload / mu]])
+    entry = np.array(
+        [[0.0, 0.0], [0.0, settings.preload / m - settings.gravity], [0.0, 0.0], [kt / mu, -settings.preload / mu]]
+    )
     start = np.array([settings.start, 0.0, float(ground[0]) - settings.preload / kt, 0.0])
     states = _simulated(a, entry, np.column_stack([ground, gravity]), start, configuration.timing.period)
     travel, rate = states[:, 0] - states[:, 2], states[:, 1] - states[:, 3]
@@ -82,7 +82,10 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
 def _simulated(a: Array, entry: Array, inputs: Array, start: Array, period: float) -> Array:
     """States at every tick under inputs held over each; exact."""
     count = len(a)
-    transition, step, *_ = cont2discrete((a, entry, np.eye(count), np.zeros_like(entry)), period)
+    both = np.zeros((count + entry.shape[1],) * 2)
+    both[:count, :count], both[:count, count:] = a, entry
+    sampled = expm(both * period)
+    transition, step = sampled[:count, :count], sampled[:count, count:]
     states = np.empty((len(inputs), count))
     states[0] = start
     for tick in range(1, len(inputs)):

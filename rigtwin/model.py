@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
+from functools import cache
 from importlib.resources import files
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.parameters import Plant
-
-Array = NDArray[np.float64]
 
 SCENE = files("models") / "xml" / "scene.xml"
 """The rig with lights and cameras."""
@@ -38,9 +37,15 @@ class Handles(NamedTuple):
     motor_constant: float
 
 
+@cache
+def _nominal() -> mujoco.MjModel:
+    """The model as the XML has it, compiled once; never changed."""
+    return mujoco.MjModel.from_xml_path(str(MECHANICS))
+
+
 def build(plant: Plant, timestep: float) -> mujoco.MjModel:
     """The mechanics of that plant. timestep in s."""
-    model = mujoco.MjModel.from_xml_path(str(MECHANICS))
+    model = copy(_nominal())
     model.opt.timestep = timestep
     model.body("carriage").mass = plant.carriage.mass
     mujoco.mj_setConst(model, mujoco.MjData(model))

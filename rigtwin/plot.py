@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
-
-Array = NDArray[np.float64]
 
 COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
 KINDS = (".png", ".svg", ".pdf")

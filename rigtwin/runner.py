@@ -6,17 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rigtwin import __version__
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, flattened
 from rigtwin.loop import run_compiled
 from rigtwin.recording import Writer
 from rigtwin.safety import Trip, explained
 from rigtwin.twin import Twin
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ def record(
     configuration: Configuration,
     demands: Array,
     seed: int,
-    progress: Callable[[int], object] = lambda ticks: None,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> Outcome:
     """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers import Commands, Measurements
+from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
 from rigtwin.converters import Disturbance, resolutions, sampled
 from rigtwin.plant import Machine, Simulation, advance, sense
-
-Array = NDArray[np.float64]
 
 _advance = kernel(advance)
 

@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.model import SCENE
 from rigtwin.plot import ASKED, SENSED, stretch
 from rigtwin.recording import Recording
 
-Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 FRAMES_PER_SECOND = 30
@@ -43,7 +43,7 @@ def film(
     start: float = 0.0,
     until: float | None = None,
     magnify: float = 1.0,
-    progress: Callable[[int, int], object] = lambda done, total: None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> None:
     """Films the stretch from `start` to `until` (s) in real time, 30 frames a second, into an mp4 file.
 
@@ -65,9 +65,12 @@ def film(
             stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
             stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
             for number, tick in enumerate(frames):
-                picture = np.vstack([render({name: float(m[tick]) for name, m in motions.items()}), traces.at(time[tick])])
+                picture = np.vstack(
+                    [render({name: float(m[tick]) for name, m in motions.items()}), traces.at(float(time[tick]))]
+                )
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")))
-                progress(number + 1, len(frames))
+                if progress is not None:
+                    progress(number + 1, len(frames))
             container.mux(stream.encode())
         temporary.replace(out)
     except OSError as error:
@@ -87,7 +90,7 @@ def _motions(recording: Recording) -> dict[str, Array]:
 
 
 def _smooth(signal: Array, period: float) -> Array:
-    if SMOOTHING >= 0.45 / period or len(signal) < 50:
+    if 0.45 / period <= SMOOTHING or len(signal) < 50:
         return signal
     return sosfiltfilt(butter(2, SMOOTHING, fs=1.0 / period, output="sos"), signal)
 

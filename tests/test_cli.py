@@ -27,7 +27,9 @@ QUICK = ["--set", "timing.duration=0.5"]
 
 def test_run_info_compare_export_plot(tmp_path, capsys):
     path = tmp_path / "d.mcap"
-    assert main(["run", "drop", "--out", str(path), "--seed", "3", "--set", "timing.duration=1", "--set", "rail.coulomb=60"]) == 0
+    assert (
+        main(["run", "drop", "--out", str(path), "--seed", "3", "--set", "timing.duration=1", "--set", "rail.coulomb=60"]) == 0
+    )
     assert "1.000 s recorded" in capsys.readouterr().out
     recording = load(path)
     assert (recording.ticks, recording.twin["seed"]) == (1000, "3")

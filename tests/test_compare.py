@@ -16,7 +16,14 @@ from rigtwin.recording import Recording, load
 from rigtwin.runner import record
 from tests.conftest import rig_recording
 
-LIMITS = {"motor": 3.0, "carriage": 1.1, "mechanics": 1.15, "structure_cylinder": 1.1, "ground_cylinder": 1.1, "controller": 5.0}
+LIMITS = {
+    "motor": 3.0,
+    "carriage": 1.1,
+    "mechanics": 1.15,
+    "structure_cylinder": 1.1,
+    "ground_cylinder": 1.1,
+    "controller": 5.0,
+}
 COMPONENTS = tuple(LIMITS)
 
 
@@ -120,7 +127,7 @@ def test_without_the_operators_settings_the_controller_is_left_out(example):
 
 
 def test_settings_unknown_here_are_refused(example):
-    with pytest.raises(RigtwinError, match="unknown setting controller.kd"):
+    with pytest.raises(RigtwinError, match=r"unknown setting controller\.kd"):
         configuration_of(dataclasses.replace(example, controller={**example.controller, "kd": 1.0}))
 
 

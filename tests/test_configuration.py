@@ -65,7 +65,11 @@ def test_toml(tmp_path):
     good = tmp_path / "good.toml"
     good.write_text('[rail]\ncoulomb = 60\n[controller]\nskyhook = "semi-active"\nkp = 0.5\n')
     changed = from_toml(Configuration(), good)
-    assert (changed.plant.rail.coulomb, changed.controller.skyhook, changed.controller.kp) == (60.0, Skyhook.SEMI_ACTIVE, 0.5)
+    assert (changed.plant.rail.coulomb, changed.controller.skyhook, changed.controller.kp) == (
+        60.0,
+        Skyhook.SEMI_ACTIVE,
+        0.5,
+    )
     for content, says in (
         ("[rail\n", "not valid TOML"),
         ("[rail]\ncoulomb = true\n", "rail.coulomb = True"),

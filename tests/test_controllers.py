@@ -31,8 +31,8 @@ def stream(count: int) -> list[tuple[Measurements, Demand]]:
     force = 220 + 40 * random.standard_normal(count)
     demand = np.cumsum(random.standard_normal((count, 2)), axis=0) * 1e-4
     return [
-        (Measurements(*w.tolist(), float(f)), Demand(*d.tolist(), 230.0 + float(f) * 0.1))
-        for w, f, d in zip(walk, force, demand, strict=True)
+        (Measurements(w[0], w[1], w[2], f), Demand(d[0], d[1], 230.0 + f * 0.1))
+        for w, f, d in zip(walk.tolist(), force.tolist(), demand.tolist(), strict=True)
     ]
 
 
@@ -41,9 +41,12 @@ def compiled_update(settings, state, measured, demand, period):  # type: ignore[
     return update(settings, state, measured, demand, period)
 
 
-@pytest.mark.parametrize("settings", EVERY, ids=lambda s: f"{s.mode.label}-{s.travel.label}-{s.skyhook.label}-{s.voltage_limit:g}")
+@pytest.mark.parametrize(
+    "settings", EVERY, ids=lambda s: f"{s.mode.label}-{s.travel.label}-{s.skyhook.label}-{s.voltage_limit:g}"
+)
 def test_python_and_compiled_agree(settings):
     plain = fast = initial_state(settings)
+    one = None
     for measured, demand in stream(500):
         plain, one = update(settings, plain, measured, demand, PERIOD)
         fast, other = compiled_update(settings, fast, measured, demand, PERIOD)

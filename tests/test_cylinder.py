@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lsim
 
+from controllers import Mode, Settings
 from rigtwin.configuration import Configuration, Timing
 from rigtwin.cylinder import continuous
 from rigtwin.diagnosis.replay import replay_cylinder
@@ -15,7 +16,6 @@ from rigtwin.excitation import schroeder
 from rigtwin.loop import run_compiled
 from rigtwin.parameters import Cylinder
 from rigtwin.twin import Twin
-from controllers import Mode, Settings
 
 NOMINAL = Cylinder()
 

@@ -124,17 +124,23 @@ def test_no_damage_gives_anything_but_an_error_or_a_note(tmp_path):
         for place in random.integers(0, len(data), random.integers(0, 4)):
             data[place] = random.integers(0, 256)
         (tmp_path / "d.mcap").write_bytes(bytes(data))
+        message, ticks = "", 1
         try:
-            recording = load(tmp_path / "d.mcap")
+            ticks = load(tmp_path / "d.mcap").ticks
         except RigtwinError as error:
-            assert "\n" not in str(error)
-        else:
-            assert recording.ticks > 0
+            message = str(error)
+        assert ticks > 0
+        assert "\n" not in message
 
 
 @pytest.mark.parametrize(
     ("content", "says"),
-    [(b"", "is empty"), (b"hello, this is a text", "is not an MCAP file"), (b"\x89MCAP0\r\n", "is not a"), (b"\x00" * 400, "is not an MCAP file")],
+    [
+        (b"", "is empty"),
+        (b"hello, this is a text", "is not an MCAP file"),
+        (b"\x89MCAP0\r\n", "is not a"),
+        (b"\x00" * 400, "is not an MCAP file"),
+    ],
 )
 def test_foreign_files_are_refused_in_one_line(tmp_path, content, says):
     path = tmp_path / "f.mcap"

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controllers import Commands, Measurements
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety, overridden
 from rigtwin.diagnosis.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.diagnosis.replay import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
@@ -19,8 +19,6 @@ from rigtwin.loop import run, run_compiled
 from rigtwin.recording import Recording
 from rigtwin.replay import Replay
 from rigtwin.twin import Twin
-
-Array = NDArray[np.float64]
 
 SIGNIFICANT_DIGITS = 8
 """Digits to which recordings in text keep a command; a controller that agrees to them is exact."""
@@ -243,7 +241,7 @@ def rounding(recorded: Array) -> float:
 
 
 def compare(
-    recording: Recording, configuration: Configuration, progress: Callable[[str], object] = lambda name: None
+    recording: Recording, configuration: Configuration, progress: Callable[[str], object] = lambda _: None
 ) -> Comparison:
     """Replays everything. configuration: of the twin, see `configuration_of`; progress is called with each replay's name."""
     replays = Replays(recording, configuration)

@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import welch
 
-Array = NDArray[np.float64]
+from rigtwin.arrays import Array
 
 NORMAL_MEDIAN = 0.6744897501960817
 """Median of the absolute value of a standard normal variable."""
@@ -64,9 +63,14 @@ def _less_line(signal: Array, centred: Array, window: Array, time: Array, freque
     return signal - basis @ weights
 
 
+def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
+    """One-sided power spectral density, mean included: frequencies in Hz, density in unit²/Hz."""
+    return welch(signal, 1.0 / period, nperseg=min(4096, len(signal)), detrend=False)  # type: ignore[arg-type]
+
+
 def band(signal: Array, period: float) -> tuple[float, float]:
     """The band in Hz that holds the middle 80 % of the signal's power, mean included; (0, 0) for no signal."""
-    frequencies, density = welch(signal, 1.0 / period, nperseg=min(4096, len(signal)), detrend=False)
+    frequencies, density = spectrum(signal, period)
     if not density.any():
         return 0.0, 0.0
     share = np.cumsum(density) / np.sum(density)
@@ -94,7 +98,7 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
     padding = min(PADDING, len(difference) - 1)
     start, end = 2 * difference[0] - difference[padding:0:-1], 2 * difference[-1] - difference[-2 : -2 - padding : -1]
     extended = np.concatenate([start, difference, end]) - offset
-    frequencies, density = welch(difference - offset, 1.0 / period, nperseg=min(4096, len(difference)), detrend=False)
+    frequencies, density = spectrum(difference - offset, period)
     noise = 2 * white_noise(measured) ** 2 * period
     gain = wiener_gain(frequencies, density, noise)
     # The error of a Wiener filter has the density noise·gain; it is differentiated here.

@@ -9,17 +9,15 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from rigtwin.arrays import Array
 from rigtwin.compiling import forward, integrate, kernel
 from rigtwin.configuration import Configuration
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
 from rigtwin.model import Handles, build, handles
 from rigtwin.parameters import Carriage, Cylinder, Rail
 from rigtwin.plant import brace, drive, true_measurements
-
-Array = NDArray[np.float64]
 
 FIXED = 1e6
 """kg; a carriage this heavy goes where it is driven."""

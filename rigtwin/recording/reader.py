@@ -19,13 +19,21 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.channels import topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
 
-Array = NDArray[np.float64]
-
-_DAMAGE = (McapError, CRCValidationError, struct.error, zstandard.ZstdError, RuntimeError, EOFError, UnicodeDecodeError, ValueError)
+_DAMAGE = (
+    McapError,
+    CRCValidationError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,
+    EOFError,
+    UnicodeDecodeError,
+    ValueError,
+)
 """What the mcap package raises on a file that ends or breaks in the middle."""
 
 
@@ -209,7 +217,9 @@ def _aligned(
         _, first = np.unique(times, return_index=True)
         keep = first[np.isin(times[first], common)]
         if len(keep) < len(times):
-            notes.append(f"{len(times) - len(keep)} messages on {topic} left out: repeated, or without their like on another topic")
+            notes.append(
+                f"{len(times) - len(keep)} messages on {topic} left out: repeated, or without their like on another topic"
+            )
         columns[topic] = {name: column[keep] for name, column in values.items()}
     return common * 1e-9, columns
 

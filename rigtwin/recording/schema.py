@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from rigtwin.channels import CHANNELS, topic_fields
 
-Array = NDArray[np.float64]
-
 WRITTEN_FORMAT = "1"
 """Format number in the metadata of the recordings that this version reads and writes."""
 RECORD = "rigtwin"

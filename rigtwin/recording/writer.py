@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 import numpy as np
 import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import (
     Channel,
@@ -26,7 +27,6 @@ from mcap.records import (
     McapRecord,
     Metadata,
     MetadataIndex,
-    RecordBuilder,
     Schema,
     Statistics,
     SummaryOffset,
@@ -34,11 +34,10 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from rigtwin.arrays import Array
 from rigtwin.channels import topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, descriptor, tags, type_name
-
-Array = NDArray[np.float64]
 
 _MESSAGE = [
     ("opcode", "u1"),
@@ -64,7 +63,9 @@ class Writer:
     A process that dies without leaving it (kill -9, power) loses at most the block it was about to append.
     """
 
-    def __init__(self, path: Path, experiment: str, period: float, controller: Mapping[str, object], machine: str = "suspension-rig") -> None:
+    def __init__(
+        self, path: Path, experiment: str, period: float, controller: Mapping[str, object], machine: str = "suspension-rig"
+    ) -> None:
         """period in s; controller: the operator's settings as `config.controller` holds them. Raises RigtwinError."""
         try:
             self._file: BinaryIO = path.open("wb", buffering=0)
@@ -82,7 +83,13 @@ class Writer:
         config = json.dumps({"controller": controller})
         self.add_metadata(
             RECORD,
-            {"format": WRITTEN_FORMAT, "machine": machine, "experiment": experiment, "period": repr(period), "config": config},
+            {
+                "format": WRITTEN_FORMAT,
+                "machine": machine,
+                "experiment": experiment,
+                "period": repr(period),
+                "config": config,
+            },
         )
 
     def add_twin(self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str) -> None:

@@ -1,0 +1,1 @@
+"""Speeds, always as ratios measured side by side in one run."""

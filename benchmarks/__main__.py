@@ -1,0 +1,98 @@
+"""`python -m benchmarks`: every speed that the project promises, beside what it is measured against."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from experiments import EXPERIMENTS
+from rigtwin.compiling import kernel, step
+from rigtwin.loop import BLOCK, run_compiled
+from rigtwin.plant import Simulation
+from rigtwin.runner import record
+from rigtwin.twin import Twin
+
+DROP = EXPERIMENTS["drop"]
+CONFIGURATION = DROP.configuration
+DEMANDS = DROP.demands(CONFIGURATION, 0)
+
+
+@kernel
+def _steps(model: int, data: int, count: int) -> None:
+    for _ in range(count):
+        step(model, data)
+
+
+def _bare() -> None:
+    """As many mj_step of the same model, from the same start, as a drop test takes; plates at rest."""
+    settings = CONFIGURATION.controller
+    simulation = Simulation(CONFIGURATION.plant, CONFIGURATION.timing.timestep, 4, 0.0, settings.start, settings.preload)
+    _steps(simulation.model._address, simulation.data._address, len(DEMANDS) * CONFIGURATION.substeps)
+
+
+def _closed_loop(block: int = BLOCK) -> None:
+    for _ in run_compiled(Twin(CONFIGURATION, 0.0, 0), CONFIGURATION, DEMANDS, block):
+        pass
+
+
+def _sixteen(threads: int) -> None:
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(_closed_loop, [len(DEMANDS)] * 16):
+            pass
+
+
+def _long(recorded: bool) -> None:
+    experiment = EXPERIMENTS["single-mass"]
+    configuration = experiment.configuration
+    demands = experiment.demands(configuration, 0)
+    if not recorded:
+        for _ in run_compiled(Twin(configuration, 0.0, 0), configuration, demands):
+            pass
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        record(Path(folder) / "r.mcap", "single-mass", configuration, demands, 0)
+
+
+def _help() -> None:
+    subprocess.run([sys.executable, "-m", "rigtwin.cli", "--help"], check=True, stdout=subprocess.DEVNULL)
+
+
+def _python() -> None:
+    subprocess.run([sys.executable, "-c", "pass"], check=True)
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def _side_by_side(title: str, goal: str, ours: Callable[[], object], against: Callable[[], object], rounds: int = 7) -> None:
+    """Medians of alternating rounds, and the ratio's spread over the rounds."""
+    ours(), against()
+    pairs = [(_seconds(ours), _seconds(against)) for _ in range(rounds)]
+    mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
+    ratios = sorted(one / other for one, other in pairs)
+    spread = f"{ratios[0]:.2f} to {ratios[-1]:.2f}"
+    print(f"{title:58s} {mine:7.3f} s / {theirs:7.3f} s = {statistics.median(ratios):5.2f} ({spread}); goal {goal}", flush=True)
+
+
+def main() -> None:
+    print(f"mujoco {mujoco.__version__}, numpy {np.__version__}, alternating rounds")
+    _side_by_side("closed loop with all controllers / bare mj_step", "<= 1.5", _closed_loop, _bare)
+    _side_by_side("16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3)
+    _side_by_side("45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False))
+    _side_by_side("rigtwin --help / starting Python", "< 0.5 s", _help, _python)
+
+
+if __name__ == "__main__":
+    main()
