@@ -78,7 +78,8 @@ def _seconds(work: Callable[[], object]) -> float:
 
 def _side_by_side(title: str, goal: str, ours: Callable[[], object], against: Callable[[], object], rounds: int = 7) -> None:
     """Medians of alternating rounds, and the ratio's spread over the rounds."""
-    ours(), against()
+    ours()
+    against()
     pairs = [(_seconds(ours), _seconds(against)) for _ in range(rounds)]
     mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
     ratios = sorted(one / other for one, other in pairs)
