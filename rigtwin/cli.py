@@ -57,7 +57,21 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)"
     )
+    run.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="KIND@COMPONENT=VALUE",
+        help="give the rig an effect, e.g. coulomb@rail=80",
+    )
     settings(run)
+
+    effects = command(
+        "effects",
+        "list the effects that a rig can have",
+        "Give one to a test with rigtwin run NAME --effect KIND@COMPONENT=VALUE.",
+    )
+    effects.add_argument("component", nargs="?", help="only those of this component")
 
     info = command("info", "say what is in a recording")
     info.add_argument("recording", type=Path)

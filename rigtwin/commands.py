@@ -65,10 +65,32 @@ def run(parsed: Namespace) -> int:
     demands = experiment.demands(configuration, parsed.seed)
     path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     with tqdm(total=len(demands), unit="tick", unit_scale=True, disable=None, desc=experiment.name, leave=False) as bar:
-        outcome = record(path, experiment.name, configuration, demands, parsed.seed, bar.update)
+        outcome = record(path, experiment.name, configuration, demands, parsed.seed, bar.update, parsed.effect)
     seconds = outcome.ticks * configuration.timing.period
     print(f"{experiment.name}: {seconds:.3f} s recorded in {outcome.path}; {outcome.reason}")
     return 3 if outcome.tripped else 0
+
+
+def effects(parsed: Namespace) -> int:
+    from rigtwin.effects import candidates
+    from rigtwin.parameters import Plant
+
+    plant = Plant()
+    rows: list[tuple[str, ...]] = [("effect", "parameter", "nominal", "unit", "allowed", "what it does")]
+    for effect in candidates(plant):
+        if parsed.component not in (None, effect.component):
+            continue
+        name, meaning = effect.name, effect.kind.meaning
+        for parameter, quantity in effect.quantities().items():
+            value, allowed = effect.nominal(plant)[parameter], f"{quantity.low:g} to {quantity.high:g}"
+            rows.append((name, parameter, f"{value:g}", quantity.unit, allowed, meaning))
+            name = meaning = ""
+    if len(rows) == 1:
+        components = dict.fromkeys(effect.component for effect in candidates(plant))
+        raise RigtwinError(f"unknown component {parsed.component!r}; there are {', '.join(components)}")
+    print(_table(rows))
+    print("setting@controller=NAME:VALUE  a setting that is not what the recording says; rigtwin list --settings has them")
+    return 0
 
 
 def _fresh(stem: str) -> Path:
@@ -213,6 +235,7 @@ def reproduce(parsed: Namespace) -> int:
 COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "list": list_experiments,
     "run": run,
+    "effects": effects,
     "info": info,
     "plot": plot,
     "video": video,

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
 
 from controllers import Commands, Demand, Measurements, Settings, State, initial_state, update
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration, Safety
-from rigtwin.converters import sampled
+from rigtwin.converters import Sensing, sampled
 from rigtwin.plant import Machine, advance, sense
 from rigtwin.rig import Rig
 from rigtwin.safety import Trip, tripped
@@ -53,10 +54,13 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
             trip = Trip.NONE
             for demand in demands[first : first + BLOCK]:
                 measured = rig.read()
-                state, commands = update(settings, state, measured, Demand(*demand.tolist()), period)
-                rows.append((commands, measured))
                 if isinstance(rig, Twin):
                     truth.append(rig.truth)
+                if isinstance(rig, Twin) and rig.misses(1)[0]:
+                    commands = rig.held
+                else:
+                    state, commands = update(settings, state, measured, Demand(*demand.tolist()), period)
+                rows.append((commands, measured))
                 trip = tripped(configuration.safety, measured, commands)
                 if trip != Trip.NONE:
                     break
@@ -79,10 +83,11 @@ def _ticks(
     machine: Machine,
     settings: Settings,
     limits: Safety,
-    resolution: Measurements,
+    sensing: Sensing,
     memory: Array,
     held: Commands,
     demands: Array,
+    missed: NDArray[np.bool_],
     disturbance: Array,
     period: float,
     commands_out: Array,
@@ -94,10 +99,12 @@ def _ticks(
     state = State(*to_fixed_tuple(memory, STATE_SIZE))  # type: ignore[call-arg]
     done, trip = 0, Trip.NONE
     for tick in range(len(demands)):
-        true = sense(machine, held.ground, held.structure)
-        measured = sampled(true, disturbance[tick], resolution)
+        true = sense(machine)
+        measured = sampled(sensing, true, disturbance[tick])
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
-        state, commands = update(settings, state, measured, demand, period)
+        commands = held
+        if not missed[tick]:
+            state, commands = update(settings, state, measured, demand, period)
         for column in range(4):
             commands_out[tick, column] = commands[column]
             measured_out[tick, column] = measured[column]
@@ -124,10 +131,11 @@ def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block
             twin.simulation.machine,
             settings,
             configuration.safety,
-            twin.resolution,
+            twin.sensing,
             memory,
             twin.held,
             asked,
+            twin.misses(len(asked)),
             twin.disturbance.take(len(asked)),
             period,
             commands,

@@ -35,6 +35,13 @@ class Handles(NamedTuple):
     structure: int
     load_cell: int
     motor_constant: float
+    constraint: Array
+    passive: Array
+    rail_friction: Array
+    motor_friction: Array
+    motor_bias: Array
+    tyre: Array
+    tyre_scale: float
 
 
 @cache
@@ -49,12 +56,16 @@ def build(plant: Plant, timestep: float) -> mujoco.MjModel:
     model.opt.timestep = timestep
     model.body("carriage").mass = plant.carriage.mass
     mujoco.mj_setConst(model, mujoco.MjData(model))
-    model.dof_frictionloss[model.joint("carriage").dofadr[0]] = plant.rail.coulomb
-    model.tendon_frictionloss[model.tendon("motor").id] = plant.motor.coulomb
+    carriage, rod = model.joint("carriage").dofadr[0], model.tendon("motor").id
+    model.dof_frictionloss[carriage] = plant.rail.coulomb
+    model.dof_damping[carriage] = plant.rail.viscous
+    model.tendon_frictionloss[rod] = plant.motor.coulomb
+    model.tendon_damping[rod] = plant.motor.viscous
     # Two timesteps: the fastest friction constraint MuJoCo takes as it is, so the least creep.
     model.dof_solref[:, 0] = 2 * timestep
     model.tendon_solref_fri[:, 0] = 2 * timestep
-    write_tyre(model, plant.tyre.stiffness)
+    scale = tyre_scale(model)
+    model.pair("tyre").solref[:] = (-scale * plant.tyre.stiffness, -scale * plant.tyre.damping)
     motor = model.actuator("motor")
     motor.gainprm[0] = plant.motor.constant
     motor.dynprm[0] = plant.motor.time_constant
@@ -63,18 +74,23 @@ def build(plant: Plant, timestep: float) -> mujoco.MjModel:
     return model
 
 
-def write_tyre(model: mujoco.MjModel, stiffness: float) -> None:
-    """Makes the tyre's contact a spring of `stiffness` N/m.
+def tyre_scale(model: mujoco.MjModel) -> float:
+    """What to multiply a stiffness (N/m) or damping (Ns/m) by for −solref of the tyre's contact, 1/kg.
 
-    MuJoCo solves f·(A + R) = −k·r with R = (1 − d)/d·D and k = −solref/d, where d is the impedance, A the contact's exact
-    inverse mass and D its approximate one (MuJoCo documentation, computation, "Parameters"). Solved for solref here.
+    MuJoCo solves f·(A + R) = −k·r − b·v with R = (1 − d)/d·D, k and b = −solref/d, where d is the impedance, A the contact's
+    exact inverse mass and D its approximate one (MuJoCo documentation, computation, "Parameters"). Solved for solref here.
     """
     pair = model.pair("tyre")
     impedance = float(pair.solimp[0])
     bodies = [int(model.geom_bodyid[geom]) for geom in (pair.geom1[0], pair.geom2[0])]
     exact = sum(1.0 / float(model.body_mass[body]) for body in bodies)
     approximate = sum(float(model.body_invweight0[body, 0]) for body in bodies)
-    pair.solref[:] = (-stiffness * (impedance * exact + (1.0 - impedance) * approximate), 0.0)
+    return impedance * exact + (1.0 - impedance) * approximate
+
+
+def _one(number: int) -> slice:
+    """The place of one element, as a view."""
+    return slice(int(number), int(number) + 1)
 
 
 def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
@@ -94,4 +110,11 @@ def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
         structure=int(model.joint("structure").qposadr[0]),
         load_cell=int(model.sensor("load_cell").adr[0]),
         motor_constant=float(model.actuator("motor").gainprm[0]),
+        constraint=data.qfrc_constraint,
+        passive=data.qfrc_passive,
+        rail_friction=model.dof_frictionloss[_one(model.joint("carriage").dofadr[0])],
+        motor_friction=model.tendon_frictionloss[_one(model.tendon("motor").id)],
+        motor_bias=model.actuator("motor").biasprm,
+        tyre=model.pair("tyre").solref,
+        tyre_scale=tyre_scale(model),
     )

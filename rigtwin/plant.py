@@ -2,16 +2,43 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import mujoco
+import numpy as np
 
 from controllers import Measurements
 from controllers.compiled import compilable
+from rigtwin.actuator import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.arrays import Array
 from rigtwin.compiling import forward, integrate
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
+from rigtwin.friction import Friction, breakaway, friction, gap_at
 from rigtwin.model import Handles, build, handles
 from rigtwin.parameters import Plant
+
+YIELDING = 1e-3
+"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
+
+
+class Contacts(NamedTuple):
+    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape (1,) each; yielded: of
+    the ground and structure plate under load, m, shape (2,)."""
+
+    changing: bool
+    rail: Friction
+    rail_gap: Array
+    motor: Friction
+    motor_gap: Array
+    cogging: float
+    cogging_pitch: float
+    stiffness: float
+    damping: float
+    hardening: float
+    ground_compliance: float
+    structure_compliance: float
+    yielded: Array
 
 
 class Machine(NamedTuple):
@@ -21,8 +48,36 @@ class Machine(NamedTuple):
     substeps: int
     ground: CylinderModel
     ground_state: CylinderState
+    ground_drive: Actuator
+    ground_command: ActuatorState
     structure: CylinderModel
     structure_state: CylinderState
+    structure_drive: Actuator
+    structure_command: ActuatorState
+    motor_drive: Actuator
+    motor_command: ActuatorState
+    contacts: Contacts
+
+
+def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
+    """The plant's contacts with the carriage and the travel at those positions, m."""
+    rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
+    compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
+    forces = (tyre.hardening, plant.motor.cogging, rail.asymmetry, motor.asymmetry, *compliances)
+    return Contacts(
+        rail.changing or motor.changing or any(forces),
+        rail,
+        gap_at(carriage),
+        motor,
+        gap_at(travel),
+        plant.motor.cogging,
+        plant.motor.cogging_pitch,
+        tyre.stiffness,
+        tyre.damping,
+        tyre.hardening,
+        *compliances,
+        np.zeros(2),
+    )
 
 
 class Simulation:
@@ -30,21 +85,32 @@ class Simulation:
     at rest. Owns the MuJoCo structures that `machine` looks into."""
 
     def __init__(self, plant: Plant, timestep: float, substeps: int, ground: float, structure: float, preload: float) -> None:
-        """timestep s; ground and structure: plate positions at the start, m; preload: motor force at the start, N."""
+        """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
-        view.qpos[view.ground] = ground
-        view.qpos[view.structure] = structure
-        view.qpos[view.carriage] = ground - preload / plant.tyre.stiffness
+        drives = [
+            actuator(of, plant.computer, timestep) for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
+        ]
+        held = [holding(drives[0], ground), holding(drives[1], structure), holding(drives[2], preload / plant.motor.constant)]
+        here = [float(state.memory[3]) for state in held]
+        view.qpos[view.ground], view.qpos[view.structure] = here[0], here[1]
+        view.qpos[view.carriage] = carriage = here[0] - preload / plant.tyre.stiffness
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         self.machine = Machine(
             view,
             substeps,
             sampled(plant.ground_cylinder, timestep),
-            settled(plant.ground_cylinder, ground),
+            settled(plant.ground_cylinder, here[0]),
+            drives[0],
+            held[0],
             sampled(plant.structure_cylinder, timestep),
-            settled(plant.structure_cylinder, structure),
+            settled(plant.structure_cylinder, here[1]),
+            drives[1],
+            held[1],
+            drives[2],
+            held[2],
+            contacts(plant, carriage, here[1] - carriage),
         )
 
 
@@ -56,9 +122,42 @@ def drive(mechanics: Handles, joint: int, here: float, there: float) -> None:
 
 
 @compilable
+def motor_force(mechanics: Handles) -> float:
+    """What the motor pushes with now, its friction apart, N."""
+    return mechanics.motor_constant * mechanics.activation[0] + mechanics.motor_bias[0]
+
+
+@compilable
 def brace(mechanics: Handles) -> None:
     """Holds the structure plate against the motor, so that its friction is not asked to."""
-    mechanics.applied[mechanics.structure] = -mechanics.motor_constant * mechanics.activation[0]
+    mechanics.applied[mechanics.structure] = -motor_force(mechanics)
+
+
+@compilable
+def touch(mechanics: Handles, now: Contacts) -> None:
+    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
+    if not now.changing:
+        return
+    carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
+    travel = mechanics.qpos[mechanics.structure] - carriage
+    sliding = mechanics.qvel[mechanics.structure] - velocity
+    mechanics.rail_friction[0] = breakaway(now.rail, now.rail_gap, carriage, velocity)
+    mechanics.motor_friction[0] = breakaway(now.motor, now.motor_gap, travel, sliding)
+    mechanics.applied[mechanics.carriage] = -0.5 * now.rail.asymmetry
+    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch)
+    mechanics.motor_bias[0] = cogging - 0.5 * now.motor.asymmetry
+    deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
+    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * max(1.0 + now.hardening * deflection, 0.0)
+
+
+@compilable
+def give_way(mechanics: Handles, now: Contacts) -> None:
+    """Lets compliant cylinders yield to the load of the last step."""
+    share = mechanics.timestep / (YIELDING + mechanics.timestep)
+    tyre = -mechanics.constraint[mechanics.ground]
+    cell = mechanics.constraint[mechanics.structure] + mechanics.passive[mechanics.structure] + motor_force(mechanics)
+    now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
+    now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
 
 
 @compilable
@@ -70,21 +169,19 @@ def true_measurements(mechanics: Handles) -> Measurements:
 
 
 @compilable
-def sense(machine: Machine, ground_command: float, structure_command: float) -> Measurements:
+def sense(machine: Machine) -> Measurements:
     """Ideal measurements now, under the commands held until now.
 
     The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
     that accelerates the carriage with the plate, which a velocity one timestep old would not show.
     """
-    mechanics = machine.mechanics
-    ground, structure = machine.ground_state.position[0], machine.structure_state.position[0]
-    drive(mechanics, mechanics.ground, ground, next_position(machine.ground, machine.ground_state, ground_command))
-    drive(
-        mechanics,
-        mechanics.structure,
-        structure,
-        next_position(machine.structure, machine.structure_state, structure_command),
-    )
+    mechanics, yielded = machine.mechanics, machine.contacts.yielded
+    ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+    onward = next_position(machine.ground, machine.ground_state, machine.ground_command.memory[3])
+    drive(mechanics, mechanics.ground, ground, onward + yielded[0])
+    onward = next_position(machine.structure, machine.structure_state, machine.structure_command.memory[3])
+    drive(mechanics, mechanics.structure, structure, onward + yielded[1])
+    touch(mechanics, machine.contacts)
     brace(mechanics)
     forward(mechanics.model, mechanics.data, 0, 0)
     return true_measurements(mechanics)
@@ -93,14 +190,23 @@ def sense(machine: Machine, ground_command: float, structure_command: float) -> 
 @compilable
 def advance(machine: Machine, ground_command: float, structure_command: float, voltage: float) -> None:
     """One control period with the commands held."""
-    mechanics = machine.mechanics
-    mechanics.control[0] = voltage
+    mechanics, yielded = machine.mechanics, machine.contacts.yielded
     for _ in range(machine.substeps):
-        ground, structure = machine.ground_state.position[0], machine.structure_state.position[0]
-        advance_cylinder(machine.ground, machine.ground_state, ground_command)
-        advance_cylinder(machine.structure, machine.structure_state, structure_command)
-        drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0])
-        drive(mechanics, mechanics.structure, structure, machine.structure_state.position[0])
+        ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+        advance_cylinder(
+            machine.ground, machine.ground_state, conditioned(machine.ground_drive, machine.ground_command, ground_command)
+        )
+        advance_cylinder(
+            machine.structure,
+            machine.structure_state,
+            conditioned(machine.structure_drive, machine.structure_command, structure_command),
+        )
+        mechanics.control[0] = conditioned(machine.motor_drive, machine.motor_command, voltage)
+        if machine.contacts.changing:
+            give_way(mechanics, machine.contacts)
+        drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])
+        drive(mechanics, mechanics.structure, structure, machine.structure_state.position[0] + yielded[1])
+        touch(mechanics, machine.contacts)
         brace(mechanics)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)

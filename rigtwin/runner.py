@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rigtwin import __version__
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, flattened
+from rigtwin.effects import applied
 from rigtwin.loop import run_compiled
 from rigtwin.recording import Writer
 from rigtwin.safety import Trip, explained
@@ -32,18 +33,22 @@ def record(
     demands: Array,
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
+    effects: Sequence[str] = (),
 ) -> Outcome:
     """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
+
+    effects: as `--effect` takes them; the rig has them, the operator's settings in the recording do not know.
 
     progress is called with the ticks done since its last call. A trip, an interruption or an exception leaves a readable
     recording that says why it ended. Raises RigtwinError before anything is written if the configuration is at fault.
     """
-    twin = Twin(configuration, float(demands[0, 0]), seed)
+    actual = applied(configuration, list(effects))
+    twin = Twin(actual, float(demands[0, 0]), seed)
     settings = flattened(configuration)
     ticks, trip = 0, Trip.NONE
     with Writer(path, experiment, configuration.timing.period, settings["controller"]) as writer:
-        writer.add_twin(seed, settings, (), __version__)
-        for block in run_compiled(twin, configuration, demands):
+        writer.add_twin(seed, settings, tuple(effects), __version__)
+        for block in run_compiled(twin, actual, demands):
             writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
             ticks, trip = ticks + len(block.commands), block.trip
             progress(len(block.commands))

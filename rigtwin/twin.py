@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controllers import Commands, Measurements
+from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
-from rigtwin.converters import Disturbance, resolutions, sampled
+from rigtwin.converters import Disturbance, sampled, sensing
 from rigtwin.plant import Machine, Simulation, advance, sense
 
 _advance = kernel(advance)
 
 
 @kernel
-def _sense(machine: Machine, ground_command: float, structure_command: float, out: Array) -> None:
-    true = sense(machine, ground_command, structure_command)
+def _sense(machine: Machine, out: Array) -> None:
+    true = sense(machine)
     for number in range(4):
         out[number] = true[number]
 
@@ -39,8 +41,10 @@ class Twin:
             preload=controller.preload,
         )
         self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
-        self.resolution = resolutions(configuration.plant)
-        self.held = Commands(float(ground), controller.start, controller.preload, 0.0)
+        self.sensing = sensing(configuration.plant, configuration.timing.period)
+        self._missed = np.random.default_rng([seed, 2])
+        self._share_missed = configuration.plant.computer.missed_ticks
+        self.held = Commands(float(ground), controller.start, controller.preload, controller.preload / MOTOR_CONSTANT)
         self.truth = Measurements(0.0, 0.0, 0.0, 0.0)
 
     def start(self) -> None:
@@ -48,9 +52,13 @@ class Twin:
 
     def read(self) -> Measurements:
         true = np.empty(4)
-        _sense(self.simulation.machine, self.held.ground, self.held.structure, true)
+        _sense(self.simulation.machine, true)
         self.truth = Measurements(*true.tolist())
-        return sampled(self.truth, self.disturbance.take(1)[0], self.resolution)
+        return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
+
+    def misses(self, ticks: int) -> NDArray[np.bool_]:
+        """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as they are."""
+        return self._missed.random(ticks) < self._share_missed
 
     def write(self, commands: Commands) -> None:
         _advance(self.simulation.machine, commands.ground, commands.structure, commands.voltage)

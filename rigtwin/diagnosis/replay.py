@@ -16,8 +16,8 @@ from rigtwin.compiling import forward, integrate, kernel
 from rigtwin.configuration import Configuration
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
 from rigtwin.model import Handles, build, handles
-from rigtwin.parameters import Carriage, Cylinder, Rail
-from rigtwin.plant import brace, drive, true_measurements
+from rigtwin.parameters import Carriage, Cylinder, Motor, Plant, Rail
+from rigtwin.plant import Contacts, brace, contacts, drive, motor_force, touch, true_measurements
 
 FIXED = 1e6
 """kg; a carriage this heavy goes where it is driven."""
@@ -52,6 +52,7 @@ def replay_cylinder(cylinder: Cylinder, configuration: Configuration, commands: 
 @kernel
 def _mechanics(
     mechanics: Handles,
+    contacts: Contacts,
     substeps: int,
     ground: Array,
     structure: Array,
@@ -73,10 +74,13 @@ def _mechanics(
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
                 drive(mechanics, mechanics.carriage, carriage[now], carriage[now + 1])
-                mechanics.applied[mechanics.carriage] = mechanics.motor_constant * mechanics.activation[0]
+            touch(mechanics, contacts)
+            if driven:
+                mechanics.applied[mechanics.carriage] = motor_force(mechanics)
             else:
                 share = substep / substeps
-                mechanics.applied[mechanics.carriage] = -((1.0 - share) * force[tick] + share * following)
+                load = (1.0 - share) * force[tick] + share * following
+                mechanics.applied[mechanics.carriage] = -load - 0.5 * contacts.rail.asymmetry
             brace(mechanics)
             forward(mechanics.model, mechanics.data, 0, 1 if substep else 0)
             if substep == 0:
@@ -98,7 +102,7 @@ def _between(motion: Array, substeps: int) -> Array:
 
 
 def _run(
-    model: mujoco.MjModel,
+    plant: Plant,
     configuration: Configuration,
     ground: Array,
     structure: Array,
@@ -109,6 +113,7 @@ def _run(
     wheel: float,
 ) -> Output:
     """preload: motor force at the start, N; wheel: carriage position at the start, m."""
+    model = build(plant, configuration.timing.timestep)
     data = mujoco.MjData(model)
     view = handles(model, data)
     view.qpos[view.carriage] = wheel
@@ -117,6 +122,7 @@ def _run(
     out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
     _mechanics(
         view,
+        contacts(plant, wheel, float(structure[0]) - wheel),
         substeps,
         _between(ground, substeps),
         _between(structure, substeps),
@@ -132,24 +138,21 @@ def _run(
 def replay_carriage(configuration: Configuration, ground: Array, force: Array, preload: float) -> Array:
     """Ground motion and measured suspension force → wheel position, m. The motor is out of it."""
     plant = configuration.plant
-    alone = plant._replace(motor=plant.motor._replace(coulomb=0.0))
+    alone = plant._replace(motor=Motor(coulomb=0.0))
     nothing = np.zeros_like(force)
     wheel = float(ground[0]) - preload / plant.tyre.stiffness
-    model = build(alone, configuration.timing.timestep)
-    return _run(model, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
+    return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
 
 
 def replay_mechanics(configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float) -> Output:
     """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
     plant = configuration.plant
     wheel = float(ground[0]) - preload / plant.tyre.stiffness
-    model = build(plant, configuration.timing.timestep)
-    return _run(model, configuration, ground, structure, None, voltage, np.zeros_like(voltage), preload, wheel)
+    return _run(plant, configuration, ground, structure, None, voltage, np.zeros_like(voltage), preload, wheel)
 
 
 def replay_motor(configuration: Configuration, travel: Array, voltage: Array, preload: float) -> Array:
     """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
-    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(0.0))
-    model = build(alone, configuration.timing.timestep)
+    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(coulomb=0.0))
     nothing = np.zeros_like(travel)
-    return _run(model, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0).load_cell
+    return _run(alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0).load_cell

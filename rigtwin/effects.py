@@ -1,0 +1,138 @@
+"""Effects: what a real rig may have that the nominal one has not. An effect is a kind at a component, `coulomb@rail`.
+
+A kind is defined once, as other values of a component's parameters; bounds and units are the parameters' own. So the twin,
+every comparison and every calibrated twin mean the same by it. Which effects a machine can have follows from its components.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from controllers.quantity import Quantity, fields
+from rigtwin.configuration import Configuration, overridden
+from rigtwin.errors import RigtwinError
+from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+
+SLIDES = (Rail, Motor)
+ACTUATORS = (Motor, Cylinder)
+SENSORS = (Lvdt, LoadCell)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A sort of effect. at: types of component that can have it; parameters: theirs that it sets, the first its magnitude;
+    meaning: what it does."""
+
+    name: str
+    at: tuple[type, ...]
+    parameters: tuple[str, ...]
+    meaning: str
+
+
+KINDS = (
+    Kind("coulomb", SLIDES, ("coulomb",), "dry friction, the same at any speed"),
+    Kind("viscous", SLIDES, ("viscous",), "friction in proportion to the speed"),
+    Kind("stribeck", SLIDES, ("stribeck", "stribeck_velocity"), "dry friction greater near standstill"),
+    Kind("asymmetry", SLIDES, ("asymmetry",), "dry friction greater in positive direction than in negative"),
+    Kind("backlash", SLIDES, ("backlash",), "friction felt only once a gap is taken up after each reversal"),
+    Kind("mass", (Carriage,), ("mass",), "mass"),
+    Kind("stiffness", (Tyre,), ("stiffness",), "stiffness at small deflection"),
+    Kind("damping", (Tyre,), ("damping",), "damping while in contact"),
+    Kind("hardening", (Tyre,), ("hardening",), "stiffness that grows with deflection"),
+    Kind("gain", (*ACTUATORS, *SENSORS), ("gain",), "output by this factor"),
+    Kind("lag", (*ACTUATORS, *SENSORS), ("lag",), "a first-order lag more"),
+    Kind("delay", (*ACTUATORS, *SENSORS, Computer), ("delay",), "a delay more"),
+    Kind("saturation", ACTUATORS, ("saturation",), "command limited to this magnitude"),
+    Kind("deadband", ACTUATORS, ("deadband",), "command without effect within this band"),
+    Kind("rate_limit", (Motor,), ("rate_limit",), "command's rate limited"),
+    Kind("rate_limit", (Cylinder,), ("speed_limit",), "speed limited"),
+    Kind("cogging", (Motor,), ("cogging", "cogging_pitch"), "force that alternates along the stroke"),
+    Kind("compliance", (Cylinder,), ("compliance",), "yields under load"),
+    Kind("offset", SENSORS, ("offset",), "output displaced"),
+    Kind("hum", SENSORS, ("hum",), "amplitude of the mains line"),
+    Kind("noise", SENSORS, ("white",), "white noise, rms"),
+    Kind("quantisation", SENSORS, ("resolution",), "size of one bit"),
+    Kind("missed_ticks", (Computer,), ("missed_ticks",), "share of ticks at which the outputs stay as they are"),
+)
+"""Every kind of effect. `setting@controller` is besides: any setting that is not what the operator wrote down."""
+
+NAMES = {"computer": "controller"}
+"""What a component is called in effects, where that is not its name among the parameters."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A kind at a component of the plant. group: the component's name among the parameters."""
+
+    kind: Kind
+    group: str
+
+    @property
+    def component(self) -> str:
+        return NAMES.get(self.group, self.group)
+
+    @property
+    def name(self) -> str:
+        return f"{self.kind.name}@{self.component}"
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Its parameters: name → unit, bounds, source."""
+        meanings = fields(type(getattr(Plant(), self.group)))
+        found = {name: meanings[name] for name in self.kind.parameters}
+        return {name: meaning for name, meaning in found.items() if isinstance(meaning, Quantity)}
+
+    def nominal(self, plant: Plant) -> dict[str, float]:
+        """Its parameters' values in a plant."""
+        return {name: float(getattr(getattr(plant, self.group), name)) for name in self.kind.parameters}
+
+    def at(self, configuration: Configuration, values: dict[str, float]) -> Configuration:
+        """The configuration with the effect. Raises RigtwinError for a value out of bounds."""
+        return overridden(configuration, {self.group: values})
+
+
+def candidates(plant: Plant) -> Iterator[Effect]:
+    """All effects that a plant of these components can have."""
+    for group, component in plant._asdict().items():
+        for kind in KINDS:
+            if isinstance(component, kind.at):
+                yield Effect(kind, group)
+
+
+def find(name: str) -> Effect:
+    """The effect of that name, `kind@component`. Raises RigtwinError with what there is."""
+    effects = {effect.name: effect for effect in candidates(Plant())}
+    if name in effects:
+        return effects[name]
+    kind, _, component = name.partition("@")
+    there = [effect.kind.name for effect in effects.values() if effect.component == component]
+    if there:
+        raise RigtwinError(f"unknown effect {kind!r} at {component}; there are {', '.join(there)}")
+    components = dict.fromkeys(effect.component for effect in effects.values())
+    raise RigtwinError(f"unknown effect {name!r}; expected KIND@COMPONENT with a component of {', '.join(components)}")
+
+
+def applied(configuration: Configuration, texts: list[str]) -> Configuration:
+    """The configuration with effects as `--effect` takes them: `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or
+    `setting@controller=kp:0.5` for a setting that is not what the recording will say.
+
+    Raises RigtwinError naming the effect and what is allowed.
+    """
+    for text in texts:
+        name, equals, values = text.partition("=")
+        if not equals:
+            raise RigtwinError(f"--effect {text}: expected KIND@COMPONENT=VALUE, such as coulomb@rail=80")
+        if name == "setting@controller":
+            key, _, value = values.partition(":")
+            configuration = overridden(configuration, {"controller": {key: value}})
+            continue
+        effect = find(name)
+        first, *more = values.split(",")
+        changes: dict[str, object] = {effect.kind.parameters[0]: first}
+        for item in more:
+            key, _, value = item.partition("=")
+            if key not in effect.kind.parameters:
+                raise RigtwinError(f"--effect {text}: {effect.name} has {', '.join(effect.kind.parameters)}, not {key!r}")
+            changes[key] = value
+        configuration = overridden(configuration, {effect.group: changes})
+    return configuration

@@ -1,0 +1,235 @@
+"""Effects: every one listed, bounded, felt where it is, absent at its nominal value, and right in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from controllers import Measurements
+from experiments import EXPERIMENTS
+from rigtwin.actuator import actuator, conditioned, holding
+from rigtwin.configuration import Configuration, Timing
+from rigtwin.converters import sampled, sensing
+from rigtwin.effects import KINDS, applied, candidates, find
+from rigtwin.errors import RigtwinError
+from rigtwin.friction import breakaway, friction, gap_at
+from rigtwin.loop import run, run_compiled
+from rigtwin.model import build, handles
+from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+from rigtwin.plant import contacts, drive, touch
+from rigtwin.recording import load
+from rigtwin.runner import record
+from rigtwin.twin import Twin
+
+EFFECTS = {effect.name: effect for effect in candidates(Plant())}
+IMPOSED = EXPERIMENTS["imposed"]
+SHORT = IMPOSED.configuration._replace(timing=Timing(duration=3.0))
+DEMANDS = IMPOSED.demands(SHORT, 0)
+NOTICEABLE = {
+    "coulomb@rail": "90", "viscous@rail": "400", "stribeck@rail": "30", "asymmetry@rail": "30", "backlash@rail": "0.002",
+    "coulomb@motor": "24", "viscous@motor": "60", "stribeck@motor": "12", "asymmetry@motor": "12", "backlash@motor": "0.002",
+    "mass@carriage": "40", "stiffness@tyre": "42000", "damping@tyre": "500", "hardening@tyre": "60",
+    "gain@motor": "1.05", "lag@motor": "0.005", "delay@motor": "0.005", "saturation@motor": "1.5", "deadband@motor": "0.1",
+    "rate_limit@motor": "5", "cogging@motor": "10",
+    "gain@cylinder": "1.05", "lag@cylinder": "0.01", "delay@cylinder": "0.005", "saturation@cylinder": "0.008",
+    "deadband@cylinder": "0.001", "rate_limit@cylinder": "0.03", "compliance@cylinder": "1e-6",
+    "gain@lvdt": "1.05", "offset@lvdt": "0.001", "lag@lvdt": "0.01", "delay@lvdt": "0.01", "hum@lvdt": "0.001",
+    "noise@lvdt": "0.0003", "quantisation@lvdt": "0.0005",
+    "gain@load_cell": "1.05", "offset@load_cell": "10", "lag@load_cell": "0.01", "delay@load_cell": "0.01",
+    "hum@load_cell": "30", "noise@load_cell": "10", "quantisation@load_cell": "5",
+    "delay@controller": "0.005", "missed_ticks@controller": "0.1",
+}  # fmt: skip
+
+
+def text(name: str) -> str:
+    kind, _, component = name.partition("@")
+    for ending in ("cylinder", "lvdt"):
+        component = ending if component.endswith(ending) else component
+    return f"{name}={NOTICEABLE[f'{kind}@{component}']}"
+
+
+def all_measurements(configuration: Configuration) -> np.ndarray:
+    blocks = run_compiled(Twin(configuration, float(DEMANDS[0, 0]), 0), configuration, DEMANDS)
+    return np.concatenate([block.measurements for block in blocks])
+
+
+@pytest.fixture(scope="module")
+def nominal() -> np.ndarray:
+    return all_measurements(SHORT)
+
+
+def test_the_list_is_that_of_the_design():
+    slides = {"coulomb", "viscous", "stribeck", "asymmetry", "backlash"}
+    actuators = {"gain", "lag", "delay", "saturation", "deadband", "rate_limit"}
+    sensors = {"gain", "offset", "lag", "delay", "hum", "noise", "quantisation"}
+    expected = {
+        "rail": slides,
+        "carriage": {"mass"},
+        "tyre": {"stiffness", "damping", "hardening"},
+        "motor": slides | actuators | {"cogging"},
+        "structure_cylinder": actuators | {"compliance"},
+        "ground_cylinder": actuators | {"compliance"},
+        **dict.fromkeys(("load_cell", "suspension_lvdt", "structure_lvdt", "ground_lvdt"), sensors),
+        "controller": {"missed_ticks", "delay"},
+    }
+    found: dict[str, set[str]] = {}
+    for effect in EFFECTS.values():
+        found.setdefault(effect.component, set()).add(effect.kind.name)
+    assert found == expected
+    assert all(kind.meaning for kind in KINDS)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_nominal_value_is_no_effect(name, nominal):
+    effect = EFFECTS[name]
+    values = effect.nominal(SHORT.plant)
+    for parameter, quantity in effect.quantities().items():
+        assert quantity.low <= values[parameter] <= quantity.high
+    assert np.array_equal(all_measurements(effect.at(SHORT, values)), nominal)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_is_felt_and_stays_finite(name, nominal):
+    changed = all_measurements(applied(SHORT, [text(name)]))
+    count = min(len(changed), len(nominal))
+    assert np.isfinite(changed).all()
+    difference = np.std(changed[:count] - nominal[:count], axis=0) + np.abs(np.mean(changed[:count] - nominal[:count], axis=0))
+    assert np.any(difference > [2e-5, 2e-5, 2e-5, 0.5])
+    if find(name).component.endswith(("lvdt", "load_cell")) and find(name).component != "load_cell":
+        column = Measurements._fields.index(find(name).component)
+        others = [number for number in range(4) if number != column]
+        assert np.array_equal(changed[:, others], nominal[:, others]), "an imposed test does not feed back its LVDTs"
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_stepwise_and_compiled_agree_with_effects(name):
+    configuration = applied(SHORT._replace(timing=Timing(duration=0.3)), [text(name)])
+    first = float(DEMANDS[0, 0])
+    compiled = [b.measurements for b in run_compiled(Twin(configuration, first, 4), configuration, DEMANDS[:300])]
+    stepwise = [b.measurements for b in run(Twin(configuration, first, 4), configuration, DEMANDS[:300])]
+    assert np.max(np.abs(np.concatenate(compiled) - np.concatenate(stepwise))) < 1e-12 * 300
+
+
+def test_a_recording_keeps_its_effects_but_not_among_the_operators_settings(tmp_path):
+    effects = ["coulomb@rail=80", "setting@controller=kp:0.9"]
+    record(tmp_path / "e.mcap", "imposed", SHORT, DEMANDS, 0, effects=effects)
+    recording = load(tmp_path / "e.mcap")
+    assert recording.twin["effects"] == '["coulomb@rail=80", "setting@controller=kp:0.9"]'
+    assert recording.controller["kp"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ("coulomb@rail", "KIND@COMPONENT=VALUE"),
+        ("coulomb=3", "a component of carriage, rail, tyre"),
+        ("coulomb@tyre=3", "at tyre; there are stiffness, damping, hardening"),
+        ("coulomb@rail=much", "rail.coulomb = much: expected a number from 0 to 1000 N"),
+        ("stribeck@rail=20,speed=0.1", "stribeck@rail has stribeck, stribeck_velocity, not 'speed'"),
+        ("setting@controller=kd:1", "unknown setting controller.kd"),
+    ],
+)
+def test_wrong_effects_are_refused_with_what_there_is(wrong, says):
+    with pytest.raises(RigtwinError, match=says):
+        applied(SHORT, [wrong])
+
+
+STEP = 2.5e-4
+NEVER_LATE = Computer()
+
+
+def through(of: Motor | Cylinder, commands: np.ndarray, computer: Computer = NEVER_LATE) -> np.ndarray:
+    conditioning = actuator(of, computer, STEP)
+    state = holding(conditioning, float(commands[0]))
+    return np.array([conditioned(conditioning, state, float(command)) for command in commands])
+
+
+def test_actuator_conditioning_in_closed_form():
+    time = np.arange(2000) * STEP
+    sine = 1.0 + 0.5 * np.sin(2 * np.pi * 4.0 * time) * (time > 0)
+    late = through(Motor(delay=0.0101), sine)
+    assert np.max(np.abs(late[100:] - (1.0 + 0.5 * np.sin(2 * np.pi * 4.0 * (time[100:] - 0.0101))))) < 1e-4
+    assert np.array_equal(through(Cylinder(delay=0.0101), sine), late)
+    assert np.array_equal(through(Motor(), sine, Computer(delay=0.0101)), late)
+    step = np.where(time < 0.05, 0.0, 1.0)
+    lagged = through(Motor(lag=0.02), step)
+    exact = np.where(time < 0.05, 0.0, 1 - np.exp(-(time + STEP - 0.05) / 0.02))
+    assert np.max(np.abs(lagged - exact)) < 1e-9
+    assert np.max(through(Motor(gain=1.1), sine) - 1.1 * sine) == 0.0
+    assert np.max(through(Motor(saturation=1.2), sine)) == 1.2
+    assert np.max(np.abs(np.diff(through(Motor(rate_limit=3.0), sine)))) == pytest.approx(3.0 * STEP)
+    assert np.max(np.abs(through(Motor(deadband=0.2), sine) - (sine - 0.2))) < 1e-12
+    play = through(Cylinder(deadband=0.2), sine)
+    assert np.max(np.abs(play - sine)) == pytest.approx(0.2)
+    assert np.ptp(play) == pytest.approx(1.0 - 0.4)
+
+
+def test_sensor_in_closed_form():
+    plant = Plant(load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045), ground_lvdt=Lvdt(0, 0, 0, lag=0.02))
+    sensors = sensing(plant, 1e-3)
+    time = np.arange(1000) * 1e-3
+    wave = np.sin(2 * np.pi * 2.0 * time)
+    step = np.where(time < 0.1, 0.0, 1.0)
+    rows = [
+        sampled(sensors, Measurements(s, 0.0, 0.0, w), np.zeros(4)) for s, w in zip(step.tolist(), wave.tolist(), strict=True)
+    ]
+    force = np.array([row.load_cell for row in rows])
+    assert np.max(np.abs(force[10:] - (3.0 + 1.1 * np.sin(2 * np.pi * 2.0 * (time[10:] - 0.0045))))) < 1e-4
+    ground = np.array([row.ground_lvdt for row in rows])
+    assert np.max(np.abs(ground - np.where(time < 0.0995, 0.0, 1 - np.exp(-(time + 1e-3 - 0.1) / 0.02)))) < 1e-9
+
+
+def test_friction_in_closed_form():
+    dry = friction(Rail(coulomb=50.0, stribeck=20.0, stribeck_velocity=0.01))
+    gap = gap_at(0.0)
+    assert breakaway(dry, gap, 0.0, 0.0) == 70.0
+    assert breakaway(dry, gap, 0.0, 0.01) == pytest.approx(50 + 20 * math.exp(-1))
+    assert breakaway(dry, gap, 0.0, 1.0) == pytest.approx(50.0)
+    loose = friction(Rail(coulomb=50.0, backlash=0.004))
+    gap = gap_at(0.0)
+    path = np.concatenate([np.linspace(0, 0.01, 101), np.linspace(0.01, 0, 101)])
+    felt = np.array([breakaway(loose, gap, float(x), 0.1) for x in path]) > 0
+    assert np.all(felt[21:101])
+    assert not np.any(felt[:20])
+    after = path[101:][~felt[101:]]
+    assert np.ptp(after) == pytest.approx(0.004, abs=2e-4), "free over the gap after the reversal"
+
+
+def steady_force(plant: Plant, velocity: float) -> float:
+    """Force of rail and tyre on the carriage when driven at a steady speed out of the tyre's reach, N."""
+    model = build(plant, STEP)
+    data = mujoco.MjData(model)
+    view = handles(model, data)
+    now = contacts(plant, 0.0, 0.0)
+    view.qpos[view.ground] = -1.0
+    for number in range(50):
+        drive(view, view.carriage, number * velocity * STEP, (number + 1) * velocity * STEP)
+        view.applied[:] = 0.0
+        touch(view, now)
+        mujoco.mj_forward(model, data)
+    return float((data.qfrc_constraint + data.qfrc_passive + data.qfrc_applied)[view.carriage])
+
+
+@pytest.mark.parametrize("velocity", [-0.2, 0.05, 0.2])
+def test_rail_force_at_a_steady_speed(velocity):
+    rail = Rail(coulomb=50.0, viscous=300.0, asymmetry=12.0)
+    expected = -(50.0 * math.copysign(1.0, velocity) + 300.0 * velocity + 6.0)
+    quiet = Plant(carriage=Carriage(1e4), rail=rail, motor=Motor(coulomb=0.0))
+    assert steady_force(quiet, velocity) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(("damping", "hardening"), [(0.0, 40.0), (800.0, 0.0), (300.0, 25.0)])
+def test_tyre_law(damping, hardening):
+    plant = Plant(rail=Rail(coulomb=0.0), motor=Motor(coulomb=0.0), tyre=Tyre(50_000.0, damping, hardening))
+    model = build(plant, STEP)
+    data = mujoco.MjData(model)
+    view = handles(model, data)
+    for deflection, rate in ((0.004, 0.0), (0.01, 0.05), (0.01, -0.05), (0.0005, -0.3), (-0.001, 0.1)):
+        view.qpos[view.carriage], view.qvel[view.carriage] = -deflection, -rate
+        touch(view, contacts(plant, -deflection, deflection))
+        mujoco.mj_forward(model, data)
+        law = 50_000 * deflection * (1 + hardening * deflection) + damping * rate if deflection > 0 else 0.0
+        assert data.qfrc_constraint[view.carriage] == pytest.approx(max(law, 0.0), rel=1e-3, abs=1e-3)
