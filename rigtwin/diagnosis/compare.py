@@ -12,6 +12,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety, overridden
+from rigtwin.diagnosis.checks import SHORTEST, check
 from rigtwin.diagnosis.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.diagnosis.replay import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
 from rigtwin.errors import RigtwinError
@@ -28,8 +29,6 @@ CERTAIN = 3.0
 """Standard deviations of a velocity beyond which its sign is certain."""
 CLOSED_LOOP_SEED = 2**31 - 1
 """Of the twin's noise in the closed loop: not one that a recording of a twin is likely to have."""
-SHORTEST = 200
-"""Ticks below which a noise floor cannot be estimated."""
 
 
 class Undetermined(Exception):
@@ -86,21 +85,16 @@ def together(outputs: dict[str, Residual], differences: dict[str, Array], period
 class Replays:
     """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
 
-    Raises RigtwinError if a channel is missing or the recording is too short.
+    Raises RigtwinError naming every fault of the data that makes a comparison meaningless, see `checks`.
     """
 
     def __init__(self, recording: Recording, configuration: Configuration) -> None:
-        if recording.ticks < SHORTEST:
-            raise RigtwinError(f"{recording.path} has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
+        self.faults = check(recording, configuration)
+        if any(fault.fatal for fault in self.faults):
+            raise RigtwinError(f"{recording.path}: " + "; ".join(fault.message for fault in self.faults if fault.fatal))
         self.recording = recording
         self.configuration = configuration
         self.period = recording.period
-        for topic, names in (("/sensor", Measurements._fields), ("/command", Commands._fields)):
-            for name in names:
-                column = recording.column(topic, name)
-                if not np.isfinite(column).all():
-                    tick = int(np.nonzero(~np.isfinite(column))[0][0])
-                    raise RigtwinError(f"{recording.path}: {topic}.{name} is not a number at {recording.time[tick]:.3f} s")
         self.preload = configuration.controller.preload
         self.wheel = self._sensor("structure_lvdt") - self._sensor("suspension_lvdt")
 
@@ -257,7 +251,8 @@ def compare(
                 results[name] = replay(replays)
             except Undetermined as reason:
                 left_out[name] = str(reason)
-    return Comparison(results, left_out, recording.notes)
+    notes = (*recording.notes, *(fault.message for fault in replays.faults))
+    return Comparison(results, left_out, notes)
 
 
 def compare_recordings(first: Recording, second: Recording) -> dict[str, Residual]:

@@ -1,0 +1,184 @@
+"""Is this recording fit to be compared? Faults of the data, recognised before anybody takes them for physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.noise import rms, white_noise
+from rigtwin.diagnosis.replay import replay_cylinder
+from rigtwin.recording import Recording
+
+MACHINE = "suspension-rig"
+SHORTEST = 200
+"""Ticks below which a noise floor cannot be estimated."""
+STUCK = 200
+"""Equal samples in a row of a sensor that has noise: it is not alive."""
+FLAT = 8
+"""Equal samples in a row at a signal's very end of range: it is cut off there."""
+MOVES = 10.0
+"""A motion this many times its sensor's noise says what its scale is."""
+FAR_OFF = 5.0
+"""A scale this far from 1 either way is a unit, no gain."""
+UNITS = {"m": ((1e3, "mm"), (1e2, "cm"), (39.37, "inch")), "N": ((1e-3, "kN"), (0.2248, "lbf"), (9.81**-1, "kgf"))}
+"""SI unit → (how many of another make one, its name)."""
+MOVED_BY = {
+    "ground_lvdt": ("ground",),
+    "structure_lvdt": ("structure",),
+    "suspension_lvdt": ("ground", "structure"),
+    "load_cell": ("voltage",),
+}
+"""Which commands move what a sensor measures: one that stays put under a command that does not is no fault."""
+LVDTS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with the data. kind: short name; where: the channel, or the recording; message: one line; fatal: no
+    comparison makes sense."""
+
+    kind: str
+    where: str
+    message: str
+    fatal: bool = True
+
+
+def check(recording: Recording, configuration: Configuration) -> tuple[Fault, ...]:
+    """All faults found, the gravest first. Later checks are left out where earlier ones make them meaningless."""
+    stages: tuple[Callable[[], Iterator[Fault]], ...] = (
+        lambda: _presence(recording),
+        lambda: _time(recording),
+        lambda: _numbers(recording),
+        lambda: _alive(recording),
+        lambda: _order(recording, configuration),
+        lambda: _scale(recording, configuration),
+    )
+    found: list[Fault] = []
+    for stage in stages:
+        found += stage()
+        if any(fault.fatal for fault in found):
+            break
+    return tuple(sorted(found, key=lambda fault: not fault.fatal))
+
+
+def _presence(recording: Recording) -> Iterator[Fault]:
+    if recording.machine != MACHINE:
+        yield Fault("wrong machine", "recording", f"it is of machine {recording.machine!r}; this twin is {MACHINE!r}")
+    for topic, names in (("/sensor", Measurements._fields), ("/command", Commands._fields)):
+        for name in names:
+            if not recording.has(topic, name):
+                there = ", ".join(f"{t}.{n}" for t, fields in recording.columns.items() for n in fields)
+                yield Fault("missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}")
+    if recording.ticks < SHORTEST:
+        yield Fault("too short", "recording", f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
+
+
+def _time(recording: Recording) -> Iterator[Fault]:
+    steps = np.diff(recording.time)
+    gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
+    if len(gaps):
+        first = gaps[0]
+        message = f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} s at {recording.time[first]:.3f} s"
+        yield Fault("gap", "recording", message)
+
+
+def _numbers(recording: Recording) -> Iterator[Fault]:
+    for topic, names in (("/sensor", Measurements._fields), ("/command", Commands._fields)):
+        for name in names:
+            wrong = ~np.isfinite(recording.column(topic, name))
+            if wrong.any():
+                when = recording.time[np.argmax(wrong)]
+                yield Fault("not a number", f"{topic}.{name}", f"{topic}.{name} is not a number at {when:.3f} s")
+
+
+def _alive(recording: Recording) -> Iterator[Fault]:
+    for name in Measurements._fields:
+        signal = recording.column("/sensor", name)
+        where, first, length = f"/sensor.{name}", *longest_run(signal, np.ones(len(signal), bool))
+        throughout = length == len(signal)
+        if throughout and not any(np.ptp(recording.column("/command", command)) > 0 for command in MOVED_BY[name]):
+            continue
+        if length >= STUCK:
+            since = f"for {length * recording.period:.3g} s from {recording.time[first]:.3f} s"
+            span = "throughout" if throughout else since
+            yield Fault("dead", where, f"{where} does not change {span}: a dead or disconnected sensor")
+            continue
+        for end, extreme in (("above", signal.max()), ("below", signal.min())):
+            at_end = signal == extreme
+            _, length = longest_run(signal, at_end)
+            if length >= FLAT:
+                share = 100 * at_end.mean()
+                yield Fault(
+                    "clipped", where, f"{where} is cut off {end} {extreme:.4g} ({share:.2g} % of the ticks)", fatal=False
+                )
+
+
+def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
+    """Where the longest run of equal, counted samples starts, and its length."""
+    same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
+    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
+    starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
+    if not len(starts):
+        return 0, 1
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest]), int(ends[longest] - starts[longest]) + 1
+
+
+def expected(recording: Recording, configuration: Configuration) -> dict[str, Array]:
+    """What each sensor should roughly read, worked out from the commands alone."""
+    plant, ground, structure = configuration.plant, *(recording.column("/command", n) for n in ("ground", "structure"))
+    u = replay_cylinder(plant.ground_cylinder, configuration, ground, float(ground[0]))
+    x = replay_cylinder(plant.structure_cylinder, configuration, structure, configuration.controller.start)
+    return {
+        "ground_lvdt": u,
+        "structure_lvdt": x,
+        # The tyre is stiff: the wheel goes with the ground, a preload's deflection apart.
+        "suspension_lvdt": x - u + configuration.controller.preload / plant.tyre.stiffness,
+        "load_cell": MOTOR_CONSTANT * recording.column("/command", "voltage"),
+    }
+
+
+def _scale(recording: Recording, configuration: Configuration) -> Iterator[Fault]:
+    """Units and signs, by how much a signal goes with what is expected of it."""
+    for name, model in expected(recording, configuration).items():
+        signal, where = recording.column("/sensor", name), f"/sensor.{name}"
+        unit = "N" if name == "load_cell" else "m"
+        # Motions have a zero that may be displaced; a force has its preload, which says its scale even at rest.
+        a, b = (signal, model) if unit == "N" else (signal - signal.mean(), model - model.mean())
+        if rms(b) < MOVES * white_noise(signal) / max(rms(a) / max(rms(b), 1e-12), 1e-12):
+            continue
+        slope = float(a @ b / (b @ b))
+        alike = abs(float(a @ b)) / np.sqrt(float(a @ a) * float(b @ b))
+        if alike < 0.7:
+            continue
+        if slope < 0:
+            yield Fault("sign", where, f"{where} has the wrong sign: it goes against what was commanded")
+        elif not 1 / FAR_OFF < slope < FAR_OFF:
+            factor, guess = min(UNITS[unit], key=lambda pair: abs(np.log(pair[0] / slope)))
+            name_of = f", as if in {guess}" if abs(np.log(factor / slope)) < 0.5 else ""
+            yield Fault("unit", where, f"{where} is {slope:.3g} times what was commanded{name_of}; expected {unit}")
+
+
+def _order(recording: Recording, configuration: Configuration) -> Iterator[Fault]:
+    """Swapped channels: another order of the LVDTs fits far better."""
+    models = expected(recording, configuration)
+    signals = {name: recording.column("/sensor", name) for name in LVDTS}
+    misfit = {(s, m): rms(signals[s] - models[m] - np.mean(signals[s] - models[m])) for s in LVDTS for m in LVDTS}
+
+    def total(order: tuple[str, ...]) -> float:
+        return float(np.sqrt(sum(misfit[name, model] ** 2 for name, model in zip(LVDTS, order, strict=True))))
+
+    least = min(total(order) for order in permutations(LVDTS))
+    if least < total(LVDTS) / 3:
+        # Orders that fit about as well differ in what these data cannot tell; the one with the fewest swaps is the likeliest.
+        likely = [order for order in permutations(LVDTS) if total(order) < 1.5 * least]
+        best = min(likely, key=lambda order: sum(name != model for name, model in zip(LVDTS, order, strict=True)))
+        swapped = ", ".join(f"{name} holds {model}" for name, model in zip(LVDTS, best, strict=True) if name != model)
+        yield Fault("swapped", "/sensor", f"channels of /sensor are swapped: {swapped}")

@@ -1,0 +1,120 @@
+"""Faults of the data: each recognised and named, and no physical effect taken for one."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from experiments import EXPERIMENTS
+from rigtwin.configuration import Timing
+from rigtwin.diagnosis.checks import check, longest_run
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.effects import candidates
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording, load
+from rigtwin.runner import record
+from tests.conftest import RECORDINGS
+from tests.test_effects import text
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory) -> dict[str, Recording]:
+    folder, found = tmp_path_factory.mktemp("checks"), {}
+    for name in ("drop", "imposed", "road10", "single-mass", "semi-active"):
+        experiment = EXPERIMENTS[name]
+        configuration = experiment.configuration._replace(timing=Timing(duration=8.0))
+        record(folder / f"{name}.mcap", name, configuration, experiment.demands(configuration, 0), 0)
+        found[name] = load(folder / f"{name}.mcap")
+    return found
+
+
+def changed(recording: Recording, **sensors: np.ndarray) -> Recording:
+    return dataclasses.replace(recording, columns={**recording.columns, "/sensor": {**recording.columns["/sensor"], **sensors}})
+
+
+def faults(recording: Recording) -> dict[str, str]:
+    """where → kind."""
+    return {fault.where: fault.kind for fault in check(recording, configuration_of(recording))}
+
+
+def test_sound_recordings_have_no_fault(recordings, example):
+    for recording in (*recordings.values(), example):
+        assert faults(recording) == {}, recording.experiment
+
+
+@pytest.mark.parametrize("path", sorted(RECORDINGS.glob("*.mcap")), ids=lambda path: path.stem)
+def test_recordings_of_the_stand_in_rig_have_no_fault(path):
+    assert faults(load(path)) == {}
+
+
+@pytest.mark.parametrize("name", [e.name for e in candidates(Plant())])
+def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
+    experiment = EXPERIMENTS["imposed"]
+    configuration = experiment.configuration._replace(timing=Timing(duration=5.0))
+    record(tmp_path / "e.mcap", "imposed", configuration, experiment.demands(configuration, 2), 2, effects=[text(name)])
+    found = faults(load(tmp_path / "e.mcap"))
+    assert set(found.values()) <= {"clipped"}, "saturation looks like clipping, and is"
+
+
+@pytest.mark.parametrize("name", ["drop", "imposed", "road10", "single-mass"])
+@pytest.mark.parametrize("channel", ["structure_lvdt", "suspension_lvdt", "load_cell"])
+def test_units_and_signs(recordings, name, channel):
+    recording = recordings[name]
+    signal = recording.column("/sensor", channel)
+    factor = 1e-3 if channel == "load_cell" else 1e3
+    assert faults(changed(recording, **{channel: factor * signal})) == {f"/sensor.{channel}": "unit"}
+    assert faults(changed(recording, **{channel: -signal})) == {f"/sensor.{channel}": "sign"}
+
+
+def test_all_lvdts_in_millimetres_are_named_as_such(recordings):
+    recording = recordings["imposed"]
+    scaled = {name: 1e3 * recording.column("/sensor", name) for name in ("ground_lvdt", "structure_lvdt", "suspension_lvdt")}
+    found = check(changed(recording, **scaled), configuration_of(recording))
+    assert {fault.kind for fault in found} == {"unit"}
+    assert all("as if in mm; expected m" in fault.message for fault in found)
+
+
+@pytest.mark.parametrize("name", ["drop", "imposed", "road10"])
+@pytest.mark.parametrize("pair", [("ground_lvdt", "structure_lvdt"), ("ground_lvdt", "suspension_lvdt")])
+def test_swapped_channels(recordings, name, pair):
+    recording = recordings[name]
+    one, other = (recording.column("/sensor", channel) for channel in pair)
+    found = check(changed(recording, **{pair[0]: other, pair[1]: one}), configuration_of(recording))
+    assert [fault.kind for fault in found] == ["swapped"]
+    assert f"{pair[0]} holds {pair[1]}" in found[0].message
+
+
+def test_dead_stuck_and_clipped(recordings):
+    recording = recordings["imposed"]
+    force = recording.column("/sensor", "load_cell")
+    assert faults(changed(recording, load_cell=np.full_like(force, 3.0))) == {"/sensor.load_cell": "dead"}
+    stuck = force.copy()
+    stuck[3000:3400] = stuck[3000]
+    found = check(changed(recording, load_cell=stuck), configuration_of(recording))
+    assert [fault.kind for fault in found] == ["dead"]
+    assert "for 0.4 s from 3.000 s" in found[0].message
+    limit = np.quantile(force, 0.97)
+    assert faults(changed(recording, load_cell=np.minimum(force, limit))) == {"/sensor.load_cell": "clipped"}
+
+
+def test_gap_missing_short_and_other_machines(recordings):
+    recording = recordings["imposed"]
+    time = recording.time.copy()
+    time[4000:] += 0.25
+    assert faults(dataclasses.replace(recording, time=time)) == {"recording": "gap"}
+    sensors = {name: values for name, values in recording.columns["/sensor"].items() if name != "load_cell"}
+    assert faults(dataclasses.replace(recording, columns={**recording.columns, "/sensor": sensors})) == {
+        "/sensor.load_cell": "missing"
+    }
+    assert faults(dataclasses.replace(recording, machine="lathe")) == {"recording": "wrong machine"}
+    broken = recording.column("/sensor", "structure_lvdt").copy()
+    broken[100] = np.inf
+    assert faults(changed(recording, structure_lvdt=broken)) == {"/sensor.structure_lvdt": "not a number"}
+
+
+def test_longest_run():
+    signal = np.array([1.0, 2.0, 2.0, 2.0, 3.0, 3.0])
+    assert longest_run(signal, np.ones(6, bool)) == (1, 3)
+    assert longest_run(np.arange(5.0), np.ones(5, bool)) == (0, 1)
