@@ -61,7 +61,7 @@ class Settings(NamedTuple):
     filter_position: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §6.2")] = 0.01
     filter_velocity: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §6.2")] = 0.01
     filter_force: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §6.1.2")] = 0.01
-    kff: Annotated[float, Quantity("1", 0.0, 5.0, "assumed; reproduces thesis Table 3.5")] = 1.0
-    kp: Annotated[float, Quantity("1", 0.0, 20.0, "assumed; reproduces thesis Table 3.5")] = 0.3
-    ki: Annotated[float, Quantity("1/s", 0.0, 1e3, "assumed; reproduces thesis Table 3.5")] = 10.0
+    kff: Annotated[float, Quantity("1", 0.0, 5.0, "assumed, the thesis does not give it")] = 1.0
+    kp: Annotated[float, Quantity("1", 0.0, 20.0, "assumed, the thesis does not give it")] = 0.3
+    ki: Annotated[float, Quantity("1/s", 0.0, 1e3, "assumed, the thesis does not give it")] = 10.0
     voltage_limit: Annotated[float, Quantity("V", 0.0, 10.0, "amplifier input ±10 V")] = 10.0

@@ -116,7 +116,8 @@ def _draw_chapter_6(dropped: Recording, should_drop: Ideal, driven: Recording, s
             axis.plot(x[shown], values[shown], color=colour, linewidth=1.0, label=label)
         axis.set(title=title, xlabel="time, s", ylabel=unit)
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=8, frameon=False)
+        axis.legend(fontsize=8, framealpha=0.85, edgecolor="none")
+        axis.margins(x=0)
 
     load_cell, demanded = dropped.column("/truth", "load_cell"), dropped.column("/command", "force")
     force = [

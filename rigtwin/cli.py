@@ -25,7 +25,8 @@ a first session:
 
 def _parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = top.add_subparsers(dest="command", metavar="command", required=True)
+    top.add_argument("--version", action="store_true", help="print the version and stop")
+    commands = top.add_subparsers(dest="command", metavar="command")
 
     def command(name: str, summary: str, more: str = "") -> argparse.ArgumentParser:
         return commands.add_parser(
@@ -57,13 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)"
     )
-    run.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="KIND@COMPONENT=VALUE",
-        help="give the rig an effect, e.g. coulomb@rail=80",
-    )
+    _effect(run, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
     settings(run)
 
     effects = command(
@@ -101,7 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     compare.add_argument("recording", type=Path)
     compare.add_argument("other", type=Path, nargs="?", help="a second recording of the same test")
-    compare.add_argument("--json", type=Path, metavar="J", help="also write the figures to a file")
+    compare.add_argument("--json", type=Path, metavar="J.json", help="also write the figures to a file")
+    _effect(compare, "compare with a twin that has an effect, e.g. coulomb@rail=80")
     settings(compare)
 
     reproduce = command(
@@ -115,6 +111,10 @@ def _parser() -> argparse.ArgumentParser:
     return top
 
 
+def _effect(parser: argparse.ArgumentParser, summary: str) -> None:
+    parser.add_argument("--effect", action="append", default=[], metavar="KIND@COMPONENT=VALUE", help=summary)
+
+
 def _stretch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="start at this time (default 0)")
     parser.add_argument("--until", type=float, metavar="S", help="stop at this time (default: the end)")
@@ -123,7 +123,13 @@ def _stretch(parser: argparse.ArgumentParser) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a test that tripped,
     130 interrupted."""
-    parsed = _parser().parse_args(arguments)
+    parser = _parser()
+    parsed = parser.parse_args(arguments)
+    if parsed.version:
+        print(f"rigtwin {import_module('rigtwin').__version__}")
+        return 0
+    if parsed.command is None:
+        parser.error("a command is missing; rigtwin --help lists them")
     try:
         return import_module("rigtwin.commands").COMMANDS[parsed.command](parsed)
     except RigtwinError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import asdict
@@ -122,7 +123,8 @@ def info(parsed: Namespace) -> int:
             rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
     print(_table(rows))
     if recording.controller:
-        print("controller: " + ", ".join(f"{key} {value}" for key, value in recording.controller.items()))
+        settings = ", ".join(f"{key} {value}" for key, value in recording.controller.items())
+        print(textwrap.fill(f"controller: {settings}", 120, subsequent_indent="  "))
     return 0
 
 
@@ -168,18 +170,22 @@ def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
     from rigtwin.configuration import Configuration
-    from rigtwin.diagnosis.compare import REPLAYS, compare_recordings, configuration_of
+    from rigtwin.diagnosis.compare import REPLAYS, compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.compare import compare as replay_all
+    from rigtwin.effects import applied
     from rigtwin.recording import load
 
     recording = load(parsed.recording)
     if parsed.other is not None:
-        if parsed.config is not None or parsed.set:
-            raise RigtwinError("--set and --config change the twin; two recordings are compared without one")
-        results, left_out, notes = compare_recordings(recording, load(parsed.other)), {}, recording.notes
-        print(f"{recording.path} against {parsed.other}")
+        if parsed.config is not None or parsed.set or parsed.effect:
+            raise RigtwinError("--set, --config and --effect change the twin; two recordings are compared without one")
+        other = load(parsed.other)
+        results, left_out = compare_recordings(recording, other), {}
+        notes = (*recording.notes, *other.notes, *differences(recording, other))
+        print(f"{recording.path} against {parsed.other}, tick against tick")
     else:
-        configuration = configuration_of(recording, _configured(Configuration(), parsed))
+        twin = applied(_configured(Configuration(), parsed), parsed.effect)
+        configuration = configuration_of(recording, twin)
         with tqdm(total=len(REPLAYS), disable=None, desc="replaying", leave=False) as bar:
             comparison = replay_all(recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name))
         results, left_out, notes = comparison.replays, comparison.left_out, comparison.notes

@@ -6,10 +6,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 
 from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.arrays import Array
+from rigtwin.compiling import kernel
 from rigtwin.parameters import LoadCell, Lvdt, Plant
 
 
@@ -21,6 +23,12 @@ def sensors(plant: Plant) -> tuple[Lvdt | LoadCell, ...]:
 def resolutions(plant: Plant) -> Measurements:
     """Size of one bit of each channel, in its unit."""
     return Measurements(*(sensor.resolution for sensor in sensors(plant)))
+
+
+INVERTIBLE = 80.0
+"""Hz, up to which a sensor's lag is undone."""
+PADDED = 50
+"""Samples that a zero-phase filter needs."""
 
 
 class Transducer(NamedTuple):
@@ -57,8 +65,12 @@ def transducer(sensor: Lvdt | LoadCell, period: float) -> Transducer:
 def sensing(plant: Plant, period: float) -> Sensing:
     """The plant's sensors before their first sample. period in s."""
     one, two, three, four = (transducer(sensor, period) for sensor in sensors(plant))
-    fresh = [TransducerState(np.zeros(int(each.delay) + 3), np.array([-1.0, 0.0])) for each in (one, two, three, four)]
-    return Sensing((one, two, three, four), (fresh[0], fresh[1], fresh[2], fresh[3]), resolutions(plant))
+    return Sensing((one, two, three, four), (fresh(one), fresh(two), fresh(three), fresh(four)), resolutions(plant))
+
+
+def fresh(sensor: Transducer) -> TransducerState:
+    """Before the first sample."""
+    return TransducerState(np.zeros(int(sensor.delay) + 3), np.array([-1.0, 0.0]))
 
 
 @compilable
@@ -78,6 +90,33 @@ def transduced(sensor: Transducer, state: TransducerState, value: float) -> floa
     state.memory[0] = (place + 1) % length
     state.memory[1] += sensor.share * (late - state.memory[1])
     return sensor.gain * state.memory[1] + sensor.offset
+
+
+@kernel
+def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
+    for tick in range(len(true)):
+        out[tick] = transduced(sensor, state, true[tick])
+
+
+def seen(sensor: Lvdt | LoadCell, true: Array, period: float) -> Array:
+    """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
+    model, out = transducer(sensor, period), np.empty(len(true))
+    _seen(model, fresh(model), np.ascontiguousarray(true), out)
+    return out
+
+
+def unseen(sensor: Lvdt | LoadCell, signal: Array, period: float) -> Array:
+    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
+
+    The lag's inverse is limited to 80 Hz, or it would make much of the noise.
+    """
+    lagged = signal
+    if sensor.lag > 0.0 and len(signal) > PADDED:
+        smooth = sosfiltfilt(butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos"), signal)
+        lagged = signal + sensor.lag * np.gradient(smooth, period)
+    ticks = np.arange(len(signal))
+    early = np.interp(ticks + sensor.delay / period, ticks, lagged) if sensor.delay > 0.0 else lagged
+    return early / sensor.gain
 
 
 class Disturbance:

@@ -111,7 +111,8 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
             axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
         axis.set_ylabel(title, fontsize=9)
         axis.grid(alpha=0.3)
-        axis.legend(loc="upper right", fontsize=8, frameon=False, ncols=2)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), fontsize=8, frameon=False, ncols=2, borderpad=0.1)
+        axis.margins(x=0)
     axes[-1].set_xlabel("time, s")
     ending = f" · {recording.end}" if recording.end else ""
     figure.suptitle(f"{recording.path.name} · {recording.experiment}{ending}", fontsize=11)

@@ -155,7 +155,7 @@ class _Traces:
             upper.plot(time, recording.column("/command", "force")[ticks], color=ASKED, linewidth=0.9, label="demanded")
         upper.set_ylabel("force, N", fontsize=8)
         if upper.lines:
-            upper.legend(loc="upper right", fontsize=7, frameon=False, ncols=2)
+            upper.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
         lower.plot(time, 1e3 * recording.column("/sensor", "suspension_lvdt")[ticks], color=SENSED, linewidth=0.8)
         lower.set_ylabel("travel, mm", fontsize=8)
         lower.set_xlabel("time, s", fontsize=8)

@@ -12,6 +12,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety, overridden
+from rigtwin.converters import seen, unseen
 from rigtwin.diagnosis.checks import SHORTEST, check
 from rigtwin.diagnosis.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.diagnosis.replay import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
@@ -107,36 +108,63 @@ class Replays:
     def _clean(self, signal: Array) -> Array:
         return without_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
-    def _motion(self, measured: Array, expected: Array) -> Motion:
-        return motion(measured, expected, self.period, self.configuration.plant.mains.frequency)
+    def _seen(self, name: str, true: Array) -> Array:
+        """What the twin's sensor of that name makes of a true signal."""
+        return seen(getattr(self.configuration.plant, name), true, self.period)
+
+    def _wheel_seen(self, wheel: Array) -> Array:
+        """The difference of both LVDTs for a true wheel position and the plate's motion."""
+        plate = self.structure_motion.position
+        return self._seen("structure_lvdt", plate) - self._seen("suspension_lvdt", plate - wheel)
+
+    def _motion(self, name: str, expected: Array) -> Motion:
+        """The true motion that a sensor measured, given what a replay expects of it."""
+        sensor = getattr(self.configuration.plant, name)
+        mains = self.configuration.plant.mains.frequency
+        found = motion(self._sensor(name), self._seen(name, expected), self.period, mains)
+        return Motion(
+            expected + unseen(sensor, found.correction, self.period), found.correction, found.velocity_error / sensor.gain
+        )
 
     @cached_property
     def ground_cylinder_output(self) -> Array:
-        command = self._command("ground")
-        return replay_cylinder(self.configuration.plant.ground_cylinder, self.configuration, command, float(command[0]))
+        command, cylinder = self._command("ground"), self.configuration.plant.ground_cylinder
+        unloaded = replay_cylinder(cylinder, self.configuration, command, float(command[0]))
+        if cylinder.compliance == 0.0:
+            return unloaded
+        tyre = self.configuration.plant.tyre.stiffness * (self._clean(self._sensor("ground_lvdt") - self.wheel))
+        return unloaded - cylinder.compliance * np.maximum(tyre, 0.0)
 
     @cached_property
     def structure_cylinder_output(self) -> Array:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
-        return replay_cylinder(cylinder, self.configuration, self._command("structure"), start)
+        unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start)
+        return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
 
     @cached_property
     def ground_motion(self) -> Motion:
-        return self._motion(self._sensor("ground_lvdt"), self.ground_cylinder_output)
+        return self._motion("ground_lvdt", self.ground_cylinder_output)
 
     @cached_property
     def structure_motion(self) -> Motion:
-        return self._motion(self._sensor("structure_lvdt"), self.structure_cylinder_output)
+        return self._motion("structure_lvdt", self.structure_cylinder_output)
 
     @cached_property
     def carriage_output(self) -> Array:
-        force = self._clean(self._sensor("load_cell"))
+        sensor = self.configuration.plant.load_cell
+        force = unseen(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
         return replay_carriage(self.configuration, self.ground_motion.position, force, self.preload)
 
     @cached_property
-    def wheel_motion(self) -> Motion:
-        return self._motion(self.wheel, self.carriage_output)
+    def travel_motion(self) -> Motion:
+        """Of plate against wheel, by the difference that the carriage's replay leaves between the LVDTs."""
+        mains = self.configuration.plant.mains.frequency
+        found = motion(self.wheel, self._wheel_seen(self.carriage_output), self.period, mains)
+        sensor = self.configuration.plant.suspension_lvdt
+        wheel = self.carriage_output + unseen(sensor, found.correction, self.period)
+        error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)
+        return Motion(self.structure_motion.position - wheel, found.correction, error)
 
     @cached_property
     def mechanics_output(self) -> Output:
@@ -154,35 +182,35 @@ class Replays:
 
     def motor(self) -> Residual:
         """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
-        measured = self._sensor("load_cell")
-        travel = self.structure_motion.position - self.wheel_motion.position
-        output = replay_motor(self.configuration, travel, self._command("voltage"), self.preload)
-        resolved = white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER + CERTAIN * math.hypot(
-            self.structure_motion.velocity_error, self.wheel_motion.velocity_error
-        )
-        slides = np.abs(np.gradient(travel, self.period)) > resolved
+        measured, travel = self._sensor("load_cell"), self.travel_motion
+        output = replay_motor(self.configuration, travel.position, self._command("voltage"), self.preload)
+        resolved = white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER + CERTAIN * travel.velocity_error
+        slides = np.abs(np.gradient(travel.position, self.period)) > resolved
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
-        difference = self._clean(measured - output)
+        difference = self._clean(measured - self._seen("load_cell", output))
         left = rms(difference[slides])
         floor = white_noise(measured)
-        return Residual(left, floor, left / floor, "N", band(difference * slides, self.period))
+        return Residual(left, floor, left / floor if floor > 0 else math.inf, "N", band(difference * slides, self.period))
 
     def carriage(self) -> Residual:
-        return self._residual(self.wheel, self.carriage_output, "m")[0]
+        return self._residual(self.wheel, self._wheel_seen(self.carriage_output), "m")[0]
 
     def mechanics(self) -> Residual:
+        force = self._seen("load_cell", self.mechanics_output.load_cell)
         pairs = {
-            "load_cell": self._residual(self._sensor("load_cell"), self.mechanics_output.load_cell, "N"),
-            "wheel": self._residual(self.wheel, self.mechanics_output.wheel, "m"),
+            "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
+            "wheel": self._residual(self.wheel, self._wheel_seen(self.mechanics_output.wheel), "m"),
         }
         return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
 
     def structure_cylinder(self) -> Residual:
-        return self._residual(self._sensor("structure_lvdt"), self.structure_cylinder_output, "m")[0]
+        output = self._seen("structure_lvdt", self.structure_cylinder_output)
+        return self._residual(self._sensor("structure_lvdt"), output, "m")[0]
 
     def ground_cylinder(self) -> Residual:
-        return self._residual(self._sensor("ground_lvdt"), self.ground_cylinder_output, "m")[0]
+        output = self._seen("ground_lvdt", self.ground_cylinder_output)
+        return self._residual(self._sensor("ground_lvdt"), output, "m")[0]
 
     def _demands(self) -> Array:
         return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
@@ -208,7 +236,7 @@ class Replays:
         truth = np.concatenate([block.truth for block in run_compiled(twin, quiet, demands) if block.truth is not None])
         units = ("m", "m", "m", "N")
         pairs = {
-            name: self._residual(self._sensor(name), truth[:, number], unit)
+            name: self._residual(self._sensor(name), self._seen(name, truth[:, number]), unit)
             for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
         }
         return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
@@ -253,6 +281,25 @@ def compare(
                 left_out[name] = str(reason)
     notes = (*recording.notes, *(fault.message for fault in replays.faults))
     return Comparison(results, left_out, notes)
+
+
+def differences(first: Recording, second: Recording) -> tuple[str, ...]:
+    """What was not the same in two tests, a line each; empty if they were asked the same."""
+    notes = []
+    if first.experiment != second.experiment:
+        notes.append(f"different experiments: {first.experiment} and {second.experiment}")
+    settings = {*first.controller, *second.controller}
+    unlike = sorted(key for key in settings if first.controller.get(key) != second.controller.get(key))
+    if unlike:
+        notes.append(f"different controller settings: {', '.join(unlike)}")
+    ticks = min(first.ticks, second.ticks)
+    if first.has("/command", "ground") and second.has("/command", "ground"):
+        apart = first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
+        if np.max(np.abs(apart)) > 1e-6:
+            notes.append("different ground motions were commanded")
+    if str(first.controller.get("mode")) == "mil":
+        notes.append("with a model in the loop a limit cycle drifts in phase, so two runs of one rig differ too")
+    return tuple(notes)
 
 
 def compare_recordings(first: Recording, second: Recording) -> dict[str, Residual]:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rigtwin.actuator import Actuator, ActuatorState, actuator, conditioned, holding
 from rigtwin.arrays import Array
 from rigtwin.compiling import forward, integrate, kernel
 from rigtwin.configuration import Configuration
@@ -34,18 +35,29 @@ class Output:
 
 
 @kernel
-def _cylinder(model: CylinderModel, state: CylinderState, commands: Array, substeps: int, out: Array) -> None:
+def _cylinder(
+    model: CylinderModel,
+    state: CylinderState,
+    conditioning: Actuator,
+    command: ActuatorState,
+    commands: Array,
+    substeps: int,
+    out: Array,
+) -> None:
     for tick in range(len(commands)):
         out[tick] = state.position[0]
         for _ in range(substeps):
-            advance_cylinder(model, state, commands[tick])
+            advance_cylinder(model, state, conditioned(conditioning, command, commands[tick]))
 
 
 def replay_cylinder(cylinder: Cylinder, configuration: Configuration, commands: Array, start: float) -> Array:
-    """Command → plate position at every tick, m, from rest at `start`."""
-    out = np.empty(len(commands))
-    model = sampled(cylinder, configuration.timing.timestep)
-    _cylinder(model, settled(cylinder, start), np.ascontiguousarray(commands), configuration.substeps, out)
+    """Command → plate position at every tick, m, unloaded, from rest at the command `start`."""
+    out, timestep = np.empty(len(commands)), configuration.timing.timestep
+    conditioning = actuator(cylinder, configuration.plant.computer, timestep)
+    command = holding(conditioning, start)
+    state = settled(cylinder, float(command.memory[3]))
+    model = sampled(cylinder, timestep)
+    _cylinder(model, state, conditioning, command, np.ascontiguousarray(commands), configuration.substeps, out)
     return out
 
 
@@ -53,6 +65,8 @@ def replay_cylinder(cylinder: Cylinder, configuration: Configuration, commands: 
 def _mechanics(
     mechanics: Handles,
     contacts: Contacts,
+    motor_drive: Actuator,
+    motor_command: ActuatorState,
     substeps: int,
     ground: Array,
     structure: Array,
@@ -66,10 +80,10 @@ def _mechanics(
     driven = len(carriage) > 0
     ticks = len(voltage)
     for tick in range(ticks):
-        mechanics.control[0] = voltage[tick]
         following = force[min(tick + 1, ticks - 1)]
         for substep in range(substeps):
             now = tick * substeps + substep
+            mechanics.control[0] = conditioned(motor_drive, motor_command, voltage[tick])
             drive(mechanics, mechanics.ground, ground[now], ground[now + 1])
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
@@ -119,10 +133,13 @@ def _run(
     view.qpos[view.carriage] = wheel
     view.activation[0] = preload / view.motor_constant
     substeps = configuration.substeps
+    conditioning = actuator(plant.motor, plant.computer, configuration.timing.timestep)
     out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
     _mechanics(
         view,
         contacts(plant, wheel, float(structure[0]) - wheel),
+        conditioning,
+        holding(conditioning, preload / plant.motor.constant),
         substeps,
         _between(ground, substeps),
         _between(structure, substeps),
