@@ -12,6 +12,7 @@ import numpy as np
 
 from controllers.compiled import compilable
 from rigtwin.arrays import Array
+from rigtwin.delay import delayed, ring
 from rigtwin.parameters import UNLIMITED, Computer, Cylinder, Motor
 
 
@@ -56,7 +57,7 @@ def actuator(of: Motor | Cylinder, computer: Computer, timestep: float) -> Actua
 
 def holding(conditioning: Actuator, command: float) -> ActuatorState:
     """The state in which `command` has been held for long."""
-    state = ActuatorState(np.full(int(conditioning.delay) + 3, command), np.array([0.0, command, 0.0, 0.0]))
+    state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
     if conditioning.zero_centred:
         state.memory[1] = 0.0
     output = limited(conditioning, state, command)
@@ -83,14 +84,7 @@ def conditioned(conditioning: Actuator, state: ActuatorState, command: float) ->
     if conditioning.neutral:
         state.memory[3] = command
         return command
-    length = len(state.history)
-    place = int(state.memory[0])
-    state.history[place] = command
-    whole = int(conditioning.delay)
-    part = conditioning.delay - whole
-    late = (1.0 - part) * state.history[(place - whole) % length] + part * state.history[(place - whole - 1) % length]
-    state.memory[0] = (place + 1) % length
-    wanted = limited(conditioning, state, late)
+    wanted = limited(conditioning, state, delayed(state.history, state.memory, conditioning.delay, command))
     before = state.memory[2]
     state.memory[2] = before + min(max(wanted - before, -conditioning.rate), conditioning.rate)
     state.memory[3] += conditioning.share * (state.memory[2] - state.memory[3])

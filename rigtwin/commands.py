@@ -15,7 +15,7 @@ from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
     from rigtwin.configuration import Configuration
-    from rigtwin.diagnosis.compare import Residual
+    from rigtwin.diagnosis.residual import Residual
 
 
 def _configured(configuration: Configuration, parsed: Namespace) -> Configuration:
@@ -170,8 +170,9 @@ def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
     from rigtwin.configuration import Configuration
-    from rigtwin.diagnosis.compare import REPLAYS, compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.compare import compare as replay_all
+    from rigtwin.diagnosis.compare import compare_recordings, configuration_of, differences
+    from rigtwin.diagnosis.replays import REPLAYS
     from rigtwin.effects import applied
     from rigtwin.recording import load
 

@@ -12,6 +12,7 @@ from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
+from rigtwin.delay import delayed, ring
 from rigtwin.parameters import LoadCell, Lvdt, Plant
 
 
@@ -70,7 +71,7 @@ def sensing(plant: Plant, period: float) -> Sensing:
 
 def fresh(sensor: Transducer) -> TransducerState:
     """Before the first sample."""
-    return TransducerState(np.zeros(int(sensor.delay) + 3), np.array([-1.0, 0.0]))
+    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0]))
 
 
 @compilable
@@ -81,13 +82,7 @@ def transduced(sensor: Transducer, state: TransducerState, value: float) -> floa
     if state.memory[0] < 0.0:
         state.history[:] = value
         state.memory[0], state.memory[1] = 0.0, value
-    length = len(state.history)
-    place = int(state.memory[0])
-    state.history[place] = value
-    whole = int(sensor.delay)
-    part = sensor.delay - whole
-    late = (1.0 - part) * state.history[(place - whole) % length] + part * state.history[(place - whole - 1) % length]
-    state.memory[0] = (place + 1) % length
+    late = delayed(state.history, state.memory, sensor.delay, value)
     state.memory[1] += sensor.share * (late - state.memory[1])
     return sensor.gain * state.memory[1] + sensor.offset
 

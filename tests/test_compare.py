@@ -10,7 +10,8 @@ import pytest
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.configuration import Configuration, Timing, from_assignments
-from rigtwin.diagnosis.compare import REPLAYS, compare, compare_recordings, configuration_of
+from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
+from rigtwin.diagnosis.replays import REPLAYS
 from rigtwin.effects import applied, candidates, find
 from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Plant

@@ -11,7 +11,7 @@ from scipy.signal import lsim
 from controllers import Mode, Settings
 from rigtwin.configuration import Configuration, Timing
 from rigtwin.cylinder import continuous
-from rigtwin.diagnosis.replay import replay_cylinder
+from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.excitation import schroeder
 from rigtwin.loop import run_compiled
 from rigtwin.parameters import Cylinder

@@ -13,7 +13,7 @@ from scipy.signal import StateSpace, dlsim
 from experiments import EXPERIMENTS
 from rigtwin.configuration import Configuration
 from rigtwin.cylinder import continuous
-from rigtwin.diagnosis.replay import replay_carriage
+from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.model import MECHANICS, SCENE, build
 from rigtwin.parameters import Carriage, Motor, Plant, Rail, Tyre
 from tests.reference import coulomb_carriage

@@ -12,8 +12,8 @@ from controllers import Commands, Measurements
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.diagnosis.noise import rms, white_noise
-from rigtwin.diagnosis.replay import replay_cylinder
 from rigtwin.recording import Recording
 
 MACHINE = "suspension-rig"

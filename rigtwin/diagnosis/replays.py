@@ -1,0 +1,205 @@
+"""The replays of one recording: every component alone, driven by measured signals; the mechanics together; the closed loop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration, Safety
+from rigtwin.converters import seen, unseen
+from rigtwin.diagnosis.checks import check
+from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
+from rigtwin.diagnosis.noise import Motion, band, motion, rms, white_noise, without_mains
+from rigtwin.diagnosis.residual import Residual, rounding, single, together
+from rigtwin.errors import RigtwinError
+from rigtwin.loop import run, run_compiled
+from rigtwin.recording import Recording
+from rigtwin.replay import Replay
+from rigtwin.twin import Twin
+
+RESOLVED_OVER = 0.03
+"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""
+CERTAIN = 3.0
+"""Standard deviations of a velocity beyond which its sign is certain."""
+CLOSED_LOOP_SEED = 2**31 - 1
+"""Of the twin's noise in the closed loop: not one that a recording of a twin is likely to have."""
+
+
+class Undetermined(Exception):
+    """The recorded signals do not determine what a replay would compare. The message says why."""
+
+
+class Replays:
+    """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
+
+    Raises RigtwinError naming every fault of the data that makes a comparison meaningless, see `checks`.
+    """
+
+    def __init__(self, recording: Recording, configuration: Configuration) -> None:
+        self.faults = check(recording, configuration)
+        if any(fault.fatal for fault in self.faults):
+            raise RigtwinError(f"{recording.path}: " + "; ".join(fault.message for fault in self.faults if fault.fatal))
+        self.recording = recording
+        self.configuration = configuration
+        self.period = recording.period
+        self.preload = configuration.controller.preload
+        self.wheel = self._sensor("structure_lvdt") - self._sensor("suspension_lvdt")
+
+    def _sensor(self, name: str) -> Array:
+        return self.recording.column("/sensor", name)
+
+    def _command(self, name: str) -> Array:
+        return self.recording.column("/command", name)
+
+    def _clean(self, signal: Array) -> Array:
+        return without_mains(signal, self.period, self.configuration.plant.mains.frequency)
+
+    def _seen(self, name: str, true: Array) -> Array:
+        """What the twin's sensor of that name makes of a true signal."""
+        return seen(getattr(self.configuration.plant, name), true, self.period)
+
+    def _wheel_seen(self, wheel: Array) -> Array:
+        """The difference of both LVDTs for a true wheel position and the plate's motion."""
+        plate = self.structure_motion.position
+        return self._seen("structure_lvdt", plate) - self._seen("suspension_lvdt", plate - wheel)
+
+    def _motion(self, name: str, expected: Array) -> Motion:
+        """The true motion that a sensor measured, given what a replay expects of it."""
+        sensor = getattr(self.configuration.plant, name)
+        mains = self.configuration.plant.mains.frequency
+        found = motion(self._sensor(name), self._seen(name, expected), self.period, mains)
+        return Motion(
+            expected + unseen(sensor, found.correction, self.period), found.correction, found.velocity_error / sensor.gain
+        )
+
+    @cached_property
+    def ground_cylinder_output(self) -> Array:
+        command, cylinder = self._command("ground"), self.configuration.plant.ground_cylinder
+        unloaded = replay_cylinder(cylinder, self.configuration, command, float(command[0]))
+        if cylinder.compliance == 0.0:
+            return unloaded
+        tyre = self.configuration.plant.tyre.stiffness * (self._clean(self._sensor("ground_lvdt") - self.wheel))
+        return unloaded - cylinder.compliance * np.maximum(tyre, 0.0)
+
+    @cached_property
+    def structure_cylinder_output(self) -> Array:
+        start = self.configuration.controller.start
+        cylinder = self.configuration.plant.structure_cylinder
+        unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start)
+        return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
+
+    @cached_property
+    def ground_motion(self) -> Motion:
+        return self._motion("ground_lvdt", self.ground_cylinder_output)
+
+    @cached_property
+    def structure_motion(self) -> Motion:
+        return self._motion("structure_lvdt", self.structure_cylinder_output)
+
+    @cached_property
+    def carriage_output(self) -> Array:
+        sensor = self.configuration.plant.load_cell
+        force = unseen(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
+        return replay_carriage(self.configuration, self.ground_motion.position, force, self.preload)
+
+    @cached_property
+    def travel_motion(self) -> Motion:
+        """Of plate against wheel, by the difference that the carriage's replay leaves between the LVDTs."""
+        mains = self.configuration.plant.mains.frequency
+        found = motion(self.wheel, self._wheel_seen(self.carriage_output), self.period, mains)
+        sensor = self.configuration.plant.suspension_lvdt
+        wheel = self.carriage_output + unseen(sensor, found.correction, self.period)
+        error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)
+        return Motion(self.structure_motion.position - wheel, found.correction, error)
+
+    @cached_property
+    def mechanics_output(self) -> Output:
+        return replay_mechanics(
+            self.configuration,
+            self.ground_motion.position,
+            self.structure_motion.position,
+            self._command("voltage"),
+            self.preload,
+        )
+
+    def _residual(self, measured: Array, output: Array, unit: str) -> tuple[Residual, Array]:
+        difference = self._clean(measured - output)
+        return single(difference, white_noise(measured), unit, self.period), difference
+
+    def motor(self) -> Residual:
+        """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
+        measured, travel = self._sensor("load_cell"), self.travel_motion
+        output = replay_motor(self.configuration, travel.position, self._command("voltage"), self.preload)
+        resolved = white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER + CERTAIN * travel.velocity_error
+        slides = np.abs(np.gradient(travel.position, self.period)) > resolved
+        if not slides.any():
+            raise Undetermined("the motor never slides fast enough for its friction to be known")
+        difference = self._clean(measured - self._seen("load_cell", output))
+        left = rms(difference[slides])
+        floor = white_noise(measured)
+        return Residual(left, floor, left / floor if floor > 0 else math.inf, "N", band(difference * slides, self.period))
+
+    def carriage(self) -> Residual:
+        return self._residual(self.wheel, self._wheel_seen(self.carriage_output), "m")[0]
+
+    def mechanics(self) -> Residual:
+        force = self._seen("load_cell", self.mechanics_output.load_cell)
+        pairs = {
+            "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
+            "wheel": self._residual(self.wheel, self._wheel_seen(self.mechanics_output.wheel), "m"),
+        }
+        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+
+    def structure_cylinder(self) -> Residual:
+        output = self._seen("structure_lvdt", self.structure_cylinder_output)
+        return self._residual(self._sensor("structure_lvdt"), output, "m")[0]
+
+    def ground_cylinder(self) -> Residual:
+        output = self._seen("ground_lvdt", self.ground_cylinder_output)
+        return self._residual(self._sensor("ground_lvdt"), output, "m")[0]
+
+    def _demands(self) -> Array:
+        return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
+
+    def controller(self) -> Residual:
+        unlimited = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+        replay = Replay(self.recording)
+        for _ in run(replay, unlimited, self._demands()):
+            pass
+        outputs: dict[str, Residual] = {}
+        differences: dict[str, Array] = {}
+        for number, (name, unit) in enumerate(zip(Commands._fields, ("m", "m", "N", "V"), strict=True)):
+            recorded = self._command(name)
+            differences[name] = np.array([commands[number] for commands in replay.written]) - recorded
+            outputs[name] = single(differences[name], rounding(recorded), unit, self.period)
+        return together(outputs, differences, self.period)
+
+    def closed_loop(self) -> Residual:
+        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
+        quiet = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+        demands = self._demands()
+        twin = Twin(quiet, float(demands[0, 0]), CLOSED_LOOP_SEED)
+        truth = np.concatenate([block.truth for block in run_compiled(twin, quiet, demands) if block.truth is not None])
+        units = ("m", "m", "m", "N")
+        pairs = {
+            name: self._residual(self._sensor(name), self._seen(name, truth[:, number]), unit)
+            for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
+        }
+        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+
+
+REPLAYS: dict[str, Callable[[Replays], Residual]] = {
+    "motor": Replays.motor,
+    "carriage": Replays.carriage,
+    "mechanics": Replays.mechanics,
+    "structure_cylinder": Replays.structure_cylinder,
+    "ground_cylinder": Replays.ground_cylinder,
+    "controller": Replays.controller,
+    "closed_loop": Replays.closed_loop,
+}
+"""Every replay by name, in the order in which they are reported."""
