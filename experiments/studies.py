@@ -17,7 +17,7 @@ from experiments.identification import identification
 from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.metrics import Ideal, Tracking, ideal, tracking
-from rigtwin.plot import ASKED, COLOURS, SENSED, save
+from rigtwin.plot import ASKED, COLOURS, SENSED, checked_ending, save
 from rigtwin.recording import Recording, load
 from rigtwin.runner import record
 
@@ -77,6 +77,8 @@ def _moving(wheel: Array, period: float) -> float:
 def chapter_6(seeds: int, out: Path | None, progress: Progress) -> str:
     """The drop test of §6.3.1 and the road test of §6.3.3: limit cycle at rest, stick-slip staircase of the carriage,
     missing wheel hop. Draws them."""
+    path = out or Path("chapter-6.png")
+    checked_ending(path)
     drop, road = find("drop").configuration, find("road10").configuration
     errors = []
     for seed in range(seeds):
@@ -85,7 +87,6 @@ def chapter_6(seeds: int, out: Path | None, progress: Progress) -> str:
     dropped, driven = run_once("drop", 0), run_once("road10", 0)
     should_drop = ideal(drop, dropped.column("/command", "ground"))
     should_drive = ideal(road, driven.column("/command", "ground"))
-    path = out or Path("chapter-6.png")
     _draw_chapter_6(dropped, should_drop, driven, should_drive, path)
     rest = dropped.time > 10.0
     after = (dropped.time > 2.0) & (dropped.time < 8.0)

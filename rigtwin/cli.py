@@ -56,7 +56,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("name", help="an experiment of rigtwin list")
     run.add_argument("--seed", type=int, default=0, help="of noise and road (default 0); the same seed gives the same bytes")
     run.add_argument(
-        "--out", "-o", type=Path, metavar="F.mcap", help="where to record (default NAME-SEED.mcap, numbered if there)"
+        "--out",
+        "-o",
+        type=Path,
+        metavar="F.mcap",
+        help="where to record; replaced if there (default NAME-SEED.mcap, numbered if there)",
     )
     _effect(run, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
     settings(run)
@@ -137,6 +141,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except BrokenPipeError:
         sys.stderr.close()
+        return 1
+    except OSError as error:
+        print(f"rigtwin: {error.strerror or error}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("rigtwin: not enough memory for that; make the test shorter", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("rigtwin: interrupted", file=sys.stderr)

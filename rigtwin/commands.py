@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import textwrap
 from argparse import Namespace
@@ -24,6 +25,13 @@ def _configured(configuration: Configuration, parsed: Namespace) -> Configuratio
     if parsed.config is not None:
         configuration = from_toml(configuration, parsed.config)
     return from_assignments(configuration, parsed.set)
+
+
+def _apart(out: Path, *inputs: Path) -> Path:
+    """The output's path. Raises RigtwinError if it is one of the inputs, which would be lost."""
+    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
+        raise RigtwinError(f"{out} is the input; name another output")
+    return out
 
 
 def _table(rows: list[tuple[str, ...]]) -> str:
@@ -132,8 +140,9 @@ def plot(parsed: Namespace) -> int:
     from rigtwin.plot import draw
     from rigtwin.recording import load
 
-    out = parsed.out or parsed.recording.with_suffix(".png")
-    draw(load(parsed.recording), out, parsed.start, parsed.until)
+    recording = load(parsed.recording)
+    out = _apart(parsed.out or parsed.recording.with_suffix(".png"), parsed.recording)
+    draw(recording, out, parsed.start, parsed.until)
     print(f"drawn in {out}")
     return 0
 
@@ -144,8 +153,8 @@ def video(parsed: Namespace) -> int:
     from rigtwin.recording import load
     from rigtwin.video import film
 
-    out = parsed.out or parsed.recording.with_suffix(".mp4")
     recording = load(parsed.recording)
+    out = _apart(parsed.out or parsed.recording.with_suffix(".mp4"), parsed.recording)
     with tqdm(unit="frame", disable=None, desc="filming", leave=False) as bar:
 
         def progress(done: int, total: int) -> None:
@@ -161,7 +170,7 @@ def export(parsed: Namespace) -> int:
     from rigtwin.recording import load
     from rigtwin.recording.export import export as write
 
-    write(load(parsed.recording), parsed.out)
+    write(load(parsed.recording), _apart(parsed.out, parsed.recording))
     print(f"written to {parsed.out}")
     return 0
 
@@ -177,6 +186,8 @@ def compare(parsed: Namespace) -> int:
     from rigtwin.recording import load
 
     recording = load(parsed.recording)
+    if parsed.json is not None:
+        _apart(parsed.json, parsed.recording, *([parsed.other] if parsed.other else []))
     if parsed.other is not None:
         if parsed.config is not None or parsed.set or parsed.effect:
             raise RigtwinError("--set, --config and --effect change the twin; two recordings are compared without one")
@@ -186,6 +197,9 @@ def compare(parsed: Namespace) -> int:
         print(f"{recording.path} against {parsed.other}, tick against tick")
     else:
         twin = applied(_configured(Configuration(), parsed), parsed.effect)
+        told = Configuration()._replace(plant=twin.plant, timing=twin.timing._replace(timestep=Configuration().timing.timestep))
+        if told != Configuration(plant=twin.plant) or twin.controller != told.controller:
+            raise RigtwinError("--set: what the controller was told, period and duration are the recording's; set the plant")
         configuration = configuration_of(recording, twin)
         with tqdm(total=len(REPLAYS), disable=None, desc="replaying", leave=False) as bar:
             comparison = replay_all(recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name))
@@ -218,9 +232,20 @@ def _row(name: str, result: Residual) -> tuple[str, ...]:
     )
 
 
+def _finite(document: object) -> object:
+    """The document with null for what is not a finite number, which JSON does not have."""
+    if isinstance(document, float):
+        return document if math.isfinite(document) else None
+    if isinstance(document, dict):
+        return {key: _finite(value) for key, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [_finite(value) for value in document]
+    return document
+
+
 def _write_json(path: Path, document: object) -> None:
     try:
-        path.write_text(json.dumps(document, indent=1) + "\n")
+        path.write_text(json.dumps(_finite(document), indent=1, allow_nan=False) + "\n")
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
 

@@ -16,6 +16,9 @@ from controllers.quantity import Choice, Quantity, fields
 from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Plant
 
+MOST_TICKS = 100_000_000
+"""More than a day at 1 kHz."""
+
 
 class Safety(NamedTuple):
     """Limits on raw measurements that end a test."""
@@ -66,8 +69,11 @@ class Configuration(NamedTuple):
 
     @property
     def ticks(self) -> int:
-        """Ticks in the test, at least one."""
-        return max(1, round(self.timing.duration / self.timing.period))
+        """Ticks in the test, at least one. Raises RigtwinError for more than fit into memory."""
+        ticks = max(1, round(self.timing.duration / self.timing.period))
+        if ticks > MOST_TICKS:
+            raise RigtwinError(f"timing.duration / timing.period = {ticks} ticks: expected at most {MOST_TICKS}")
+        return ticks
 
 
 def groups(configuration: Configuration) -> dict[str, Any]:
@@ -99,10 +105,12 @@ def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float 
             raise RigtwinError(f"{key}: {error}") from None
     try:
         number = float(value) if isinstance(value, str | int | float) and not isinstance(value, bool) else math.nan
-    except ValueError:
+    except (ValueError, OverflowError):
         number = math.nan
     if not (meaning.low <= number <= meaning.high):
-        raise RigtwinError(f"{key} = {value}: expected a number from {meaning.low:g} to {meaning.high:g} {meaning.unit}")
+        raise RigtwinError(
+            f"{key} = {str(value)[:40]}: expected a number from {meaning.low:g} to {meaning.high:g} {meaning.unit}"
+        )
     return number
 
 
@@ -135,7 +143,7 @@ def from_toml(configuration: Configuration, path: Path) -> Configuration:
             return overridden(configuration, tomllib.load(file))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise RigtwinError(f"{path} is not valid TOML: {error}") from None
     except RigtwinError as error:
         raise RigtwinError(f"{path}: {error}") from None

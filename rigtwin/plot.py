@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,6 +85,8 @@ PANELS = (
 def stretch(recording: Recording, start: float, until: float | None) -> slice:
     """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
     end = float(recording.time[-1]) if until is None else until
+    if not (math.isfinite(start) and math.isfinite(end)):
+        raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:
         span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
@@ -93,8 +96,7 @@ def stretch(recording: Recording, start: float, until: float | None) -> slice:
 
 def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
     """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
-    if out.suffix.lower() not in KINDS:
-        raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
+    checked_ending(out)
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
     there = [
@@ -117,6 +119,12 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     ending = f" · {recording.end}" if recording.end else ""
     figure.suptitle(f"{recording.path.name} · {recording.experiment}{ending}", fontsize=11)
     save(figure, out)
+
+
+def checked_ending(out: Path) -> None:
+    """Raises RigtwinError unless a figure can be written to that name."""
+    if out.suffix.lower() not in KINDS:
+        raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
 
 
 def save(figure: Figure, out: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,7 @@ def film(
     motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}
     traces = _Traces(recording, ticks)
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
-    temporary = out.with_name(out.name + ".part")
+    temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
         with _renderer(camera) as render, av.open(str(temporary), "w", format="mp4") as container:
             stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
@@ -76,7 +76,8 @@ def film(
     except OSError as error:
         raise RigtwinError(f"cannot write {out}: {error.strerror}") from None
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def _motions(recording: Recording) -> dict[str, Array]:

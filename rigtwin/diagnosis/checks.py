@@ -36,6 +36,8 @@ MOVED_BY = {
     "load_cell": ("voltage",),
 }
 """Which commands move what a sensor measures: one that stays put under a command that does not is no fault."""
+PLAUSIBLE = 1e7
+"""In any unit of the channels; above it a number is damage."""
 LVDTS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt")
 
 
@@ -96,6 +98,11 @@ def _numbers(recording: Recording) -> Iterator[Fault]:
             if wrong.any():
                 when = recording.time[np.argmax(wrong)]
                 yield Fault("not a number", f"{topic}.{name}", f"{topic}.{name} is not a number at {when:.3f} s")
+                continue
+            largest = float(np.max(np.abs(recording.column(topic, name))))
+            if largest > PLAUSIBLE:
+                message = f"{topic}.{name} reaches {largest:.3g}; no such rig goes above {PLAUSIBLE:g}"
+                yield Fault("implausible", f"{topic}.{name}", message)
 
 
 def _alive(recording: Recording) -> Iterator[Fault]:

@@ -30,8 +30,9 @@ class Comparison:
 def configuration_of(recording: Recording, base: Configuration | None = None) -> Configuration:
     """The operator's settings of a recording over `base` (the nominal rig). Raises RigtwinError for settings unknown here."""
     start = base or Configuration()
-    duration = recording.ticks * recording.period
-    timing = {"period": recording.period, "duration": duration, "timestep": recording.period / start.substeps}
+    substeps = max(1, math.ceil(recording.period / start.timing.timestep - 1e-9))
+    duration = max(recording.ticks * recording.period, 0.01)
+    timing = {"period": recording.period, "duration": duration, "timestep": recording.period / substeps}
     try:
         return overridden(start, {"controller": recording.controller, "timing": timing})
     except RigtwinError as error:
@@ -92,6 +93,8 @@ def compare_recordings(first: Recording, second: Recording) -> dict[str, Residua
     for name, unit in zip(Measurements._fields, ("m", "m", "m", "N"), strict=True):
         if first.has("/sensor", name) and second.has("/sensor", name):
             one, other = first.column("/sensor", name)[:ticks], second.column("/sensor", name)[:ticks]
+            if not (np.isfinite(one).all() and np.isfinite(other).all()):
+                raise RigtwinError(f"/sensor.{name} is not a number somewhere in {first.path} or {second.path}")
             difference = without_mains(one - other, first.period, 50.0)
             results[name] = single(difference, math.hypot(white_noise(one), white_noise(other)), unit, first.period)
     if not results:

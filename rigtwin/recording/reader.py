@@ -115,12 +115,18 @@ def load(path: Path) -> Recording:
         channel = channels.get(number)
         if channel is None or channel.topic not in known_topics():
             continue
+        if channel.topic in tables:
+            raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
+        if max(times) >= 2**63:
+            raise RigtwinError(f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start")
         values = _decoded(path, channel, schemas.get(channel.schema_id), data)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
         raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}")
     time, columns = _aligned(tables, notes)
-    _look_at_times(time, period, notes)
+    if not len(time):
+        raise RigtwinError(f"{path}: {' and '.join(tables)} have no tick in common; expected the same times on each")
+    _look_at_times(path, time, period, notes)
     if notes and "cut off" in notes[0]:
         notes[0] += f"; readable up to {time[-1]:.3f} s"
     return Recording(
@@ -155,7 +161,7 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         controller = config.get("controller", {})
         if not isinstance(controller, dict):
             raise ValueError
-    except (ValueError, AttributeError):
+    except (ValueError, AttributeError, RecursionError):
         raise RigtwinError(f"{path}: metadata config is not a JSON object with an object 'controller'") from None
     return controller
 
@@ -176,12 +182,31 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
                 return {name: fields["value"][:, present.index(name)].copy() for name in ours}
     else:
         raise RigtwinError(f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; expected json or protobuf")
+    rows: list[Mapping[str, Any]] = []
+    for number, item in enumerate(data):
+        try:
+            row = decode(item)
+        except (ValueError, RecursionError, DecodeError):
+            row = None
+        if not isinstance(row, Mapping):
+            raise RigtwinError(f"{path}: message {number} on {channel.topic} cannot be read; expected an object of numbers")
+        rows.append(row)
+    ours = [name for name in names if any(name in row for row in rows)]
+    if not ours:
+        raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
+    return {name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows]) for name in ours}
+
+
+def _column(path: Path, channel: str, values: list[Any]) -> Array:
+    """Numbers as they came; anything else is refused with its place."""
+    for number, value in enumerate(values):
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            shown = "missing" if value is None else f"{value!r:.40}"
+            raise RigtwinError(f"{path}: {channel} of message {number} is {shown}; expected a number")
     try:
-        rows = [decode(item) for item in data]
-        ours = [name for name in names if name in rows[0]]
-        return {name: np.array([row[name] for row in rows], np.float64) for name in ours}
-    except (ValueError, KeyError, TypeError, DecodeError) as error:
-        raise RigtwinError(f"{path}: a message on {channel.topic} cannot be read: {error!r}") from None
+        return np.array(values, np.float64)
+    except OverflowError:
+        raise RigtwinError(f"{path}: {channel} holds a number too large to be read") from None
 
 
 def _protobuf(path: Path, schema: Schema) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
@@ -224,7 +249,10 @@ def _aligned(
     return common * 1e-9, columns
 
 
-def _look_at_times(time: Array, period: float, notes: list[str]) -> None:
+def _look_at_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
+    spacing = float(np.median(np.diff(time))) if len(time) > 1 else period
+    if abs(spacing - period) > 0.1 * period:
+        raise RigtwinError(f"{path}: its period is said to be {period:g} s, but messages come every {spacing:g} s")
     gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
     if len(gaps):
         notes.append(f"{len(gaps)} gaps in time, the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s")

@@ -71,6 +71,8 @@ class Writer:
             self._file: BinaryIO = path.open("wb", buffering=0)
         except OSError as error:
             raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+        self._path = path
+        self._ticks = 0
         self._nanoseconds = period * 1e9
         self._offset = 0
         self._topics: dict[str, int] = {}
@@ -78,7 +80,6 @@ class Writer:
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
-        self._ticks = 0
         self._put(MCAP0_MAGIC + _encoded(Header(profile="", library="rigtwin")))
         config = json.dumps({"controller": controller})
         self.add_metadata(
@@ -217,7 +218,14 @@ class Writer:
         )
 
     def _put(self, data: bytes) -> None:
-        self._file.write(data)
+        try:
+            written = self._file.write(data)
+        except OSError as error:
+            self._file.close()
+            raise RigtwinError(f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks") from None
+        if written != len(data):
+            self._file.close()
+            raise RigtwinError(f"cannot write {self._path}: no space left")
         self._offset += len(data)
 
     def __enter__(self) -> Writer:
