@@ -112,6 +112,8 @@ def _fresh(stem: str) -> Path:
 
 
 def info(parsed: Namespace) -> int:
+    import numpy as np
+
     from rigtwin.channels import CHANNELS
     from rigtwin.recording import load
 
@@ -127,7 +129,8 @@ def info(parsed: Namespace) -> int:
     for channel in CHANNELS:
         if recording.has(channel.topic, channel.name):
             values = recording.column(channel.topic, channel.name)
-            figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
+            with np.errstate(over="ignore"):
+                figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
             rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
     print(_table(rows))
     if recording.controller:

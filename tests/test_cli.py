@@ -155,3 +155,19 @@ def test_help_imports_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "a first session" in done.stdout
+
+
+@pytest.mark.parametrize("command", ["plot", "export", "video", "compare"])
+def test_no_command_overwrites_its_input(tmp_path, capsys, command):
+    ending = {"plot": "png", "export": "csv", "video": "mp4", "compare": "json"}[command]
+    path = tmp_path / f"in.{ending}"
+    path.write_bytes(EXAMPLE.read_bytes())
+    flag = "--json" if command == "compare" else "-o"
+    assert main([command, str(path), flag, str(path)]) == 1
+    assert "is the input" in capsys.readouterr().err
+    assert path.read_bytes() == EXAMPLE.read_bytes()
+
+
+def test_compare_refuses_settings_that_it_would_ignore(capsys):
+    assert main(["compare", str(EXAMPLE), "--set", "controller.kp=5"]) == 1
+    assert "the recording's" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -273,3 +274,54 @@ def test_foxglove_layout_names_channels_that_exist():
     paths = {word for word in layout.replace('"', " ").split() if word.startswith(("/sensor.", "/command.", "/truth."))}
     assert paths
     assert paths <= known, textwrap.shorten(str(paths - known), 200)
+
+
+def other_recording(path, rows, times=None, period="0.001"):
+    """A JSON recording of /sensor as another program might write it."""
+    with path.open("wb") as file:
+        writer = OtherWriter(file)
+        writer.start()
+        channel = writer.register_channel("/sensor", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        writer.add_metadata("rigtwin", {"format": "1", "period": period, "config": "{}"})
+        for tick, row in enumerate(rows):
+            stamp = times[tick] if times else tick * 1_000_000
+            writer.add_message(channel, stamp, row.encode(), stamp)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        ('{"load_cell": [1, 2]}', "load_cell of message 5 is .1, 2.; expected a number"),
+        ('{"load_cell": "12.5"}', "expected a number"),
+        ('{"load_cell": true}', "expected a number"),
+        ('{"load_cell": null}', "is missing; expected a number"),
+        ("{}", "is missing; expected a number"),
+        ("[1]", "message 5 on /sensor cannot be read"),
+        ("{", "message 5 on /sensor cannot be read"),
+        ('{"load_cell": 1' + "0" * 400 + "}", "too large"),
+        ("[" * 100_000, "cannot be read"),
+    ],
+)
+def test_values_that_are_no_numbers_are_refused_with_their_place(tmp_path, wrong, says):
+    rows = ['{"load_cell": 1.0}'] * 10
+    rows[5] = wrong
+    with pytest.raises(RigtwinError, match=says):
+        load(other_recording(tmp_path / "w.mcap", rows))
+
+
+def test_times_that_make_no_sense_are_refused(tmp_path):
+    rows = ['{"load_cell": 1.0}'] * 10
+    with pytest.raises(RigtwinError, match=r"messages come every 0\.001 s"):
+        load(other_recording(tmp_path / "p.mcap", rows, period="0.0014"))
+    with pytest.raises(RigtwinError, match="expected ns since the start"):
+        load(other_recording(tmp_path / "t.mcap", rows, times=[2**63 + n for n in range(10)]))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_is_one_line(tmp_path):
+    full = tmp_path / "full.mcap"
+    full.symlink_to("/dev/full")
+    with pytest.raises(RigtwinError, match=r"cannot write .*No space left"):
+        Writer(full, "x", 1e-3, {})
