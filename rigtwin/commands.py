@@ -181,11 +181,12 @@ def export(parsed: Namespace) -> int:
 def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
-    from rigtwin.configuration import Configuration
+    from rigtwin.configuration import Configuration, Timing
     from rigtwin.diagnosis.compare import compare as replay_all
     from rigtwin.diagnosis.compare import compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.replays import REPLAYS
     from rigtwin.effects import applied
+    from rigtwin.parameters import Plant
     from rigtwin.recording import load
 
     recording = load(parsed.recording)
@@ -200,9 +201,9 @@ def compare(parsed: Namespace) -> int:
         print(f"{recording.path} against {parsed.other}, tick against tick")
     else:
         twin = applied(_configured(Configuration(), parsed), parsed.effect)
-        told = Configuration()._replace(plant=twin.plant, timing=twin.timing._replace(timestep=Configuration().timing.timestep))
-        if told != Configuration(plant=twin.plant) or twin.controller != told.controller:
-            raise RigtwinError("--set: what the controller was told, period and duration are the recording's; set the plant")
+        besides = twin._replace(plant=Plant(), timing=twin.timing._replace(timestep=Timing().timestep))
+        if besides != Configuration():
+            raise RigtwinError("compare changes the plant and timing.timestep only; all other settings are the recording's own")
         configuration = configuration_of(recording, twin)
         with tqdm(total=len(REPLAYS), disable=None, desc="replaying", leave=False) as bar:
             comparison = replay_all(recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name))

@@ -108,9 +108,8 @@ def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float 
     except (ValueError, OverflowError):
         number = math.nan
     if not (meaning.low <= number <= meaning.high):
-        raise RigtwinError(
-            f"{key} = {str(value)[:40]}: expected a number from {meaning.low:g} to {meaning.high:g} {meaning.unit}"
-        )
+        unit = "" if meaning.unit == "1" else f" {meaning.unit}"
+        raise RigtwinError(f"{key} = {str(value)[:40]}: expected a number from {meaning.low:g} to {meaning.high:g}{unit}")
     return number
 
 

@@ -168,6 +168,7 @@ def test_no_command_overwrites_its_input(tmp_path, capsys, command):
     assert path.read_bytes() == EXAMPLE.read_bytes()
 
 
-def test_compare_refuses_settings_that_it_would_ignore(capsys):
-    assert main(["compare", str(EXAMPLE), "--set", "controller.kp=5"]) == 1
+@pytest.mark.parametrize("ignored", ["controller.kp=5", "timing.duration=1", "safety.force=100", "road.speed=3"])
+def test_compare_refuses_settings_that_it_would_ignore(capsys, ignored):
+    assert main(["compare", str(EXAMPLE), "--set", ignored]) == 1
     assert "the recording's" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from rigtwin.configuration import Configuration, Safety, Timing, from_assignment
 from rigtwin.errors import RigtwinError
 from rigtwin.excitation import schroeder
 from rigtwin.loop import Block, run, run_compiled
+from rigtwin.recording import load
 from rigtwin.runner import record
 from rigtwin.safety import Trip, tripped
 from rigtwin.twin import Twin
@@ -80,8 +81,6 @@ def test_a_trip_ends_the_test_and_keeps_the_recording(tmp_path):
     outcome = record(tmp_path / "t.mcap", "drop", configuration, experiment.demands(configuration, 0), 0)
     assert outcome.tripped
     assert "structure_lvdt" in outcome.reason
-    from rigtwin.recording import load
-
     recording = load(outcome.path)
     structure = recording.column("/sensor", "structure_lvdt")
     assert recording.ticks == outcome.ticks
