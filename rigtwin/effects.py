@@ -47,7 +47,7 @@ KINDS = (
     Kind("deadband", ACTUATORS, ("deadband",), "command without effect within this band"),
     Kind("rate_limit", (Motor,), ("rate_limit",), "command's rate limited"),
     Kind("rate_limit", (Cylinder,), ("speed_limit",), "speed limited"),
-    Kind("cogging", (Motor,), ("cogging", "cogging_pitch"), "force that alternates along the stroke"),
+    Kind("cogging", (Motor,), ("cogging", "cogging_pitch", "cogging_phase"), "force that alternates along the stroke"),
     Kind("compliance", (Cylinder,), ("compliance",), "yields under load"),
     Kind("offset", SENSORS, ("offset",), "output displaced"),
     Kind("hum", SENSORS, ("hum",), "amplitude of the mains line"),

@@ -33,6 +33,7 @@ class Contacts(NamedTuple):
     motor_gap: Array
     cogging: float
     cogging_pitch: float
+    cogging_phase: float
     stiffness: float
     damping: float
     hardening: float
@@ -74,6 +75,7 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
         gap_at(travel),
         plant.motor.cogging,
         plant.motor.cogging_pitch,
+        plant.motor.cogging_phase,
         tyre.stiffness,
         tyre.damping,
         tyre.hardening,
@@ -95,21 +97,21 @@ class Simulation:
             actuator(of, plant.computer, timestep) for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
         ]
         held = [holding(drives[0], ground), holding(drives[1], structure), holding(drives[2], preload / plant.motor.constant)]
-        here = [float(state.memory[3]) for state in held]
-        view.qpos[view.ground], view.qpos[view.structure] = here[0], here[1]
-        view.qpos[view.carriage] = carriage = here[0] - preload / plant.tyre.stiffness
+        here = float(held[0].memory[3])
+        view.qpos[view.ground] = here
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - preload / plant.tyre.stiffness
         view.activation[0] = view.control[0] = preload / plant.motor.constant
-        touching = contacts(plant, carriage, here[1] - carriage)
+        touching = contacts(plant, carriage, 0.0)
         self.machine = Machine(
             view,
             substeps,
             not touching.changing and all(each.neutral for each in drives),
             sampled(plant.ground_cylinder, timestep),
-            settled(plant.ground_cylinder, here[0]),
+            settled(plant.ground_cylinder, here),
             drives[0],
             held[0],
             sampled(plant.structure_cylinder, timestep),
-            settled(plant.structure_cylinder, here[1]),
+            settled(plant.structure_cylinder, carriage),
             drives[1],
             held[1],
             drives[2],
@@ -148,7 +150,7 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     mechanics.rail_friction[0] = breakaway(now.rail, now.rail_gap, carriage, velocity)
     mechanics.motor_friction[0] = breakaway(now.motor, now.motor_gap, travel, sliding)
     mechanics.applied[mechanics.carriage] = -0.5 * now.rail.asymmetry
-    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch)
+    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
     mechanics.motor_bias[0] = cogging - 0.5 * now.motor.asymmetry
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
     mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * max(1.0 + now.hardening * deflection, 0.0)

@@ -50,12 +50,15 @@ def _cylinder(
             advance_cylinder(model, state, conditioned(conditioning, command, commands[tick]))
 
 
-def replay_cylinder(cylinder: Cylinder, configuration: Configuration, commands: Array, start: float) -> Array:
-    """Command → plate position at every tick, m, unloaded, from rest at the command `start`."""
+def replay_cylinder(
+    cylinder: Cylinder, configuration: Configuration, commands: Array, start: float, position: float | None = None
+) -> Array:
+    """Command → plate position at every tick, m, unloaded, from rest at `position` under the command `start`; by default
+    where that command holds it."""
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
     command = holding(conditioning, start)
-    state = settled(cylinder, float(command.memory[3]))
+    state = settled(cylinder, float(command.memory[3]) if position is None else position)
     model = sampled(cylinder, timestep)
     _cylinder(model, state, conditioning, command, np.ascontiguousarray(commands), configuration.substeps, out)
     return out

@@ -77,6 +77,10 @@ class Replays:
             expected + unseen(sensor, found.correction, self.period), found.correction, found.velocity_error / sensor.gain
         )
 
+    @property
+    def _ground_start(self) -> float:
+        return float(self._command("ground")[0]) * self.configuration.plant.ground_cylinder.gain
+
     @cached_property
     def ground_cylinder_output(self) -> Array:
         command, cylinder = self._command("ground"), self.configuration.plant.ground_cylinder
@@ -90,7 +94,9 @@ class Replays:
     def structure_cylinder_output(self) -> Array:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
-        unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start)
+        # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
+        uncompressed = self._ground_start - self.preload / self.configuration.plant.tyre.stiffness
+        unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start, uncompressed)
         return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
 
     @cached_property

@@ -1,0 +1,149 @@
+"""What recordings say of a plant: the difference between predicted and measured sensors, whitened, frequency by frequency.
+
+Commands are known exactly, so whatever a plant's prediction leaves is noise or a gap. Each line of the difference's
+spectrum is weighed by what may be there without meaning: the sensor's white noise, estimated from the data, and a small
+share of the signal, since no model is exact. The mains line says nothing of the plant and is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft, rfftfreq
+
+from controllers import Measurements
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.noise import white_noise, without_mains
+from rigtwin.diagnosis.reduced import Reduced
+from rigtwin.diagnosis.tolerances import TOLERANCES, WITHIN
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording
+
+HIGHEST = 150.0
+"""Hz; above it no component moves and lines would only add noise."""
+FORM = 0.004
+"""Share of a signal that no model is held to."""
+MAINS_WIDTH = 0.8
+"""Hz to either side of the mains line that is left out."""
+STARTED = 0.7
+"""s, from which a test counts in full: by then the plates have left whatever they started from."""
+UNSEEN = 0.3
+"""Share of that which does not count at all."""
+COARSE = 4.0
+"""How much more variance than a halved step shows is put down to the integration."""
+SMOOTHED = 8
+"""Lines to either side over which a signal's spectrum is averaged."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
+    multiplied by, shape (4, lines); fade: what a difference is multiplied by before, shape (ticks,); measured: shape
+    (4, ticks); noise: white, of each sensor, shape (4,)."""
+
+    frequency: Array
+    weight: Array
+    fade: Array
+    measured: Array
+    noise: Array
+    length: int
+
+
+def lines(recording: Recording, mains: float) -> Lines:
+    """The lines of a recording's sensors, and their weights."""
+    measured = np.stack([recording.column("/sensor", name) for name in Measurements._fields])
+    ticks = measured.shape[1]
+    length = next_fast_len(ticks, real=True)
+    frequency = rfftfreq(length, recording.period)
+    kept = frequency <= min(HIGHEST, 0.4 / recording.period)
+    width = max(MAINS_WIDTH, 2.0 / (ticks * recording.period))
+    off_mains = np.abs(frequency[kept] - mains) > width
+    noise = np.array([white_noise(row) for row in measured])
+    resolution = np.array([_smallest_step(row) for row in measured])
+    floor = np.maximum(noise, resolution / np.sqrt(12.0))
+    weight = np.empty((4, int(kept.sum())))
+    fade = _fade(ticks, recording.period)
+    for row in range(4):
+        swing = fade * (measured[row] - np.mean(measured[row]))
+        power = np.abs(rfft(swing, length)[kept]) ** 2
+        variance = 0.5 * (float(fade @ fade) * floor[row] ** 2 + FORM**2 * _smoothed(power))
+        weight[row] = off_mains / np.sqrt(variance)
+    return Lines(frequency[kept], weight, fade, measured, floor, length)
+
+
+def _smoothed(power: Array) -> Array:
+    """Averaged over neighbouring lines."""
+    return np.convolve(power, np.ones(2 * SMOOTHED + 1) / (2 * SMOOTHED + 1), mode="same")
+
+
+def _fade(ticks: int, period: float) -> Array:
+    """Nothing of the start, where the rig's state is not known, then a rise to 1."""
+    time, end = np.arange(ticks) * period, min(STARTED, 0.15 * ticks * period)
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip((time / end - UNSEEN) / (1.0 - UNSEEN), 0.0, 1.0))
+
+
+def _smallest_step(row: Array) -> float:
+    """The smallest change between neighbouring values that the signal shows, its resolution if it is coarse."""
+    values = np.unique(row)
+    return float(np.min(np.diff(values))) if len(values) > 1 else 0.0
+
+
+class Evidence:
+    """Recordings of one rig, and how far a plant's predictions are from them.
+
+    residual: whitened, of unit variance if the plant is right, shape (size,). Several recordings stand one after another.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], configurations: Sequence[Configuration], steps: int = 4) -> None:
+        """configurations: the twin's, one for each recording, alike in their plant. steps: of integration a tick."""
+        self.recordings, self.configurations = tuple(recordings), tuple(configurations)
+        self.plant = self.configurations[0].plant
+        self.lines = [lines(recording, c.plant.mains.frequency) for recording, c in zip(recordings, configurations, strict=True)]
+        self._reduced = [
+            Reduced(*(recording.column("/command", name) for name in ("ground", "structure", "voltage")), c, steps)
+            for recording, c in zip(recordings, configurations, strict=True)
+        ]
+        self._loosen()
+        self.size = sum(2 * int(np.count_nonzero(each.weight)) for each in self.lines)
+        # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
+        for each, c, predicted in zip(self.lines, self.configurations, self.predicted(self.plant), strict=True):
+            for row, model in zip(each.measured, predicted, strict=True):
+                row -= (row - model) - without_mains(row - model, c.timing.period, c.plant.mains.frequency)
+
+    def _loosen(self) -> None:
+        """Adds to what no line is held to what half the integration step would change."""
+        for each, reduced in zip(self.lines, self._reduced, strict=True):
+            change = each.fade * (reduced.sensed(self.plant) - reduced.finer().sensed(self.plant))
+            power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
+            for row in range(4):
+                variance = COARSE * 0.5 * _smoothed(power[row])
+                each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
+
+    def predicted(self, plant: Plant) -> list[Array]:
+        """The sensors of every recording, shape (4, ticks) each."""
+        return [reduced.sensed(plant) for reduced in self._reduced]
+
+    def whitened(self, differences: Sequence[Array]) -> Array:
+        """Differences in the time domain, shape (4, ticks) each, as one whitened vector."""
+        parts = []
+        for each, difference in zip(self.lines, differences, strict=True):
+            transform = rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
+            parts += [transform.real.ravel(), transform.imag.ravel()]
+        return np.concatenate(parts)
+
+    def residual(self, plant: Plant) -> Array:
+        """Measured less predicted."""
+        predicted = self.predicted(plant)
+        return self.whitened([each.measured - p for each, p in zip(self.lines, predicted, strict=True)])
+
+    def nuisances(self, plant: Plant) -> Array:
+        """What a standard deviation of each tolerance does to the prediction, shape (size, tolerances)."""
+        before = self.predicted(plant)
+        columns = []
+        for tolerance in TOLERANCES:
+            after = self.predicted(tolerance.shifted(plant, 1.0))
+            columns.append(self.whitened([(b - a) / WITHIN for a, b in zip(before, after, strict=True)]))
+        return np.stack(columns, axis=1)

@@ -1,0 +1,168 @@
+"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their prior beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from rigtwin.arrays import Array
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.trials import Trials, swings, trials
+from rigtwin.effects import Effect
+from rigtwin.parameters import Plant
+
+STIFFNESS = 4.0
+"""How much more a tolerance's prior weighs than one datum: form errors add up over thousands of lines, tolerances must not
+take them up."""
+ITERATIONS = 8
+REFINED = 2
+"""Starts that are followed to their end."""
+
+
+Values = tuple[tuple[float, ...], ...]
+"""Of effects, one tuple each, in the order of its parameters."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their prior; widths: standard
+    deviation of each value; plant: with them."""
+
+    effects: tuple[Effect, ...]
+    values: tuple[tuple[float, ...], ...]
+    misfit: float
+    widths: tuple[tuple[float, ...], ...]
+    plant: Plant = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        return " + ".join(effect.name for effect in self.effects) or "none"
+
+
+def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Plant:
+    """The plant with effects of these values, one tuple an effect in the order of its parameters."""
+    for effect, numbers in zip(effects, values, strict=True):
+        changes = dict(zip(effect.kind.parameters, numbers, strict=True))
+        plant = plant._replace(**{effect.group: getattr(plant, effect.group)._replace(**changes)})
+    return plant
+
+
+class Space:
+    """The tolerances about one plant: what they can take up of a residual at what price."""
+
+    def __init__(self, evidence: Evidence, plant: Plant) -> None:
+        self._columns = evidence.nuisances(plant)
+        normal = self._columns.T @ self._columns + STIFFNESS * np.eye(self._columns.shape[1])
+        self._factor = cho_factor(normal)
+
+    def product(self, left: Array, right: Array) -> Array:
+        """leftᵀ·right with the tolerances projected out."""
+        a, b = self._columns.T @ left, self._columns.T @ right
+        return left.T @ right - a.T @ cho_solve(self._factor, b)
+
+    def misfit(self, residual: Array) -> float:
+        """min over tolerances of |residual − what they do|² + their prior."""
+        return float(self.product(residual, residual))
+
+    def nuisances(self, residual: Array) -> Array:
+        """The tolerances at that minimum, in standard deviations."""
+        return cho_solve(self._factor, self._columns.T @ residual)
+
+    def less(self, residual: Array) -> Array:
+        """The residual less what the tolerances take up."""
+        return residual - self._columns @ self.nuisances(residual)
+
+
+class Fitter:
+    """Fits any effects to one body of evidence."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence, self.plant = evidence, evidence.plant
+        self.space = Space(evidence, evidence.plant)
+        self.swing = swings(evidence.recordings)
+        self._nominal = evidence.residual(evidence.plant)
+        self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
+        self._responses: dict[Effect, list[tuple[tuple[float, ...], Array]]] = {}
+
+    def trials(self, effect: Effect) -> Trials:
+        return trials(effect, self.plant, self.swing)
+
+    def single(self, effect: Effect) -> Fit:
+        """The best fit of one effect."""
+        scored: list[tuple[float, tuple[float, ...]]] = []
+        responses = []
+        for start in self.trials(effect).starts:
+            residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
+            scored.append((self.space.misfit(residual), start))
+            responses.append((start, (self._nominal - residual).astype(np.float32)))
+        self._responses[effect] = responses
+        scored.sort()
+        return min((self.refined((effect,), (start,)) for _, start in scored[:REFINED]), key=lambda fit: fit.misfit)
+
+    def seconds(self, first: Fit, effects: Sequence[Effect], count: int) -> list[tuple[tuple[Effect, ...], Values, Space]]:
+        """The likeliest second effects beside `first`, by how well their responses at the nominal plant resemble what it
+        leaves: effects, values to start from and tolerances, as `refined` takes them."""
+        space = Space(self.evidence, first.plant)
+        left = space.less(self.evidence.residual(first.plant))
+        scored = []
+        for effect in effects:
+            if effect in first.effects:
+                continue
+            best = (0.0, self._responses[effect][0][0])
+            for start, response in self._responses[effect]:
+                power = float(response @ response)
+                share = float(response @ left) / power if power > 0.0 else 0.0
+                # A response may be too strong or too weak, but not the other way round.
+                share = min(max(share, 0.0), 3.0)
+                gain = 2.0 * share * float(response @ left) - share**2 * power
+                best = max(best, (gain, start))
+            scored.append((*best, effect))
+        scored.sort(key=lambda item: -item[0])
+        return [((*first.effects, effect), (*first.values, start), space) for _, start, effect in scored[:count]]
+
+    def refined(self, effects: tuple[Effect, ...], start: Sequence[Sequence[float]], space: Space | None = None) -> Fit:
+        """Gauss-Newton with halved steps from a start."""
+        space = space or self.space
+        sizes = [len(effect.kind.parameters) for effect in effects]
+        steps = np.concatenate([self.trials(effect).steps for effect in effects])
+        quantities = [quantity for effect in effects for quantity in effect.quantities().values()]
+        low, high = np.array([q.low for q in quantities]), np.array([q.high for q in quantities])
+
+        def split(vector: Array) -> tuple[tuple[float, ...], ...]:
+            cuts = np.cumsum(sizes)[:-1]
+            return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
+
+        def residual(vector: Array) -> Array:
+            return self.evidence.residual(with_values(self.plant, effects, split(vector)))
+
+        here = np.clip(np.concatenate([np.asarray(values, float) for values in start]), low, high)
+        left = residual(here)
+        misfit = space.misfit(left)
+        normal = np.eye(len(here))
+        for _ in range(ITERATIONS):
+            columns = []
+            for number in range(len(here)):
+                step = steps[number] if here[number] + steps[number] <= high[number] else -steps[number]
+                shifted = here.copy()
+                shifted[number] += step
+                columns.append((residual(shifted) - left) / (step / steps[number]))
+            jacobian = np.stack(columns, axis=1)
+            normal = space.product(jacobian, jacobian)
+            gradient = space.product(jacobian, left)
+            damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
+            move = -np.linalg.solve(damped, gradient) * steps
+            better = False
+            for share in (1.0, 0.5, 0.2, 0.05):
+                there = np.clip(here + share * move, low, high)
+                tried = residual(there)
+                if (value := space.misfit(tried)) < misfit:
+                    gained, better = misfit - value, True
+                    here, left, misfit = there, tried, value
+                    break
+            if not better or gained < 0.2:
+                break
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
+        return Fit(effects, split(here), misfit, split(spread), with_values(self.plant, effects, split(here)))

@@ -1,0 +1,53 @@
+"""What a rig may differ in without anything being wrong: every tolerance is a nuisance to the diagnosis, never a finding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigtwin.parameters import Plant
+
+WITHIN = 2.0
+"""Standard deviations that a declared tolerance spans to either side."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A declared tolerance of one parameter. of: the group and parameter; half_width: in the parameter's unit, or as a
+    share of its value if relative."""
+
+    group: str
+    parameter: str
+    half_width: float
+    relative: bool = False
+
+    def width(self, plant: Plant) -> float:
+        """Its half width in the parameter's unit, at that plant."""
+        return self.half_width * (abs(float(getattr(getattr(plant, self.group), self.parameter))) if self.relative else 1.0)
+
+    def shifted(self, plant: Plant, widths: float) -> Plant:
+        """The plant with this parameter that many half widths higher."""
+        group = getattr(plant, self.group)
+        value = float(getattr(group, self.parameter)) + widths * self.width(plant)
+        return plant._replace(**{self.group: group._replace(**{self.parameter: value})})
+
+
+LVDTS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt")
+TIMING = 1e-4
+"""s, of every path."""
+TOLERANCES = (
+    Tolerance("carriage", "mass", 0.005, True),
+    Tolerance("tyre", "stiffness", 0.01, True),
+    Tolerance("motor", "constant", 0.005, True),
+    Tolerance("rail", "coulomb", 0.03, True),
+    Tolerance("motor", "coulomb", 0.03, True),
+    *(Tolerance(sensor, "gain", 0.002, True) for sensor in (*LVDTS, "load_cell")),
+    *(Tolerance(sensor, "offset", 5e-5) for sensor in LVDTS),
+    Tolerance("load_cell", "offset", 0.5),
+    *(Tolerance(path, "delay", TIMING) for path in ("motor", "ground_cylinder", "structure_cylinder", *LVDTS, "load_cell")),
+)
+"""The suspension rig's: masses, stiffness, motor constant, friction, sensors, timing of each path."""
+
+
+def tolerance_of(group: str, parameter: str) -> Tolerance | None:
+    """The declared tolerance of a parameter, if there is one."""
+    return next((each for each in TOLERANCES if (each.group, each.parameter) == (group, parameter)), None)

@@ -1,0 +1,144 @@
+"""Where the search for each kind of effect starts, and how fine it steps: of the size that matters on the recorded test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from rigtwin.arrays import Array
+from rigtwin.effects import Effect
+from rigtwin.parameters import Cylinder, Lvdt, Motor, Plant
+from rigtwin.recording import Recording
+
+LEAST_FRICTION = 10.0
+"""N; a change of friction is tried in shares of what there is, or of this."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How far and fast a command went. largest: of its magnitude, in its unit; fastest: of its rate, unit/s."""
+
+    largest: float
+    fastest: float
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Values to start from, one tuple each in the order of the effect's parameters; steps: fine ones for derivatives."""
+
+    starts: tuple[tuple[float, ...], ...]
+    steps: tuple[float, ...]
+
+
+def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
+    """The swing of each command over all recordings, by the component that it moves."""
+    commands = {"motor": "voltage", "ground_cylinder": "ground", "structure_cylinder": "structure"}
+    found: dict[str, Swing] = {}
+    for component, name in commands.items():
+        columns = [(recording.column("/command", name), recording.period) for recording in recordings]
+        rates: list[Array] = [np.abs(np.diff(column)) / period for column, period in columns]
+        found[component] = Swing(
+            max(float(np.max(np.abs(column))) for column, _ in columns),
+            max(float(np.quantile(rate, 0.999)) for rate in rates),
+        )
+    return found
+
+
+def _single(values: tuple[float, ...], step: float) -> Trials:
+    return Trials(tuple((value,) for value in values), (step,))
+
+
+def _around(nominal: float, shares: tuple[float, ...], step: float) -> Trials:
+    return _single(tuple(nominal * share for share in shares), abs(nominal) * step)
+
+
+def _friction(effect: Effect, plant: Plant, swing: Swing) -> float:
+    return max(getattr(plant, effect.group).coulomb, LEAST_FRICTION)
+
+
+def _coulomb(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    nominal, base = getattr(plant, effect.group).coulomb, _friction(effect, plant, swing)
+    return _single(tuple(max(nominal + share * base, 0.0) for share in (-0.7, -0.3, 0.3, 1.0, 3.0)), 0.03 * base)
+
+
+def _stribeck(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    base = _friction(effect, plant, swing)
+    amplitudes = (-0.5 * base, 0.5 * base, 2.0 * base)
+    return Trials(tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.1))), (0.05 * base, 0.001))
+
+
+def _asymmetry(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    base = _friction(effect, plant, swing)
+    return _single((-base, -0.3 * base, 0.3 * base, base), 0.03 * base)
+
+
+def _cogging(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    pitches = (0.008, 0.012, 0.016, 0.02, 0.025, 0.03, 0.036, 0.045, 0.06, 0.08)
+    phases = (0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi)
+    return Trials(tuple(product((8.0,), pitches, phases)), (0.5, 2e-4, 0.05))
+
+
+def _offset(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    if isinstance(getattr(plant, effect.group), Lvdt):
+        return _single((-2e-3, -3e-4, 3e-4, 2e-3), 1e-5)
+    return _single((-20.0, -4.0, 4.0, 20.0), 0.1)
+
+
+def _deadband(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    if isinstance(getattr(plant, effect.group), Motor):
+        return _single((0.02, 0.08, 0.3), 0.004)
+    return _single((1e-4, 5e-4, 2e-3, 6e-3), 2e-5)
+
+
+def _saturation(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    return _around(max(swing.largest, 1e-3), (0.97, 0.9, 0.8, 0.65, 0.5), 0.005)
+
+
+def _rate_limit(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+    fastest = max(swing.fastest, 1e-2)
+    component = getattr(plant, effect.group)
+    if isinstance(component, Cylinder):
+        fastest = min(fastest, component.speed_limit)
+    return _around(fastest, (0.9, 0.7, 0.5, 0.3, 0.15, 0.05), 0.01)
+
+
+def _nominal(shares: tuple[float, ...], step: float) -> Callable[[Effect, Plant, Swing], Trials]:
+    def around(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+        return _around(effect.nominal(plant)[effect.kind.parameters[0]], shares, step)
+
+    return around
+
+
+def _fixed(values: tuple[float, ...], step: float) -> Callable[[Effect, Plant, Swing], Trials]:
+    return lambda effect, plant, swing: _single(values, step)
+
+
+TRIALS: dict[str, Callable[[Effect, Plant, Swing], Trials]] = {
+    "coulomb": _coulomb,
+    "viscous": _fixed((20.0, 100.0, 400.0, 1500.0), 5.0),
+    "stribeck": _stribeck,
+    "asymmetry": _asymmetry,
+    "backlash": _fixed((1e-4, 3e-4, 1e-3, 3e-3, 8e-3), 3e-5),
+    "mass": _nominal((0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
+    "stiffness": _nominal((0.7, 0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
+    "damping": _fixed((30.0, 150.0, 600.0, 1500.0), 10.0),
+    "hardening": _fixed((-15.0, 5.0, 20.0, 60.0, 150.0), 1.0),
+    "gain": _fixed((0.8, 0.93, 1.07, 1.2), 0.004),
+    "lag": _fixed((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4),
+    "delay": _fixed((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4),
+    "saturation": _saturation,
+    "deadband": _deadband,
+    "rate_limit": _rate_limit,
+    "cogging": _cogging,
+    "compliance": _fixed((2e-7, 1e-6, 5e-6), 2e-8),
+    "offset": _offset,
+}
+"""Kind → its trials. Kinds that are read off the signals directly (noise, hum, bits, missed ticks) are not searched for."""
+
+
+def trials(effect: Effect, plant: Plant, swing: dict[str, Swing]) -> Trials:
+    """Where to start, and how finely to step."""
+    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, Swing(0.0, 0.0)))
