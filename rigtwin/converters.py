@@ -96,6 +96,8 @@ def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -
 def seen(sensor: Lvdt | LoadCell, true: Array, period: float) -> Array:
     """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
     model, out = transducer(sensor, period), np.empty(len(true))
+    if model.neutral:
+        return true.copy()
     _seen(model, fresh(model), np.ascontiguousarray(true), out)
     return out
 

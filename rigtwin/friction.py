@@ -11,10 +11,13 @@ from controllers.compiled import compilable
 from rigtwin.arrays import Array
 from rigtwin.parameters import Motor, Rail
 
+ROUNDING = 1e-12
+"""m, within which a gap is taken up."""
+
 
 class Friction(NamedTuple):
     """changing: whether the dry friction depends on the motion. asymmetry: friction in positive less that in negative
-    direction, N; the same as a constant force of half of it against positive motion."""
+    direction, N."""
 
     changing: bool
     coulomb: float
@@ -26,7 +29,7 @@ class Friction(NamedTuple):
 
 def friction(of: Rail | Motor) -> Friction:
     """The dry friction of a rail or motor; its viscous friction is MuJoCo's damping."""
-    changing = of.stribeck != 0.0 or of.backlash != 0.0
+    changing = (of.stribeck, of.asymmetry, of.backlash) != (0.0, 0.0, 0.0)
     return Friction(changing, of.coulomb, of.stribeck, of.stribeck_velocity, of.asymmetry, of.backlash)
 
 
@@ -36,13 +39,20 @@ def gap_at(position: float) -> Array:
 
 
 @compilable
-def breakaway(dry: Friction, gap: Array, position: float, velocity: float) -> float:
-    """The force that dry friction can bear now, N. Moves the backlash's element, whose friction is felt only where the
-    gap is taken up."""
+def breakaway(dry: Friction, gap: Array, position: float, velocity: float) -> tuple[float, float]:
+    """The forces that dry friction can bear now, N: against positive and against negative motion. Moves the backlash's
+    element, whose friction is felt only where the gap is taken up, and only in the direction that pushes it on."""
+    ratio = velocity / dry.stribeck_velocity
+    size = dry.coulomb + dry.stribeck * math.exp(-ratio * ratio)
+    forward, backward = max(size + 0.5 * dry.asymmetry, 0.0), max(size - 0.5 * dry.asymmetry, 0.0)
     half = 0.5 * dry.backlash
     if half > 0.0:
-        if abs(position - gap[0]) < half:
-            return 0.0
-        gap[0] = position - math.copysign(half, position - gap[0])
-    ratio = velocity / dry.stribeck_velocity
-    return max(dry.coulomb + dry.stribeck * math.exp(-ratio * ratio), 0.0)
+        apart = position - gap[0]
+        if apart >= half - ROUNDING:
+            gap[0] = position - half
+            return forward, 0.0
+        if apart <= ROUNDING - half:
+            gap[0] = position + half
+            return 0.0, backward
+        return 0.0, 0.0
+    return forward, backward

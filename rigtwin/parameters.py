@@ -84,7 +84,7 @@ class Cylinder(NamedTuple):
     delay: Annotated[float, Quantity("s", 0.0, 0.05, _NONE)] = 0.0
     deadband: Annotated[float, Quantity("m", 0.0, 0.05, _NONE)] = 0.0
     saturation: Annotated[float, Quantity("m", 1e-4, UNLIMITED, _NONE)] = UNLIMITED
-    compliance: Annotated[float, Quantity("m/N", 0.0, 2e-6, "0: a cylinder in position control does not yield, §3.2")] = 0.0
+    compliance: Annotated[float, Quantity("m/N", 0.0, 2e-5, "0: a cylinder in position control does not yield, §3.2")] = 0.0
 
 
 class Lvdt(NamedTuple):

@@ -18,7 +18,7 @@ from rigtwin.friction import Friction, breakaway, friction, gap_at
 from rigtwin.model import Handles, build, handles
 from rigtwin.parameters import Plant
 
-YIELDING = 1e-3
+YIELDING = 5e-3
 """s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
 
 
@@ -66,7 +66,7 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
     """The plant's contacts with the carriage and the travel at those positions, m."""
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
-    forces = (tyre.hardening, plant.motor.cogging, rail.asymmetry, motor.asymmetry, *compliances)
+    forces = (tyre.hardening, plant.motor.cogging, *compliances)
     return Contacts(
         rail.changing or motor.changing or any(forces),
         rail,
@@ -147,11 +147,14 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
     travel = mechanics.qpos[mechanics.structure] - carriage
     sliding = mechanics.qvel[mechanics.structure] - velocity
-    mechanics.rail_friction[0] = breakaway(now.rail, now.rail_gap, carriage, velocity)
-    mechanics.motor_friction[0] = breakaway(now.motor, now.motor_gap, travel, sliding)
-    mechanics.applied[mechanics.carriage] = -0.5 * now.rail.asymmetry
+    # MuJoCo's dry friction is the same both ways; what one way has more is a force besides.
+    forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity)
+    mechanics.rail_friction[0] = 0.5 * (forward + backward)
+    mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
+    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding)
+    mechanics.motor_friction[0] = 0.5 * (forward + backward)
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-    mechanics.motor_bias[0] = cogging - 0.5 * now.motor.asymmetry
+    mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
     mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * max(1.0 + now.hardening * deflection, 0.0)
 

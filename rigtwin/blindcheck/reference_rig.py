@@ -8,7 +8,7 @@ defect that the referee can give the rig is a number of `Truth`; its defaults ar
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -30,6 +30,7 @@ class Slider(NamedTuple):
     viscous: float = 0.0
     peak: float = 0.0
     peak_speed: float = 0.01
+    peak_shape: float = 2.0
     uneven: float = 0.0
     lost: float = 0.0
     wave: float = 0.0
@@ -81,7 +82,7 @@ CELL = Sensor(1.5, 5.0, 0.076, full=400.0)
 
 class Truth(NamedTuple):
     """The whole rig. bristle: N/m, 0 for set-valued friction; relaxing: share of the tyre's stiffness that relaxes, in
-    `relaxing_time` s; late: computation delay, s; missed: share of ticks."""
+    `relaxing_time` s; yielding: s, a cylinder's lag behind its load; late: computation delay, s; missed: share of ticks."""
 
     mass: float = 34.0
     rail: Slider = Slider(50.0)
@@ -108,6 +109,7 @@ class Truth(NamedTuple):
     late: float = 0.0
     missed: float = 0.0
     bristle: float = 0.0
+    yielding: float = 4e-3
 
 
 class Law(NamedTuple):
@@ -132,7 +134,7 @@ class Law(NamedTuple):
 @numba.njit(cache=True, nogil=True)
 def dry(of: Slider, speed: float, place: float) -> tuple[float, float]:
     """The bounds of dry friction at this speed and place: in positive and in negative direction, N."""
-    size = of.coulomb + of.peak * math.exp(-((speed / of.peak_speed) ** 2))
+    size = of.coulomb + of.peak * math.exp(-((abs(speed) / of.peak_speed) ** of.peak_shape))
     size *= 1.0 + of.wave * math.sin(2.0 * math.pi * place / of.wave_length)
     return max(size + 0.5 * of.uneven, 0.0), max(size - 0.5 * of.uneven, 0.0)
 
@@ -245,9 +247,12 @@ def reading(of: Sensor, value: float, acceleration: float, history: Array, memor
 
 
 @numba.njit(cache=True, nogil=True)
-def simulate(truth: Truth, law: Law, demands: Array, noise: Array, missed: Array, commands: Array, sensors: Array) -> int:
-    """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); noise: of the sensors, shape (ticks, 4);
-    missed: 1 where a tick is missed, shape (ticks,); commands, sensors: what is recorded, shape (ticks, 4). Returns ticks."""
+def simulate(
+    truth: Truth, law: Law, demands: Array, voltages: Array, noise: Array, missed: Array, commands: Array, sensors: Array
+) -> int:
+    """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); voltages: V, in place of the controller's, or
+    empty; noise: of the sensors, shape (ticks, 4); missed: 1 where a tick is missed, shape (ticks,); commands, sensors: what
+    is recorded, shape (ticks, 4). Returns ticks."""
     inner = int(round(1e-3 / STEP))
     size = 2048
     histories = np.empty((3, size))
@@ -270,7 +275,7 @@ def simulate(truth: Truth, law: Law, demands: Array, noise: Array, missed: Array
     v, force, relaxed = 0.0, law.preload, 0.0
     bristle_rail = bristle_rod = 0.0
     rail_end, rod_end = x, structure - x
-    ground_yield = structure_yield = 0.0
+    ground_yield = structure_yield = ground_before = structure_before = 0.0
     acceleration = cell = 0.0
     cell = law.preload
 
@@ -308,10 +313,12 @@ def simulate(truth: Truth, law: Law, demands: Array, noise: Array, missed: Array
                 voltage = max(-law.limit, min(law.limit, voltage))
             else:
                 integral = grown
+            if len(voltages):
+                position, voltage = demands[tick, 1], voltages[tick]
             held[0], held[1], held[2], held[3] = demands[tick, 0], position, wanted, voltage
         for number in range(4):
             commands[tick, number] = held[number]
-        if abs(sensors[tick, 1]) > 0.15 or abs(sensors[tick, 3]) > 1500.0:
+        if len(voltages) == 0 and (abs(sensors[tick, 1]) > 0.15 or abs(sensors[tick, 3]) > 1500.0):
             return tick + 1
 
         for _ in range(inner):
@@ -324,29 +331,27 @@ def simulate(truth: Truth, law: Law, demands: Array, noise: Array, missed: Array
             next_structure = hydraulic_step(truth.structure_hydraulic, structure_z, structure, asked_structure)
 
             deflection = ground + ground_yield - x
-            squeeze = (next_ground - ground) / STEP - v
+            squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
             contact = 0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET)) - 0.25 * ONSET**2 / 0.004
             relaxed += STEP / truth.relaxing_time * (contact - relaxed)
             tyre = truth.tyre * (contact * (1.0 + truth.tyre_hardening * contact))
             tyre += truth.relaxing * truth.tyre * (contact - relaxed) + (truth.tyre_damping * squeeze if deflection > 0.0 else 0.0)
             tyre = max(tyre, 0.0) if contact > 0.0 else 0.0
 
-            plate = (next_structure - structure) / STEP
+            plate = (next_structure - structure + structure_yield - structure_before) / STEP
             way = structure + structure_yield - x
             sliding = plate - v
             ripple = truth.ripple * math.sin(2.0 * math.pi * way / truth.ripple_pitch + truth.ripple_phase)
             rail_up, rail_down = dry(truth.rail, v, x)
             rod_up, rod_down = dry(truth.motor, sliding, way)
             if truth.rail.lost > 0.0:
-                if abs(x - rail_end) < 0.5 * truth.rail.lost:
-                    rail_up = rail_down = 0.0
-                else:
-                    rail_end = x - math.copysign(0.5 * truth.rail.lost, x - rail_end)
+                rail_end = max(min(rail_end, x + 0.5 * truth.rail.lost), x - 0.5 * truth.rail.lost)
+                rail_up *= 1.0 if x - rail_end >= 0.5 * truth.rail.lost - 1e-12 else 0.0
+                rail_down *= 1.0 if rail_end - x >= 0.5 * truth.rail.lost - 1e-12 else 0.0
             if truth.motor.lost > 0.0:
-                if abs(way - rod_end) < 0.5 * truth.motor.lost:
-                    rod_up = rod_down = 0.0
-                else:
-                    rod_end = way - math.copysign(0.5 * truth.motor.lost, way - rod_end)
+                rod_end = max(min(rod_end, way + 0.5 * truth.motor.lost), way - 0.5 * truth.motor.lost)
+                rod_up *= 1.0 if way - rod_end >= 0.5 * truth.motor.lost - 1e-12 else 0.0
+                rod_down *= 1.0 if rod_end - way >= 0.5 * truth.motor.lost - 1e-12 else 0.0
             smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
             smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
             push = tyre - force - ripple - smooth_rail + smooth_rod
@@ -386,23 +391,32 @@ def simulate(truth: Truth, law: Law, demands: Array, noise: Array, missed: Array
             acceleration = (v - before) / STEP
             x += STEP * v
             force += (1.0 - math.exp(-STEP / truth.electrical)) * (truth.constant * asked - force)
-            ground_yield = -truth.ground_hydraulic.yields * tyre
-            structure_yield = truth.structure_hydraulic.yields * cell
+            ground_before, structure_before = ground_yield, structure_yield
+            ground_yield += STEP / truth.yielding * (-truth.ground_hydraulic.yields * tyre - ground_yield)
+            structure_yield += STEP / truth.yielding * (truth.structure_hydraulic.yields * cell - structure_yield)
             ground, structure = next_ground, next_structure
     return len(demands)
 
 
-def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator, missed: Array | None = None) -> dict[str, Any]:
-    """A whole test: the commands and sensors as recorded, shape (ticks, 4)."""
+def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator) -> tuple[Array, Array]:
+    """A whole test: the commands and sensors as recorded, shape (ticks, 4) each."""
     ticks = len(demands)
     time = np.arange(ticks) * 1e-3
-    of = (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
-    phases = random.uniform(0.0, 2.0 * np.pi, 4)
-    noise = np.column_stack(
-        [s.white * random.standard_normal(ticks) + s.mains * np.sin(2 * np.pi * 50.0 * time + p) for s, p in zip(of, phases, strict=True)]
-    )
+    noise = np.empty((ticks, 4))
+    for number, sensor in enumerate((truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)):
+        mains = sensor.mains * np.sin(2 * np.pi * 50.0 * time + random.uniform(0.0, 2.0 * np.pi))
+        noise[:, number] = sensor.white * random.standard_normal(ticks) + mains
     absent = (random.random(ticks) < truth.missed).astype(float)
     absent[0] = 0.0
     commands, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
-    done = simulate(truth, law, np.ascontiguousarray(demands), noise, absent, commands, sensors)
-    return {"commands": commands[:done], "sensors": sensors[:done], "ticks": done}
+    done = simulate(truth, law, np.ascontiguousarray(demands), np.empty(0), noise, absent, commands, sensors)
+    return commands[:done], sensors[:done]
+
+
+def quiet(truth: Truth, law: Law, commands: Array) -> Array:
+    """The sensors without noise under given commands, shape (ticks, 4) both."""
+    ticks = len(commands)
+    out, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
+    demands, voltages = np.ascontiguousarray(commands[:, :3]), np.ascontiguousarray(commands[:, 3])
+    simulate(truth, law, demands, voltages, np.zeros((ticks, 4)), np.zeros(ticks), out, sensors)
+    return sensors

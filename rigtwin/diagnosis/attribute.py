@@ -19,11 +19,11 @@ from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
 
 THREADS = 2
-PRICE = 12.0
+PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
-DETECTED = 300.0
+DETECTED = 60.0
 """χ² that an effect must explain to be a finding."""
-RELATIVE = 0.02
+RELATIVE = 0.002
 """Share of the gap that a second effect must explain to be named."""
 UNEXPLAINED = 0.12
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
@@ -31,9 +31,9 @@ ENOUGH = 0.90
 """Share of the gap that effects must explain for them to be named at all, if something is left."""
 SLACK = 0.01
 """Share of the gap that the form of an effect may leave without anything else being wrong."""
-TEMPER = 20.0
+TEMPER = 4.0
 """χ² by which explanations must differ for the better one to be e^½ times as likely."""
-FORM_TEMPER = 0.1
+FORM_TEMPER = 0.05
 """How much of what is left widens that."""
 WITHIN_TOLERANCE = 1.5
 """Tolerances below which a deviation is no finding."""
@@ -87,8 +87,11 @@ def library(evidence: Evidence) -> list[Effect]:
 
 
 def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
-    """Whether an effect is no more than its declared tolerance."""
-    effect, values = fit.effects[0], fit.values[0]
+    """Whether one of the effects is no more than its declared tolerance."""
+    return any(_tolerated(effect, values[0], evidence) for effect, values in zip(fit.effects, fit.values, strict=True))
+
+
+def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
     parameter = effect.kind.parameters[0]
     of = {("motor", "gain"): ("motor", "constant")}.get((effect.group, parameter), (effect.group, parameter))
     tolerance = tolerance_of(*of)
@@ -98,7 +101,7 @@ def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
     nominal, width = getattr(getattr(plant, effect.group), parameter), tolerance.width(plant)
     if of[1] != parameter:
         width /= getattr(getattr(plant, effect.group), of[1])
-    return abs(values[0] - nominal) <= WITHIN_TOLERANCE * width
+    return abs(value - nominal) <= WITHIN_TOLERANCE * width
 
 
 def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: None) -> Attribution:
@@ -133,7 +136,7 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
                 pairs += mapped(lambda pair: fitter.refined(*pair), fitter.seconds(leader, effects, SECONDS))
             pairs.sort(key=_priced)
             again = mapped(lambda fit: fitter.refined(fit.effects, fit.values, Space(evidence, fit.plant)), pairs[:3])
-            tried += [pair for pair in [*again, *pairs[3:]] if _both_count(pair, first, nothing, gap)]
+            tried += [pair for pair in [*again, *pairs[3:]] if _both_count(pair, first, gap) and not within_tolerance(pair, evidence)]
     return _judged(nothing, tried, first, evidence)
 
 
@@ -145,7 +148,7 @@ def _left(misfit: float, evidence: Evidence) -> float:
     return max(misfit - evidence.size, 0.0)
 
 
-def _both_count(pair: Fit, first: Fit, nothing: Fit, gap: float) -> bool:
+def _both_count(pair: Fit, first: Fit, gap: float) -> bool:
     """Whether a second effect explains enough to be named beside the best single one."""
     return first.misfit - pair.misfit > max(DETECTED, RELATIVE * gap)
 

@@ -91,13 +91,14 @@ def _mechanics(
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
                 drive(mechanics, mechanics.carriage, carriage[now], carriage[now + 1])
+            mechanics.applied[mechanics.carriage] = 0.0
             touch(mechanics, contacts)
             if driven:
                 mechanics.applied[mechanics.carriage] = motor_force(mechanics)
             else:
                 share = substep / substeps
                 load = (1.0 - share) * force[tick] + share * following
-                mechanics.applied[mechanics.carriage] = -load - 0.5 * contacts.rail.asymmetry
+                mechanics.applied[mechanics.carriage] -= load
             brace(mechanics)
             forward(mechanics.model, mechanics.data, 0, 1 if substep else 0)
             if substep == 0:

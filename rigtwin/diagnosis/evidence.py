@@ -15,10 +15,11 @@ from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from controllers import Measurements
 from rigtwin.arrays import Array
+from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.noise import white_noise, without_mains
 from rigtwin.diagnosis.reduced import Reduced
-from rigtwin.diagnosis.tolerances import TOLERANCES, WITHIN
+from rigtwin.diagnosis.tolerances import TOLERANCES
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 
@@ -32,6 +33,8 @@ STARTED = 0.7
 """s, from which a test counts in full: by then the plates have left whatever they started from."""
 UNSEEN = 0.3
 """Share of that which does not count at all."""
+SPIKE = 4.0
+"""Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
 SMOOTHED = 8
@@ -91,6 +94,29 @@ def _smallest_step(row: Array) -> float:
     return float(np.min(np.diff(values))) if len(values) > 1 else 0.0
 
 
+@kernel
+def despike(signal: Array, height: float) -> None:
+    """Replaces what stands out of the median of seven neighbours by more than `height`, in place."""
+    ticks = len(signal)
+    if ticks < 7:
+        return
+    window = np.empty(7)
+    before = signal[:3].copy()
+    for tick in range(3, ticks - 3):
+        here = signal[tick]
+        window[:3] = before
+        window[3:] = signal[tick : tick + 4]
+        # Most samples lie well within their neighbours' range: no median is needed for them.
+        low = high = window[0]
+        for value in window:
+            low, high = min(low, value), max(high, value)
+        before[0], before[1], before[2] = before[1], before[2], here
+        if high - low > height:
+            middle = np.sort(window)[3]
+            if abs(here - middle) > height:
+                signal[tick] = middle
+
+
 class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
@@ -126,6 +152,17 @@ class Evidence:
         """The sensors of every recording, shape (4, ticks) each."""
         return [reduced.sensed(plant) for reduced in self._reduced]
 
+    def differences(self, plant: Plant) -> list[Array]:
+        """Measured less predicted, spikes apart, shape (4, ticks) each: what a friction that changes sign a tick early or late
+        leaves says nothing of its size, and jumps when anything changes."""
+        found = []
+        for each, predicted in zip(self.lines, self.predicted(plant), strict=True):
+            difference = each.measured - predicted
+            for row, noise in zip(difference, each.noise, strict=True):
+                despike(row, SPIKE * float(noise))
+            found.append(difference)
+        return found
+
     def whitened(self, differences: Sequence[Array]) -> Array:
         """Differences in the time domain, shape (4, ticks) each, as one whitened vector."""
         parts = []
@@ -136,14 +173,13 @@ class Evidence:
 
     def residual(self, plant: Plant) -> Array:
         """Measured less predicted."""
-        predicted = self.predicted(plant)
-        return self.whitened([each.measured - p for each, p in zip(self.lines, predicted, strict=True)])
+        return self.whitened(self.differences(plant))
 
     def nuisances(self, plant: Plant) -> Array:
-        """What a standard deviation of each tolerance does to the prediction, shape (size, tolerances)."""
+        """What each tolerance's half width does to the prediction, shape (size, tolerances)."""
         before = self.predicted(plant)
         columns = []
         for tolerance in TOLERANCES:
             after = self.predicted(tolerance.shifted(plant, 1.0))
-            columns.append(self.whitened([(b - a) / WITHIN for a, b in zip(before, after, strict=True)]))
+            columns.append(self.whitened([b - a for a, b in zip(before, after, strict=True)]))
         return np.stack(columns, axis=1)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from rigtwin.arrays import Array
 from rigtwin.diagnosis.evidence import Evidence
@@ -14,12 +13,15 @@ from rigtwin.diagnosis.trials import Trials, swings, trials
 from rigtwin.effects import Effect
 from rigtwin.parameters import Plant
 
-STIFFNESS = 4.0
-"""How much more a tolerance's prior weighs than one datum: form errors add up over thousands of lines, tolerances must not
-take them up."""
+PRIOR = 1.0
+"""χ² that a tolerance costs at its half width."""
+BEYOND = 1.2
+"""Half widths that no tolerance exceeds: what is more is a finding."""
 ITERATIONS = 8
-REFINED = 2
-"""Starts that are followed to their end."""
+REFINED = 3
+"""Starts that are followed to their end at most."""
+WORTH = 0.5
+"""Share of the best start's gain that another may lack and still be followed."""
 
 
 Values = tuple[tuple[float, ...], ...]
@@ -51,29 +53,46 @@ def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequen
 
 
 class Space:
-    """The tolerances about one plant: what they can take up of a residual at what price."""
+    """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
 
     def __init__(self, evidence: Evidence, plant: Plant) -> None:
         self._columns = evidence.nuisances(plant)
-        normal = self._columns.T @ self._columns + STIFFNESS * np.eye(self._columns.shape[1])
-        self._factor = cho_factor(normal)
-
-    def product(self, left: Array, right: Array) -> Array:
-        """leftᵀ·right with the tolerances projected out."""
-        a, b = self._columns.T @ left, self._columns.T @ right
-        return left.T @ right - a.T @ cho_solve(self._factor, b)
-
-    def misfit(self, residual: Array) -> float:
-        """min over tolerances of |residual − what they do|² + their prior."""
-        return float(self.product(residual, residual))
+        self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
     def nuisances(self, residual: Array) -> Array:
-        """The tolerances at that minimum, in standard deviations."""
-        return cho_solve(self._factor, self._columns.T @ residual)
+        """The tolerances that take up most of a residual, in half widths."""
+        wanted = self._columns.T @ residual
+        found = np.zeros(len(wanted))
+        free = np.ones(len(wanted), bool)
+        for _ in range(len(wanted)):
+            right = wanted[free] - self._normal[np.ix_(free, ~free)] @ found[~free]
+            found[free] = np.linalg.solve(self._normal[np.ix_(free, free)], right)
+            beyond = free & (np.abs(found) > BEYOND)
+            if not beyond.any():
+                break
+            found[beyond] = np.sign(found[beyond]) * BEYOND
+            free &= ~beyond
+        return found
 
     def less(self, residual: Array) -> Array:
         """The residual less what the tolerances take up."""
         return residual - self._columns @ self.nuisances(residual)
+
+    def misfit(self, residual: Array) -> float:
+        """min over tolerances of |residual − what they do|² + their prior."""
+        found = self.nuisances(residual)
+        left = residual - self._columns @ found
+        return float(left @ left + PRIOR * found @ found)
+
+    def normal_equations(self, jacobian: Array, residual: Array) -> tuple[Array, Array]:
+        """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's columns, with all
+        tolerances that are not at their bound free beside them."""
+        found = self.nuisances(residual)
+        free = np.abs(found) < BEYOND
+        columns = self._columns[:, free]
+        shared = columns.T @ jacobian
+        normal = jacobian.T @ jacobian - shared.T @ np.linalg.solve(self._normal[np.ix_(free, free)], shared)
+        return normal, jacobian.T @ (residual - self._columns @ found)
 
 
 class Fitter:
@@ -100,7 +119,10 @@ class Fitter:
             responses.append((start, (self._nominal - residual).astype(np.float32)))
         self._responses[effect] = responses
         scored.sort()
-        return min((self.refined((effect,), (start,)) for _, start in scored[:REFINED]), key=lambda fit: fit.misfit)
+        # Another start is followed too where it comes near the best; where none helps, the best is followed alone.
+        enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
+        followed = [start for number, (misfit, start) in enumerate(scored[:REFINED]) if number == 0 or misfit < enough]
+        return min((self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit)
 
     def seconds(self, first: Fit, effects: Sequence[Effect], count: int) -> list[tuple[tuple[Effect, ...], Values, Space]]:
         """The likeliest second effects beside `first`, by how well their responses at the nominal plant resemble what it
@@ -150,8 +172,7 @@ class Fitter:
                 shifted[number] += step
                 columns.append((residual(shifted) - left) / (step / steps[number]))
             jacobian = np.stack(columns, axis=1)
-            normal = space.product(jacobian, jacobian)
-            gradient = space.product(jacobian, left)
+            normal, gradient = space.normal_equations(jacobian, left)
             damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
             move = -np.linalg.solve(damped, gradient) * steps
             better = False

@@ -25,9 +25,13 @@ from rigtwin.friction import breakaway
 from rigtwin.parameters import Computer, Cylinder, Motor, Plant
 from rigtwin.plant import YIELDING, Contacts, contacts
 
-
 KEPT = 64
 """Motions of plates that are kept."""
+
+KEPT_MOTIONS = 7
+"""Motions of the whole plant that are kept."""
+MECHANICAL = ("carriage", "rail", "tyre", "motor", "ground_cylinder", "structure_cylinder", "computer")
+"""Components that the true motion depends on."""
 
 
 class Plate(NamedTuple):
@@ -82,31 +86,37 @@ def plate(
 
 
 @compilable
-def sliding(rhs: float, inertia: float, rail: float, motor: float, plate_velocity: float) -> float:
-    """The velocity v that solves inertia·v + rail·Sgn(v) + motor·Sgn(v − plate_velocity) ∋ rhs, for impulses in Ns."""
-    low, high = min(0.0, plate_velocity), max(0.0, plate_velocity)
-    below = (rhs + rail + motor) / inertia
-    if below < low:
+def sliding(rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float) -> float:
+    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
+    against positive and negative v; motor: against positive and negative plate − v, plate being the plate's velocity."""
+    below = (rhs + rail[1] + motor[0]) / inertia
+    if below < min(0.0, plate):
         return below
-    above = (rhs - rail - motor) / inertia
-    if above > high:
+    above = (rhs - rail[0] - motor[1]) / inertia
+    if above > max(0.0, plate):
         return above
-    between = (rhs - rail + motor) / inertia if plate_velocity > 0.0 else (rhs + rail - motor) / inertia
-    return min(max(between, low), high)
+    between = (rhs - rail[0] + motor[0]) / inertia if plate > 0.0 else (rhs + rail[1] - motor[1]) / inertia
+    return min(max(between, min(0.0, plate)), max(0.0, plate))
 
 
 @compilable
-def motor_friction(rhs: float, inertia: float, rail: float, motor: float, plate_velocity: float, velocity: float) -> float:
+def motor_friction(
+    rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float, velocity: float
+) -> float:
     """The dry friction of the motor at that solution, as an impulse on the carriage in Ns."""
-    if velocity < plate_velocity:
-        return motor
-    if velocity > plate_velocity:
-        return -motor
+    if velocity < plate:
+        return motor[0]
+    if velocity > plate:
+        return -motor[1]
     left = inertia * velocity - rhs
-    if velocity != 0.0:
-        return min(max(left + math.copysign(rail, velocity), -motor), motor)
-    # Both stick: the rail carries what it can, as at the start of a test before anything has moved.
-    return left + min(max(-left, -rail), rail)
+    if velocity > 0.0:
+        left += rail[0]
+    elif velocity < 0.0:
+        left -= rail[1]
+    else:
+        # Both stick: the rail carries what it can, as at the start of a test before anything has moved.
+        left += min(max(-left, -rail[1]), rail[0])
+    return min(max(left, -motor[1]), motor[0])
 
 
 @kernel
@@ -133,7 +143,6 @@ def _mechanics(
     inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
     share = h / (YIELDING + h)
     for tick in range(len(voltage)):
-        steady = pushed[tick] - 0.5 * now.rail.asymmetry
         for step in range(-1, steps):
             # Before the tick's commands act, once as if the old ones went on: that is what the sensors see.
             place = tick * steps + max(step, 0)
@@ -150,26 +159,27 @@ def _mechanics(
                 ground_velocity += (now.yielded[0] - ground_before) / h
             travel = structure_now - x
             deflection = ground_now - x
-            rail, motor = now.rail.coulomb, now.motor.coulomb
+            rail, motor = (h * now.rail.coulomb, h * now.rail.coulomb), (h * now.motor.coulomb, h * now.motor.coulomb)
             bias = 0.0
             if now.changing:
-                rail = breakaway(now.rail, now.rail_gap, x, v)
-                motor = breakaway(now.motor, now.motor_gap, travel, plate_velocity - v)
+                forward, backward = breakaway(now.rail, now.rail_gap, x, v)
+                rail = (h * forward, h * backward)
+                forward, backward = breakaway(now.motor, now.motor_gap, travel, plate_velocity - v)
+                motor = (h * forward, h * backward)
                 bias = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-                bias -= 0.5 * now.motor.asymmetry
-            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias + steady)
+            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias + pushed[tick])
             rhs, total = free, inertia
             if deflection > 0.0:
                 spring = now.stiffness * deflection * max(1.0 + now.hardening * deflection, 0.0)
                 rhs, total = free + h * (spring + now.damping * ground_velocity), inertia + h * now.damping
-            velocity = sliding(rhs, total, h * rail, h * motor, plate_velocity)
+            velocity = sliding(rhs, total, rail, motor, plate_velocity)
             tyre = 0.0
             if deflection > 0.0:
                 tyre = spring + now.damping * (ground_velocity - velocity)
                 if tyre < 0.0:
                     tyre, rhs, total = 0.0, free, inertia
-                    velocity = sliding(rhs, total, h * rail, h * motor, plate_velocity)
-            dry = motor_friction(rhs, total, h * rail, h * motor, plate_velocity, velocity) / h
+                    velocity = sliding(rhs, total, rail, motor, plate_velocity)
+            dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
             cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
             if step < 0:
                 out[0, tick], out[1, tick], out[2, tick], out[3, tick] = ground_now, structure_now, travel, cell
@@ -193,6 +203,7 @@ class Reduced:
         self._configuration = configuration
         self._start, self._preload = configuration.controller.start, configuration.controller.preload
         self._period, self._steps = configuration.timing.period, steps
+        self._last: dict[tuple[object, ...], Array] = {}
         self._plates: dict[tuple[object, ...], Plate] = {}
 
     def finer(self) -> Reduced:
@@ -250,6 +261,11 @@ class Reduced:
 
     def sensed(self, plant: Plant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
-        true = self.true(plant)
+        mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
+        true = self._last.get(mechanical)
+        if true is None:
+            true = self.true(plant)
+            # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
+            self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
 

@@ -6,10 +6,6 @@ from dataclasses import dataclass
 
 from rigtwin.parameters import Plant
 
-WITHIN = 2.0
-"""Standard deviations that a declared tolerance spans to either side."""
-
-
 @dataclass(frozen=True)
 class Tolerance:
     """A declared tolerance of one parameter. of: the group and parameter; half_width: in the parameter's unit, or as a

@@ -8,7 +8,6 @@ from itertools import product
 
 import numpy as np
 
-from rigtwin.arrays import Array
 from rigtwin.effects import Effect
 from rigtwin.parameters import Cylinder, Lvdt, Motor, Plant
 from rigtwin.recording import Recording
@@ -17,12 +16,20 @@ LEAST_FRICTION = 10.0
 """N; a change of friction is tried in shares of what there is, or of this."""
 
 
+SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
+"""Of the time; a limit is looked for at the values that a command exceeds for the rest of it."""
+
+BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
+"""Shares of a known limit at which a lower one is looked for."""
+
+
 @dataclass(frozen=True)
 class Swing:
-    """How far and fast a command went. largest: of its magnitude, in its unit; fastest: of its rate, unit/s."""
+    """How far and fast a command went: the magnitude, in its unit, and the rate, unit/s, that it stays below for these
+    `SHARES` of the time."""
 
-    largest: float
-    fastest: float
+    largest: tuple[float, ...]
+    fastest: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -39,11 +46,9 @@ def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
     found: dict[str, Swing] = {}
     for component, name in commands.items():
         columns = [(recording.column("/command", name), recording.period) for recording in recordings]
-        rates: list[Array] = [np.abs(np.diff(column)) / period for column, period in columns]
-        found[component] = Swing(
-            max(float(np.max(np.abs(column))) for column, _ in columns),
-            max(float(np.quantile(rate, 0.999)) for rate in rates),
-        )
+        size = np.concatenate([np.abs(column) for column, _ in columns])
+        rate = np.concatenate([np.abs(np.diff(column)) / period for column, period in columns])
+        found[component] = Swing(tuple(np.quantile(size, SHARES).tolist()), tuple(np.quantile(rate, SHARES).tolist()))
     return found
 
 
@@ -94,15 +99,20 @@ def _deadband(effect: Effect, plant: Plant, swing: Swing) -> Trials:
 
 
 def _saturation(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-    return _around(max(swing.largest, 1e-3), (0.97, 0.9, 0.8, 0.65, 0.5), 0.005)
+    return _limits(swing.largest)
 
 
 def _rate_limit(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-    fastest = max(swing.fastest, 1e-2)
     component = getattr(plant, effect.group)
     if isinstance(component, Cylinder):
-        fastest = min(fastest, component.speed_limit)
-    return _around(fastest, (0.9, 0.7, 0.5, 0.3, 0.15, 0.05), 0.01)
+        return _limits(tuple(min(fastest, share * component.speed_limit) for fastest, share in zip(swing.fastest, BELOW, strict=True)))
+    return _limits(swing.fastest)
+
+
+def _limits(values: tuple[float, ...]) -> Trials:
+    """A limit at each of these values."""
+    tried = tuple(max(value, 1e-3 * max(values), 1e-6) for value in values)
+    return Trials(tuple((value,) for value in tried), (0.004 * max(float(np.median(tried)), 1e-6),))
 
 
 def _nominal(shares: tuple[float, ...], step: float) -> Callable[[Effect, Plant, Swing], Trials]:
@@ -141,4 +151,4 @@ TRIALS: dict[str, Callable[[Effect, Plant, Swing], Trials]] = {
 
 def trials(effect: Effect, plant: Plant, swing: dict[str, Swing]) -> Trials:
     """Where to start, and how finely to step."""
-    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, Swing(0.0, 0.0)))
+    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, Swing((0.0,) * len(SHARES), (0.0,) * len(SHARES))))
