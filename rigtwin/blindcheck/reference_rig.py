@@ -387,10 +387,10 @@ def simulate(
                         # Both stick: what the rail can bear, it bears.
                         rod_force = rod_force - max(-rail_up, min(rail_down, rod_force))
                     rod_force = max(-rod_down, min(rod_up, rod_force))
-            cell = force + ripple - smooth_rod - rod_force
             acceleration = (v - before) / STEP
             x += STEP * v
             force += (1.0 - math.exp(-STEP / truth.electrical)) * (truth.constant * asked - force)
+            cell = force + ripple - smooth_rod - rod_force
             ground_before, structure_before = ground_yield, structure_yield
             ground_yield += STEP / truth.yielding * (-truth.ground_hydraulic.yields * tyre - ground_yield)
             structure_yield += STEP / truth.yielding * (truth.structure_hydraulic.yields * cell - structure_yield)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Space
+from rigtwin.diagnosis.fit import Fit, Fitter
 from rigtwin.diagnosis.tolerances import tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
@@ -25,10 +25,12 @@ DETECTED = 60.0
 """χ² that an effect must explain to be a finding."""
 RELATIVE = 0.002
 """Share of the gap that a second effect must explain to be named."""
-UNEXPLAINED = 0.12
+UNEXPLAINED = 0.10
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
-ENOUGH = 0.90
+ENOUGH = 0.97
 """Share of the gap that effects must explain for them to be named at all, if something is left."""
+TOO_MUCH = 1.0
+"""χ² per degree of freedom above 1 from which what is left forbids to name anything."""
 SLACK = 0.01
 """Share of the gap that the form of an effect may leave without anything else being wrong."""
 TEMPER = 4.0
@@ -42,7 +44,11 @@ REFITTED = 6
 BEAM = 3
 """First effects to which a second is sought."""
 SECONDS = 8
-"""Second effects tried in full for each of them."""
+"""Second effects tried in full for each of them, where one leaves much."""
+FEW = 3
+"""Second effects tried in full where one leaves little."""
+FAR_BEHIND = 0.7
+"""Share of what the best effect explains that a first of two may lack."""
 MEMBER = 0.05
 """Probability from which an effect belongs to the class that is reported."""
 
@@ -119,23 +125,23 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
 
         singles = mapped(fitter.single, effects)
         singles.sort(key=_priced)
-        again = mapped(lambda fit: fitter.refined(fit.effects, fit.values, Space(evidence, fit.plant)), singles[:REFITTED])
+        again = mapped(fitter.settled, singles[:REFITTED])
         tried = again + singles[REFITTED:]
         tried.sort(key=_priced)
         first = tried[0]
-        nothing, expected = fitter.nothing, float(evidence.size)
-        gap = max(nothing.misfit - expected, 0.0)
-        if nothing.misfit - _priced(first) > DETECTED and _left(first.misfit, evidence) > max(
-            SLACK * gap, 0.25 * UNEXPLAINED * expected
-        ):
+        nothing = fitter.settled(fitter.nothing)
+        gap = max(nothing.misfit - evidence.expected, 0.0)
+        if nothing.misfit - _priced(first) > DETECTED:
+            much = _left(first.misfit, evidence) > max(SLACK * gap, UNEXPLAINED * evidence.expected)
             pairs = []
-            for leader in tried[:BEAM]:
+            for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
-                if leader.misfit - first.misfit > 0.7 * max(nothing.misfit - first.misfit, 0.0):
+                if leader.misfit - first.misfit > FAR_BEHIND * max(nothing.misfit - first.misfit, 0.0):
                     continue
-                pairs += mapped(lambda pair: fitter.refined(*pair), fitter.seconds(leader, effects, SECONDS))
+                hopeful = fitter.seconds(leader, effects, SECONDS if much else FEW, DETECTED)
+                pairs += mapped(lambda pair: fitter.refined(*pair), hopeful)
             pairs.sort(key=_priced)
-            again = mapped(lambda fit: fitter.refined(fit.effects, fit.values, Space(evidence, fit.plant)), pairs[:3])
+            again = mapped(fitter.settled, pairs[:3])
             tried += [pair for pair in [*again, *pairs[3:]] if _both_count(pair, first, gap) and not within_tolerance(pair, evidence)]
     return _judged(nothing, tried, first, evidence)
 
@@ -145,7 +151,7 @@ def _priced(fit: Fit) -> float:
 
 
 def _left(misfit: float, evidence: Evidence) -> float:
-    return max(misfit - evidence.size, 0.0)
+    return max(misfit - evidence.expected, 0.0)
 
 
 def _both_count(pair: Fit, first: Fit, gap: float) -> bool:
@@ -154,7 +160,7 @@ def _both_count(pair: Fit, first: Fit, gap: float) -> bool:
 
 
 def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence) -> Attribution:
-    expected = float(evidence.size)
+    expected = evidence.expected
     gap = max(nothing.misfit - expected, 0.0)
     pool = sorted([*tried, nothing], key=_priced)
     best = pool[0]
@@ -169,7 +175,6 @@ def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence) -> 
         found = False
     left = _left(best.misfit, evidence) / expected
     explained = (nothing.misfit - best.misfit) / gap if gap > 0.0 else 0.0
-    more = left > UNEXPLAINED and (1.0 - explained) > SLACK
-    unknown = more and (not found or explained < ENOUGH)
-    named = ranking[0] if found and not unknown else None
-    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, unknown or (more and found), single)
+    more = left > UNEXPLAINED
+    named = ranking[0] if found and not (more and (explained < ENOUGH or left > TOO_MUCH)) else None
+    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, single)

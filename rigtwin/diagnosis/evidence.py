@@ -17,7 +17,7 @@ from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
-from rigtwin.diagnosis.noise import white_noise, without_mains
+from rigtwin.diagnosis.noise import smallest_step, white_noise, without_mains
 from rigtwin.diagnosis.reduced import Reduced
 from rigtwin.diagnosis.tolerances import TOLERANCES
 from rigtwin.parameters import Plant
@@ -33,6 +33,8 @@ STARTED = 0.7
 """s, from which a test counts in full: by then the plates have left whatever they started from."""
 UNSEEN = 0.3
 """Share of that which does not count at all."""
+COARSE_BIT = 2.0
+"""Bits of this many times the white noise are seen in the signal."""
 SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
@@ -65,7 +67,7 @@ def lines(recording: Recording, mains: float) -> Lines:
     width = max(MAINS_WIDTH, 2.0 / (ticks * recording.period))
     off_mains = np.abs(frequency[kept] - mains) > width
     noise = np.array([white_noise(row) for row in measured])
-    resolution = np.array([_smallest_step(row) for row in measured])
+    resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     weight = np.empty((4, int(kept.sum())))
     fade = _fade(ticks, recording.period)
@@ -86,12 +88,6 @@ def _fade(ticks: int, period: float) -> Array:
     """Nothing of the start, where the rig's state is not known, then a rise to 1."""
     time, end = np.arange(ticks) * period, min(STARTED, 0.15 * ticks * period)
     return 0.5 - 0.5 * np.cos(np.pi * np.clip((time / end - UNSEEN) / (1.0 - UNSEEN), 0.0, 1.0))
-
-
-def _smallest_step(row: Array) -> float:
-    """The smallest change between neighbouring values that the signal shows, its resolution if it is coarse."""
-    values = np.unique(row)
-    return float(np.min(np.diff(values))) if len(values) > 1 else 0.0
 
 
 @kernel
@@ -120,7 +116,8 @@ def despike(signal: Array, height: float) -> None:
 class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
-    residual: whitened, of unit variance if the plant is right, shape (size,). Several recordings stand one after another.
+    Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if nothing but white noise is
+    left. Several recordings stand one after another.
     """
 
     def __init__(self, recordings: Sequence[Recording], configurations: Sequence[Configuration], steps: int = 4) -> None:
@@ -132,12 +129,16 @@ class Evidence:
             Reduced(*(recording.column("/command", name) for name in ("ground", "structure", "voltage")), c, steps)
             for recording, c in zip(recordings, configurations, strict=True)
         ]
-        self._loosen()
-        self.size = sum(2 * int(np.count_nonzero(each.weight)) for each in self.lines)
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
         for each, c, predicted in zip(self.lines, self.configurations, self.predicted(self.plant), strict=True):
             for row, model in zip(each.measured, predicted, strict=True):
                 row -= (row - model) - without_mains(row - model, c.timing.period, c.plant.mains.frequency)
+        self._loosen()
+        self._round()
+        self.expected = 0.0
+        for each in self.lines:
+            noise = float(each.fade @ each.fade) * each.noise**2
+            self.expected += float(np.sum(noise[:, None] * each.weight**2))
 
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
@@ -147,6 +148,16 @@ class Evidence:
             for row in range(4):
                 variance = COARSE * 0.5 * _smoothed(power[row])
                 each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
+
+    def _round(self) -> None:
+        """Adds what the bits of a coarse sensor leave, which is no white noise but follows the signal."""
+        for each, predicted in zip(self.lines, self.predicted(self.plant), strict=True):
+            for row in range(4):
+                bit = smallest_step(each.measured[row])
+                if bit > COARSE_BIT * each.noise[row]:
+                    power = np.abs(rfft(each.fade * (np.round(predicted[row] / bit) * bit - predicted[row]), each.length)) ** 2
+                    variance = 0.5 * COARSE * _smoothed(power[: len(each.frequency)])
+                    each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def predicted(self, plant: Plant) -> list[Array]:
         """The sensors of every recording, shape (4, ticks) each."""
@@ -176,10 +187,15 @@ class Evidence:
         return self.whitened(self.differences(plant))
 
     def nuisances(self, plant: Plant) -> Array:
-        """What each tolerance's half width does to the prediction, shape (size, tolerances)."""
+        """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""
         before = self.predicted(plant)
         columns = []
         for tolerance in TOLERANCES:
-            after = self.predicted(tolerance.shifted(plant, 1.0))
-            columns.append(self.whitened([b - a for a, b in zip(before, after, strict=True)]))
+            width = tolerance.width(self.plant)
+            after, scale = self.predicted(tolerance.shifted(plant, width)), 1.0
+            start = before
+            if tolerance.mechanical and width > 0.0:
+                # Friction answers a change unevenly: from both sides, half of it is gone.
+                start, scale = self.predicted(tolerance.shifted(plant, -width)), 0.5
+            columns.append(self.whitened([scale * (b - a) for a, b in zip(start, after, strict=True)]))
         return np.stack(columns, axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from rigtwin.arrays import Array
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.tolerances import TOLERANCES, shifted
 from rigtwin.diagnosis.trials import Trials, swings, trials
 from rigtwin.effects import Effect
 from rigtwin.parameters import Plant
@@ -17,6 +18,8 @@ PRIOR = 1.0
 """χ² that a tolerance costs at its half width."""
 BEYOND = 1.2
 """Half widths that no tolerance exceeds: what is more is a finding."""
+SETTLING = 2
+"""Times that the tolerances are taken anew at a fit."""
 ITERATIONS = 8
 REFINED = 3
 """Starts that are followed to their end at most."""
@@ -55,13 +58,19 @@ def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequen
 class Space:
     """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
 
-    def __init__(self, evidence: Evidence, plant: Plant) -> None:
+    def __init__(self, evidence: Evidence, plant: Plant, used: Array | None = None, effects: Sequence[Effect] = ()) -> None:
+        """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
         self._columns = evidence.nuisances(plant)
+        for number, tolerance in enumerate(TOLERANCES):
+            if any(e.group == tolerance.group and tolerance.parameter in e.kind.parameters for e in effects):
+                self._columns[:, number] = 0.0
+        self._used = np.zeros(len(TOLERANCES)) if used is None else used
+        self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
     def nuisances(self, residual: Array) -> Array:
         """The tolerances that take up most of a residual, in half widths."""
-        wanted = self._columns.T @ residual
+        wanted = self._columns.T @ (residual + self._taken)
         found = np.zeros(len(wanted))
         free = np.ones(len(wanted), bool)
         for _ in range(len(wanted)):
@@ -76,12 +85,12 @@ class Space:
 
     def less(self, residual: Array) -> Array:
         """The residual less what the tolerances take up."""
-        return residual - self._columns @ self.nuisances(residual)
+        return residual + self._columns @ (self._used - self.nuisances(residual))
 
     def misfit(self, residual: Array) -> float:
         """min over tolerances of |residual − what they do|² + their prior."""
         found = self.nuisances(residual)
-        left = residual - self._columns @ found
+        left = residual + self._columns @ (self._used - found)
         return float(left @ left + PRIOR * found @ found)
 
     def normal_equations(self, jacobian: Array, residual: Array) -> tuple[Array, Array]:
@@ -92,7 +101,7 @@ class Space:
         columns = self._columns[:, free]
         shared = columns.T @ jacobian
         normal = jacobian.T @ jacobian - shared.T @ np.linalg.solve(self._normal[np.ix_(free, free)], shared)
-        return normal, jacobian.T @ (residual - self._columns @ found)
+        return normal, jacobian.T @ (residual + self._columns @ (self._used - found))
 
 
 class Fitter:
@@ -124,9 +133,10 @@ class Fitter:
         followed = [start for number, (misfit, start) in enumerate(scored[:REFINED]) if number == 0 or misfit < enough]
         return min((self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit)
 
-    def seconds(self, first: Fit, effects: Sequence[Effect], count: int) -> list[tuple[tuple[Effect, ...], Values, Space]]:
+    def seconds(self, first: Fit, effects: Sequence[Effect], count: int, least: float) -> list[tuple[tuple[Effect, ...], Values, Space]]:
         """The likeliest second effects beside `first`, by how well their responses at the nominal plant resemble what it
-        leaves: effects, values to start from and tolerances, as `refined` takes them."""
+        leaves, if they promise to explain at least `least`: effects, values to start from and tolerances, as `refined` takes
+        them."""
         space = Space(self.evidence, first.plant)
         left = space.less(self.evidence.residual(first.plant))
         scored = []
@@ -134,7 +144,8 @@ class Fitter:
             if effect in first.effects:
                 continue
             best = (0.0, self._responses[effect][0][0])
-            for start, response in self._responses[effect]:
+            for start, raw in self._responses[effect]:
+                response = space.less(raw)
                 power = float(response @ response)
                 share = float(response @ left) / power if power > 0.0 else 0.0
                 # A response may be too strong or too weak, but not the other way round.
@@ -143,11 +154,30 @@ class Fitter:
                 best = max(best, (gain, start))
             scored.append((*best, effect))
         scored.sort(key=lambda item: -item[0])
-        return [((*first.effects, effect), (*first.values, start), space) for _, start, effect in scored[:count]]
+        return [((*first.effects, effect), (*first.values, start), space) for gain, start, effect in scored[:count] if gain > least]
 
-    def refined(self, effects: tuple[Effect, ...], start: Sequence[Sequence[float]], space: Space | None = None) -> Fit:
-        """Gauss-Newton with halved steps from a start."""
-        space = space or self.space
+    def settled(self, fit: Fit) -> Fit:
+        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant itself."""
+        used = np.zeros(len(TOLERANCES))
+        space = Space(self.evidence, fit.plant, used, fit.effects)
+        residual = self.evidence.residual(fit.plant)
+        for _ in range(SETTLING):
+            found = space.nuisances(residual)
+            used = np.array([share if t.mechanical else 0.0 for t, share in zip(TOLERANCES, found, strict=True)])
+            base = shifted(self.plant, self.plant, used)
+            space = Space(self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects)
+            fit = self.refined(fit.effects, fit.values, space, base)
+            residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
+        return fit
+
+    def refined(
+        self, effects: tuple[Effect, ...], start: Sequence[Sequence[float]], space: Space | None = None, base: Plant | None = None
+    ) -> Fit:
+        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
+        base: the plant without the effects."""
+        space, base = space or self.space, base or self.plant
+        if not effects:
+            return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
         sizes = [len(effect.kind.parameters) for effect in effects]
         steps = np.concatenate([self.trials(effect).steps for effect in effects])
         quantities = [quantity for effect in effects for quantity in effect.quantities().values()]
@@ -158,7 +188,7 @@ class Fitter:
             return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
         def residual(vector: Array) -> Array:
-            return self.evidence.residual(with_values(self.plant, effects, split(vector)))
+            return self.evidence.residual(with_values(base, effects, split(vector)))
 
         here = np.clip(np.concatenate([np.asarray(values, float) for values in start]), low, high)
         left = residual(here)

@@ -34,6 +34,19 @@ def white_noise(signal: Array) -> float:
     return (typical or rms(third)) / math.sqrt(20.0)
 
 
+def smallest_step(signal: Array) -> float:
+    """The signal's bit: the smallest difference of two of its values, rounding apart; 0 if it shows none."""
+    values = np.unique(signal)
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * max(float(np.ptp(signal)), 1e-300)]
+    if not len(steps):
+        return 0.0
+    bit = float(np.min(steps))
+    # On a lattice every step is a whole number of bits.
+    share = np.abs(steps / bit - np.round(steps / bit))
+    return bit if float(np.mean(share < 0.02)) > 0.9 else 0.0
+
+
 def rms(signal: Array) -> float:
     """Root mean square, mean included."""
     return float(np.sqrt(np.mean(signal**2)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers import Measurements
 from rigtwin.arrays import Array
-from rigtwin.diagnosis.noise import rms, white_noise, without_mains
+from rigtwin.diagnosis.noise import rms, smallest_step, white_noise, without_mains
 from rigtwin.parameters import LoadCell, Lvdt, Plant
 from rigtwin.recording import Recording
 
@@ -41,19 +41,6 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Plant) 
     # White noise as the bits leave it: a coarse bit adds a variance of its own.
     white = math.sqrt(max(white_noise(signal) ** 2 - bit**2 / 12.0, 0.0))
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
-
-
-def smallest_step(signal: Array) -> float:
-    """The signal's bit: the smallest difference of two of its values, rounding apart; 0 if it shows none."""
-    values = np.unique(signal)
-    steps = np.diff(values)
-    steps = steps[steps > 1e-9 * max(float(np.ptp(signal)), 1e-300)]
-    if not len(steps):
-        return 0.0
-    bit = float(np.min(steps))
-    # On a lattice every step is a whole number of bits.
-    share = np.abs(steps / bit - np.round(steps / bit))
-    return bit if float(np.mean(share < 0.02)) > 0.9 else 0.0
 
 
 def outstanding(recordings: Sequence[Recording], predicted: Sequence[Sequence[Array]], plant: Plant) -> tuple[Sampled, ...]:

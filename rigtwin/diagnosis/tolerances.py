@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigtwin.parameters import Plant
+
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -20,11 +22,16 @@ class Tolerance:
         """Its half width in the parameter's unit, at that plant."""
         return self.half_width * (abs(float(getattr(getattr(plant, self.group), self.parameter))) if self.relative else 1.0)
 
-    def shifted(self, plant: Plant, widths: float) -> Plant:
-        """The plant with this parameter that many half widths higher."""
+    def shifted(self, plant: Plant, amount: float) -> Plant:
+        """The plant with this parameter higher by that much, in its unit."""
         group = getattr(plant, self.group)
-        value = float(getattr(group, self.parameter)) + widths * self.width(plant)
+        value = float(getattr(group, self.parameter)) + amount
         return plant._replace(**{self.group: group._replace(**{self.parameter: value})})
+
+    @property
+    def mechanical(self) -> bool:
+        """Whether it changes the motion itself, and not only when or how it is sensed."""
+        return self.parameter in ("mass", "stiffness", "constant", "coulomb")
 
 
 LVDTS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt")
@@ -42,6 +49,14 @@ TOLERANCES = (
     *(Tolerance(path, "delay", TIMING) for path in ("motor", "ground_cylinder", "structure_cylinder", *LVDTS, "load_cell")),
 )
 """The suspension rig's: masses, stiffness, motor constant, friction, sensors, timing of each path."""
+
+
+def shifted(plant: Plant, nominal: Plant, widths: Sequence[float]) -> Plant:
+    """The plant with each tolerance used by so many half widths, those of the nominal plant."""
+    for tolerance, share in zip(TOLERANCES, widths, strict=True):
+        if share:
+            plant = tolerance.shifted(plant, share * tolerance.width(nominal))
+    return plant
 
 
 def tolerance_of(group: str, parameter: str) -> Tolerance | None:
