@@ -23,6 +23,15 @@ def multisines(configuration: Configuration, seed: int) -> Array:
     return np.column_stack([ground, structure, force])
 
 
+def fast_multisines(configuration: Configuration, seed: int) -> Array:
+    """Slow motions as in the imposed test at half its size, and force over 0.5–120 Hz, flat above 20 Hz: 50 N rms."""
+    time, random = time_of(configuration), random_of(seed)
+    ground = multisine(time, 0.2, 10.0, 0.1, 0.5, 0.0025, random)
+    structure = configuration.controller.start + multisine(time, 0.2, 20.0, 0.1, 0.5, 0.004, random)
+    force = FORCE_MEAN + multisine(time, 0.5, 20.0, 0.1, 0.5, 20.0, random) + multisine(time, 20.0, 120.0, 0.1, 0.0, 45.0, random)
+    return np.column_stack([ground, structure, force])
+
+
 EXPERIMENTS = (
     Experiment(
         "imposed",
@@ -30,5 +39,12 @@ EXPERIMENTS = (
         "for diagnosis",
         Configuration(controller=Settings(mode=Mode.IMPOSED)),
         multisines,
+    ),
+    Experiment(
+        "imposed-fast",
+        "imposed, with the force up to 120 Hz: tells a delay from a lag",
+        "for diagnosis",
+        Configuration(controller=Settings(mode=Mode.IMPOSED)),
+        fast_multisines,
     ),
 )

@@ -20,6 +20,7 @@ a first session:
   rigtwin plot drop.mcap -o drop.png            look at it
   rigtwin video drop.mcap -o drop.mp4           watch it
   rigtwin compare rig.mcap                      where a recording of the rig and the twin disagree
+  rigtwin diagnose rig.mcap --html why.html     why
 """
 
 
@@ -103,6 +104,39 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--json", type=Path, metavar="J.json", help="also write the figures to a file")
     _effect(compare, "compare with a twin that has an effect, e.g. coulomb@rail=80")
     settings(compare)
+
+    diagnose = command(
+        "diagnose",
+        "say why recordings of one rig and the twin disagree",
+        "Checks the data, fits every effect that the twin knows, and says which explains the gap, how sure that is, where it\n"
+        "lies, and how far the gap shrinks on data that were not fitted; or that there is no gap, or none that it knows.\n\n"
+        "examples:\n  rigtwin diagnose rig.mcap --html report.html --save-twin calibrated.toml\n"
+        "  rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap\n"
+        "  rigtwin compare rig.mcap --config calibrated.toml",
+    )
+    diagnose.add_argument("recordings", type=Path, nargs="+", metavar="recording", help="of one rig; all are explained together")
+    diagnose.add_argument("--json", type=Path, metavar="F.json", help="also write the answer for other programs")
+    diagnose.add_argument("--html", type=Path, metavar="F.html", help="also write a report to look at, one file")
+    diagnose.add_argument(
+        "--without", action="append", default=[], metavar="EFFECT", help="take this out of the twin first, e.g. coulomb@rail"
+    )
+    diagnose.add_argument(
+        "--held-out", nargs="+", type=Path, default=[], metavar="recording", help="judge the correction on these of the same rig"
+    )
+    diagnose.add_argument("--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config")
+    settings(diagnose)
+
+    blindcheck = command(
+        "blindcheck",
+        "check the diagnosis on recordings of another rig, whose defects are withheld from it",
+        "A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees the files alone;\n"
+        "then the key is opened, checked against its digest, and every answer is scored.",
+    )
+    blindcheck.add_argument("--cases", type=int, default=200, help="how many (default 200)")
+    blindcheck.add_argument("--seed", type=int, default=2026, help="of the referee's draws (default 2026)")
+    blindcheck.add_argument("--folder", type=Path, default=Path("blindcheck"), help="for recordings and answers; a second run goes on")
+    blindcheck.add_argument("--baselines", action="store_true", help="also score what cruder methods would have said")
+    blindcheck.add_argument("--json", type=Path, metavar="F.json", help="also write the scores to a file")
 
     reproduce = command(
         "reproduce",

@@ -254,6 +254,76 @@ def _write_json(path: Path, document: object) -> None:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
 
 
+def diagnose(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from experiments import EXPERIMENTS
+    from rigtwin.configuration import Configuration, Timing
+    from rigtwin.diagnosis.diagnose import diagnose as answer
+    from rigtwin.diagnosis.text import described
+    from rigtwin.effects import without
+    from rigtwin.parameters import Plant
+    from rigtwin.recording import load
+
+    base = _configured(Configuration(), parsed)
+    besides = base._replace(plant=Plant(), timing=base.timing._replace(timestep=Timing().timestep))
+    if besides != Configuration():
+        raise RigtwinError("diagnose changes the plant and timing.timestep only; all other settings are the recording's own")
+    for name in parsed.without:
+        base = without(base, name)
+    inputs = [*parsed.recordings, *parsed.held_out]
+    for out in (parsed.json, parsed.html, parsed.save_twin):
+        if out is not None:
+            _apart(out, *inputs)
+            if not out.parent.is_dir():
+                raise RigtwinError(f"cannot write {out}: its folder does not exist")
+    if len({path.resolve() for path in inputs}) < len(inputs):
+        raise RigtwinError("a recording is named twice; each counts once, and what is held out must not be fitted")
+    recordings, held_out = [load(path) for path in parsed.recordings], [load(path) for path in parsed.held_out]
+    tests = [(e.name, e.configuration, e.demands) for e in EXPERIMENTS.values() if e.name in NEXT_TESTS]
+    with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
+
+        def progress(stage: str, steps: int) -> None:
+            bar.set_description(stage, refresh=False)
+            bar.update(steps)
+
+        outcome = answer(recordings, base, held_out, tests, progress)
+    print(described(outcome.diagnosis))
+    if parsed.json is not None:
+        _write_json(parsed.json, outcome.diagnosis.document())
+    if parsed.html is not None:
+        from rigtwin.diagnosis.report import write
+
+        write(parsed.html, outcome)
+        print(f"report in {parsed.html}")
+    if parsed.save_twin is not None:
+        from rigtwin.diagnosis.calibrated import save
+
+        save(parsed.save_twin, outcome)
+        print(f"corrected twin in {parsed.save_twin}; use it with --config")
+    return 1 if outcome.diagnosis.verdict == "unusable" else 0
+
+
+NEXT_TESTS = ("imposed", "imposed-fast", "road10", "road1.6", "drop")
+"""Experiments that a diagnosis may propose."""
+
+
+def blindcheck(parsed: Namespace) -> int:
+    from tqdm import tqdm
+
+    from rigtwin.blindcheck.check import check
+    from rigtwin.blindcheck.score import document, table
+
+    if parsed.cases < 1 or parsed.seed < 0:
+        raise RigtwinError("--cases must be at least 1, --seed at least 0")
+    with tqdm(total=2 * parsed.cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar:
+        result = check(parsed.folder, parsed.cases, parsed.seed, parsed.baselines, bar.update)
+    print(table(result))
+    if parsed.json is not None:
+        _write_json(parsed.json, document(result))
+    return 0
+
+
 def reproduce(parsed: Namespace) -> int:
     from tqdm import tqdm
 
@@ -277,5 +347,7 @@ COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "video": video,
     "export": export,
     "compare": compare,
+    "diagnose": diagnose,
+    "blindcheck": blindcheck,
     "reproduce": reproduce,
 }

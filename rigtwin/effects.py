@@ -112,6 +112,25 @@ def find(name: str) -> Effect:
     raise RigtwinError(f"unknown effect {name!r}; expected KIND@COMPONENT with a component of {', '.join(components)}")
 
 
+def without(configuration: Configuration, name: str) -> Configuration:
+    """The configuration with an effect of the nominal rig taken out, such as `coulomb@rail`: its magnitude set to 0.
+
+    Raises RigtwinError if the rig has none of it to take out.
+    """
+    effect = find(name)
+    parameter, quantity = next(iter(effect.quantities().items()))
+    value = effect.nominal(configuration.plant)[parameter]
+    if value == 0.0 or quantity.low > 0.0:
+        there = [e.name for e in candidates(configuration.plant) if _removable(e, configuration.plant)]
+        raise RigtwinError(f"--without {name}: the twin has none to take out; it has {', '.join(there)}")
+    return effect.at(configuration, {parameter: 0.0})
+
+
+def _removable(effect: Effect, plant: Plant) -> bool:
+    parameter, quantity = next(iter(effect.quantities().items()))
+    return effect.nominal(plant)[parameter] not in (0.0, quantity.high) and quantity.low <= 0.0
+
+
 def applied(configuration: Configuration, texts: list[str]) -> Configuration:
     """The configuration with effects as `--effect` takes them: `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or
     `setting@controller=kp:0.5` for a setting that is not what the recording will say.

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter
+from rigtwin.diagnosis.fit import Fit, Fitter, with_values
 from rigtwin.diagnosis.tolerances import tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
@@ -22,7 +22,9 @@ THREADS = 2
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
 DETECTED = 60.0
-"""χ² that an effect must explain to be a finding."""
+"""χ² that an effect must explain to be a finding,"""
+NOTICEABLE = 0.015
+"""and share of what noise alone leaves: less is a trace that no closed loop shows."""
 RELATIVE = 0.002
 """Share of the gap that a second effect must explain to be named."""
 UNEXPLAINED = 0.10
@@ -70,7 +72,8 @@ class Explanation:
 class Attribution:
     """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be named, None for none;
     ranking: all tried, the likeliest first; explained: share of the gap; left: χ² per degree of freedom above 1 after it;
-    single: the best single effect, whatever becomes of it."""
+    unknown: whether what is left is a gap; single: the best single effect, whatever becomes of it; shares: of the gap, of each
+    effect named; silent: effects that no size tried makes noticeable on this evidence."""
 
     nothing: Fit
     expected: float
@@ -80,6 +83,8 @@ class Attribution:
     left: float
     unknown: bool
     single: Fit
+    shares: dict[str, float]
+    silent: tuple[Effect, ...]
 
     @property
     def gap(self) -> float:
@@ -131,19 +136,21 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
         first = tried[0]
         nothing = fitter.settled(fitter.nothing)
         gap = max(nothing.misfit - evidence.expected, 0.0)
-        if nothing.misfit - _priced(first) > DETECTED:
+        least = detectable(evidence)
+        if nothing.misfit - _priced(first) > least:
             much = _left(first.misfit, evidence) > max(SLACK * gap, UNEXPLAINED * evidence.expected)
             pairs = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
                 if leader.misfit - first.misfit > FAR_BEHIND * max(nothing.misfit - first.misfit, 0.0):
                     continue
-                hopeful = fitter.seconds(leader, effects, SECONDS if much else FEW, DETECTED)
+                hopeful = fitter.seconds(leader, effects, SECONDS if much else FEW, least)
                 pairs += mapped(lambda pair: fitter.refined(*pair), hopeful)
             pairs.sort(key=_priced)
             again = mapped(fitter.settled, pairs[:3])
-            tried += [pair for pair in [*again, *pairs[3:]] if _both_count(pair, first, gap) and not within_tolerance(pair, evidence)]
-    return _judged(nothing, tried, first, evidence)
+            tried += [pair for pair in [*again, *pairs[3:]] if first.misfit - pair.misfit > max(least, RELATIVE * gap) and not within_tolerance(pair, evidence)]
+    silent = tuple(effect for effect in effects if fitter.largest(effect) < DETECTED)
+    return _judged(nothing, tried, first, evidence, silent)
 
 
 def _priced(fit: Fit) -> float:
@@ -154,12 +161,12 @@ def _left(misfit: float, evidence: Evidence) -> float:
     return max(misfit - evidence.expected, 0.0)
 
 
-def _both_count(pair: Fit, first: Fit, gap: float) -> bool:
-    """Whether a second effect explains enough to be named beside the best single one."""
-    return first.misfit - pair.misfit > max(DETECTED, RELATIVE * gap)
+def detectable(evidence: Evidence) -> float:
+    """χ² that an effect must explain to be a finding on this evidence."""
+    return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
-def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence) -> Attribution:
+def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence, silent: tuple[Effect, ...]) -> Attribution:
     expected = evidence.expected
     gap = max(nothing.misfit - expected, 0.0)
     pool = sorted([*tried, nothing], key=_priced)
@@ -170,11 +177,25 @@ def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence) -> 
     ranking = tuple(
         Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True)
     )
-    found = nothing.misfit - _priced(best) > DETECTED and bool(best.effects)
+    found = nothing.misfit - _priced(best) > detectable(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
     left = _left(best.misfit, evidence) / expected
     explained = (nothing.misfit - best.misfit) / gap if gap > 0.0 else 0.0
     more = left > UNEXPLAINED
     named = ranking[0] if found and not (more and (explained < ENOUGH or left > TOO_MUCH)) else None
-    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, single)
+    shares = _shares(named.fit, evidence, explained) if named is not None else {}
+    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, single, shares, silent)
+
+
+def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:
+    """The share of the gap of each effect: what would come back without it, of what would for all."""
+    if len(fit.effects) == 1:
+        return {fit.name: explained}
+    whole = float(np.sum(evidence.residual(fit.plant) ** 2))
+    lost = []
+    for number in range(len(fit.effects)):
+        others = [place for place in range(len(fit.effects)) if place != number]
+        plant = with_values(evidence.plant, [fit.effects[p] for p in others], [fit.values[p] for p in others])
+        lost.append(max(float(np.sum(evidence.residual(plant) ** 2)) - whole, 0.0))
+    return {effect.name: explained * one / max(sum(lost), 1e-9) for effect, one in zip(fit.effects, lost, strict=True)}

@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.checks import FLAT, longest_run
 from rigtwin.diagnosis.noise import smallest_step, white_noise, without_mains
 from rigtwin.diagnosis.reduced import Reduced
 from rigtwin.diagnosis.tolerances import TOLERANCES
@@ -46,7 +48,7 @@ SMOOTHED = 8
 @dataclass(frozen=True)
 class Lines:
     """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
-    multiplied by, shape (4, lines); fade: what a difference is multiplied by before, shape (ticks,); measured: shape
+    multiplied by, shape (4, lines); fade: what a difference is multiplied by before, shape (4, ticks); measured: shape
     (4, ticks); noise: white, of each sensor, shape (4,)."""
 
     frequency: Array
@@ -57,8 +59,8 @@ class Lines:
     length: int
 
 
-def lines(recording: Recording, mains: float) -> Lines:
-    """The lines of a recording's sensors, and their weights."""
+def lines(recording: Recording, mains: float, counted: Array) -> Lines:
+    """The lines of a recording's sensors, and their weights. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
     measured = np.stack([recording.column("/sensor", name) for name in Measurements._fields])
     ticks = measured.shape[1]
     length = next_fast_len(ticks, real=True)
@@ -70,13 +72,23 @@ def lines(recording: Recording, mains: float) -> Lines:
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     weight = np.empty((4, int(kept.sum())))
-    fade = _fade(ticks, recording.period)
+    fade = np.stack([_fade(ticks, recording.period) * counted * ~cut_off(row) for row in measured])
     for row in range(4):
-        swing = fade * (measured[row] - np.mean(measured[row]))
+        swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
-        variance = 0.5 * (float(fade @ fade) * floor[row] ** 2 + FORM**2 * _smoothed(power))
+        variance = 0.5 * (float(fade[row] @ fade[row]) * floor[row] ** 2 + FORM**2 * _smoothed(power)) + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
     return Lines(frequency[kept], weight, fade, measured, floor, length)
+
+
+def cut_off(row: Array) -> NDArray[np.bool_]:
+    """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
+    found = np.zeros(len(row), bool)
+    for extreme in (row.min(), row.max()):
+        at_end = row == extreme
+        if longest_run(row, at_end)[1] >= FLAT:
+            found |= at_end
+    return found
 
 
 def _smoothed(power: Array) -> Array:
@@ -117,15 +129,26 @@ class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
     Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if nothing but white noise is
-    left. Several recordings stand one after another.
+    left. Several recordings stand one after another. plants: the reduced plant under each one's commands.
     """
 
-    def __init__(self, recordings: Sequence[Recording], configurations: Sequence[Configuration], steps: int = 4) -> None:
-        """configurations: the twin's, one for each recording, alike in their plant. steps: of integration a tick."""
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        configurations: Sequence[Configuration],
+        counted: Sequence[Array] | None = None,
+        steps: int = 4,
+    ) -> None:
+        """configurations: the twin's, one for each recording, alike in their plant; counted: how much each tick counts, 0 to 1;
+        steps: of integration a tick."""
+        counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.recordings, self.configurations = tuple(recordings), tuple(configurations)
         self.plant = self.configurations[0].plant
-        self.lines = [lines(recording, c.plant.mains.frequency) for recording, c in zip(recordings, configurations, strict=True)]
-        self._reduced = [
+        self.lines = [
+            lines(recording, c.plant.mains.frequency, part)
+            for recording, c, part in zip(recordings, configurations, counted, strict=True)
+        ]
+        self.plants = [
             Reduced(*(recording.column("/command", name) for name in ("ground", "structure", "voltage")), c, steps)
             for recording, c in zip(recordings, configurations, strict=True)
         ]
@@ -137,12 +160,12 @@ class Evidence:
         self._round()
         self.expected = 0.0
         for each in self.lines:
-            noise = float(each.fade @ each.fade) * each.noise**2
+            noise = np.sum(each.fade**2, axis=1) * each.noise**2
             self.expected += float(np.sum(noise[:, None] * each.weight**2))
 
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
-        for each, reduced in zip(self.lines, self._reduced, strict=True):
+        for each, reduced in zip(self.lines, self.plants, strict=True):
             change = each.fade * (reduced.sensed(self.plant) - reduced.finer().sensed(self.plant))
             power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
             for row in range(4):
@@ -155,19 +178,22 @@ class Evidence:
             for row in range(4):
                 bit = smallest_step(each.measured[row])
                 if bit > COARSE_BIT * each.noise[row]:
-                    power = np.abs(rfft(each.fade * (np.round(predicted[row] / bit) * bit - predicted[row]), each.length)) ** 2
+                    power = np.abs(rfft(each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row]), each.length)) ** 2
                     variance = 0.5 * COARSE * _smoothed(power[: len(each.frequency)])
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def predicted(self, plant: Plant) -> list[Array]:
         """The sensors of every recording, shape (4, ticks) each."""
-        return [reduced.sensed(plant) for reduced in self._reduced]
+        return [reduced.sensed(plant) for reduced in self.plants]
 
     def differences(self, plant: Plant) -> list[Array]:
         """Measured less predicted, spikes apart, shape (4, ticks) each: what a friction that changes sign a tick early or late
         leaves says nothing of its size, and jumps when anything changes."""
+        return self._despiked(self.predicted(plant))
+
+    def _despiked(self, predictions: Sequence[Array]) -> list[Array]:
         found = []
-        for each, predicted in zip(self.lines, self.predicted(plant), strict=True):
+        for each, predicted in zip(self.lines, predictions, strict=True):
             difference = each.measured - predicted
             for row, noise in zip(difference, each.noise, strict=True):
                 despike(row, SPIKE * float(noise))
@@ -185,6 +211,10 @@ class Evidence:
     def residual(self, plant: Plant) -> Array:
         """Measured less predicted."""
         return self.whitened(self.differences(plant))
+
+    def unlike(self, predictions: Sequence[Array]) -> Array:
+        """The residual of predictions, shape (4, ticks) each, however they were made."""
+        return self.whitened(self._despiked(predictions))
 
     def nuisances(self, plant: Plant) -> Array:
         """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""

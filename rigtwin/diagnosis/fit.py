@@ -133,6 +133,10 @@ class Fitter:
         followed = [start for number, (misfit, start) in enumerate(scored[:REFINED]) if number == 0 or misfit < enough]
         return min((self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit)
 
+    def largest(self, effect: Effect) -> float:
+        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
+        return max(self.space.misfit(response.astype(np.float64)) for _, response in self._responses[effect])
+
     def seconds(self, first: Fit, effects: Sequence[Effect], count: int, least: float) -> list[tuple[tuple[Effect, ...], Values, Space]]:
         """The likeliest second effects beside `first`, by how well their responses at the nominal plant resemble what it
         leaves, if they promise to explain at least `least`: effects, values to start from and tolerances, as `refined` takes

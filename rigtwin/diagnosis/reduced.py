@@ -42,6 +42,16 @@ class Plate(NamedTuple):
     onward: Array
 
 
+class Disturbances(NamedTuple):
+    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m, voltage V, force on the carriage
+    N."""
+
+    ground: Array
+    structure: Array
+    voltage: Array
+    force: Array
+
+
 class Carriage(NamedTuple):
     """What the carriage's equation of motion needs besides its contacts."""
 
@@ -221,14 +231,17 @@ class Reduced:
             self._plates[key] = found
         return found
 
-    def true(self, plant: Plant, pushed: Array | None = None) -> Array:
-        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). pushed: a force on the carriage besides,
-        N, shape (ticks,)."""
+    def true(self, plant: Plant, besides: Disturbances | None = None) -> Array:
+        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
+        does not know."""
         timestep = self._period / self._steps
         ground = self._plate(plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None)
         # The spring is uncompressed at the start, the tyre carries the preload.
         start = float(ground.position[0]) - self._preload / plant.tyre.stiffness
         structure = self._plate(plant.structure_cylinder, plant.computer, self._structure, self._start, start)
+        nothing = np.zeros_like(self._voltage)
+        besides = besides or Disturbances(nothing, nothing, nothing, nothing)
+        ground, structure = self._displaced(ground, besides.ground), self._displaced(structure, besides.structure)
         motor: Motor = plant.motor
         carriage = Carriage(
             timestep,
@@ -253,11 +266,24 @@ class Reduced:
             ground.onward,
             structure.position,
             structure.onward,
-            self._voltage,
-            np.zeros_like(self._voltage) if pushed is None else pushed,
+            self._voltage + besides.voltage,
+            besides.force,
             out,
         )
         return out
+
+    def _displaced(self, of: Plate, by: Array) -> Plate:
+        if not by.any():
+            return of
+        ticks = np.arange(len(by) * self._steps + 1) / self._steps
+        motion = np.interp(ticks, np.arange(len(by)), by)
+        ahead = motion[np.arange(len(by)) * self._steps + 1]
+        return Plate(of.position + motion, of.onward + ahead)
+
+    def disturbed(self, plant: Plant, besides: Disturbances) -> Array:
+        """What the plant's sensors would read under disturbances, shape (4, ticks)."""
+        true = self.true(plant, besides)
+        return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
 
     def sensed(self, plant: Plant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""

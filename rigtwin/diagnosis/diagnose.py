@@ -1,0 +1,332 @@
+"""The diagnosis: recordings in, one answer out.
+
+checks → evidence → attribution (replays of the whole plant) and what needs no model (controller, sensors' sampling) →
+where → judged on held-out data → the next test.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
+from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
+from rigtwin.diagnosis.checks import check
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.controller import ControllerReplay, Deviation
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import (
+    Diagnosis,
+    Estimate,
+    Finding,
+    Gap,
+    Name,
+    NextTest,
+    Place,
+    Unseen,
+    Verdict,
+)
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.freeform import Disturbed, located
+from rigtwin.diagnosis.levels import closed_loop, replay_levels
+from rigtwin.diagnosis.next_test import Test, proposed
+from rigtwin.diagnosis.place import placed
+from rigtwin.diagnosis.sampling import Sampled, outstanding
+from rigtwin.diagnosis.shrink import Judged, judged, power, with_effects
+from rigtwin.effects import Effect, find
+from rigtwin.errors import RigtwinError
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording
+
+SURE = 0.98
+"""Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
+UNSURE = 0.9
+"""Confidence below which another test is proposed."""
+WIDER = 2.5
+"""Times the statistical interval that is reported: a model's form is never exact."""
+SOMETHING = 0.05
+"""Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A diagnosis, and what pictures of it are drawn from. plant: the twin's with the effects that were found."""
+
+    diagnosis: Diagnosis
+    evidence: Evidence | None
+    nominal: Configuration
+    corrected: Configuration
+    disturbed: tuple[Disturbed, ...]
+
+
+def unusable(recordings: Sequence[Recording], configurations: Sequence[Configuration], started: float) -> Diagnosis | None:
+    """The answer if some data are not fit to be diagnosed, else None."""
+    faults: list[str] = []
+    for recording, configuration in zip(recordings, configurations, strict=True):
+        faults += [f"{recording.path}: {fault.message}" for fault in check(recording, configuration) if fault.fatal]
+    if not faults:
+        return None
+    sentence = f"The data cannot be diagnosed: {faults[0]}."
+    names = tuple(str(recording.path) for recording in recordings)
+    seconds = time.perf_counter() - started
+    return Diagnosis("unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds)
+
+
+def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    return tuple(f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes)
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    base: Configuration,
+    held_out: Sequence[Recording] = (),
+    tests: Sequence[Test] = (),
+    progress: Callable[[str, int], object] = lambda stage, steps: None,
+) -> Outcome:
+    """Diagnoses recordings of one rig against the twin of `base`. tests: the menu that a next one is chosen from; progress is
+    called with a stage's name and the steps done in it.
+
+    Raises RigtwinError if the recordings' settings are unknown here, or held-out data are not fit to be compared.
+    """
+    started = time.perf_counter()
+    with threadpool_limits(1):
+        configurations = [configuration_of(recording, base) for recording in recordings]
+        if (bad := unusable(recordings, configurations, started)) is not None:
+            return Outcome(bad, None, configurations[0], configurations[0], ())
+        others = [configuration_of(recording, base) for recording in held_out]
+        for recording, configuration in zip(held_out, others, strict=True):
+            for fault in check(recording, configuration):
+                if fault.fatal:
+                    raise RigtwinError(f"{recording.path}: {fault.message}")
+        evidence = Evidence(recordings, configurations)
+        return _diagnosed(evidence, held_out, others, tests, progress, started)
+
+
+def _diagnosed(
+    evidence: Evidence,
+    held_out: Sequence[Recording],
+    others: Sequence[Configuration],
+    tests: Sequence[Test],
+    progress: Callable[[str, int], object],
+    started: float,
+) -> Outcome:
+    found = attribute(evidence, lambda steps: progress("fitting effects", steps))
+    best = found.best.fit if found.best is not None else Fit((), (), found.nothing.misfit, (), evidence.plant)
+    notes = [*_notes(evidence.recordings), *_clipped(evidence)]
+    progress("judging on held-out data", 1)
+    verdict_of_data = judged(evidence, best, held_out, others)
+    if verdict_of_data.rejected:
+        names = " and ".join(effect.name for effect in verdict_of_data.rejected)
+        notes.append(f"{names} rejected: held-out data became worse with it")
+    plant = with_effects(evidence.plant, best, verdict_of_data.kept)
+    progress("looking where", 1)
+    disturbed = located(evidence, plant, verdict_of_data.kept, follow=found.unknown)
+    left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
+    something = found.unknown or bool(verdict_of_data.rejected) or (left - disturbed[0].misfit) > SOMETHING * evidence.expected
+    deviations = _deviations(evidence)
+    sampled = outstanding(evidence.recordings, evidence.predicted(plant), evidence.plant)
+    effects = [
+        *_findings(found, verdict_of_data.kept, evidence),
+        *(_sampled(each, evidence.plant) for each in sampled),
+        *(_deviation(each) for each in deviations if each.kind != "unknown"),
+    ]
+    odd_controller = any(each.kind == "unknown" or not each.exact for each in deviations)
+    verdict: Verdict
+    if effects:
+        verdict = "partly explained" if something or odd_controller else "explained"
+    else:
+        verdict = "unknown" if something or odd_controller else "no gap"
+    where = _where(evidence, found, plant, verdict_of_data.kept, disturbed if something else (), best)
+    if odd_controller:
+        where.append(Place("controller", 1.0, (0.0, 0.0), "throughout", "its commands are not those of its settings"))
+    progress("replaying components", 1)
+    gap = _gap(evidence, plant, verdict_of_data, sampled)
+    progress("choosing the next test", 1)
+    suggestion = _next(found, effects, verdict_of_data.kept, tests)
+    corrected = _corrected(evidence.configurations[0], plant, sampled)
+    seconds = time.perf_counter() - started
+    diagnosis = Diagnosis(
+        verdict,
+        _sentence(verdict, effects, where, gap),
+        tuple(effects),
+        tuple(where),
+        gap,
+        tuple((" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]),
+        suggestion,
+        _unseen(found),
+        (),
+        tuple(notes),
+        tuple(str(recording.path) for recording in evidence.recordings),
+        seconds,
+    )
+    return Outcome(diagnosis, evidence, evidence.configurations[0], corrected, disturbed)
+
+
+def _clipped(evidence: Evidence) -> list[str]:
+    return [
+        f"{recording.path.name}: {fault.message}; those ticks are left out"
+        for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True)
+        for fault in check(recording, configuration)
+        if not fault.fatal
+    ]
+
+
+def _deviations(evidence: Evidence) -> list[Deviation]:
+    """What the controller did other than told, once for all recordings."""
+    found: dict[tuple[str, str], Deviation] = {}
+    for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
+        if recording.controller:
+            deviation = ControllerReplay(recording, configuration.controller).deviation()
+            if deviation is not None:
+                found[deviation.kind, deviation.name] = deviation
+    return list(found.values())
+
+
+def _findings(found: Attribution, kept: tuple[Effect, ...], evidence: Evidence) -> list[Finding]:
+    if found.best is None:
+        return []
+    fit = found.best.fit
+    return [
+        Finding(
+            Name(effect.component, effect.kind.name),
+            _estimates(effect, values, widths, evidence.plant),
+            min(SURE, _probability(found.ranking, effect)),
+            _class(found.ranking, found.best, effect),
+            min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
+        )
+        for effect, values, widths in zip(fit.effects, fit.values, fit.widths, strict=True)
+        if effect in kept
+    ]
+
+
+def _estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], plant: Plant) -> dict[str, Estimate]:
+    nominal = effect.nominal(plant)
+    return {
+        name: Estimate(value, value - WIDER * width, value + WIDER * width, nominal[name], quantity.unit)
+        for (name, quantity), value, width in zip(effect.quantities().items(), values, widths, strict=True)
+    }
+
+
+def _probability(ranking: Sequence[Explanation], effect: Effect) -> float:
+    return float(sum(each.probability for each in ranking if effect in each.fit.effects))
+
+
+def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) -> tuple[Name, ...]:
+    """Effects that stand in this one's place in other likely explanations."""
+    names = [Name(effect.component, effect.kind.name)]
+    rest = [other for other in best.fit.effects if other != effect]
+    for each in ranking:
+        if each.probability < MEMBER or len(each.fit.effects) != len(best.fit.effects) or effect in each.fit.effects:
+            continue
+        for other in each.fit.effects:
+            if other not in rest and len([e for e in each.fit.effects if e in rest]) == len(rest):
+                names.append(Name(other.component, other.kind.name))
+    return tuple(dict.fromkeys(names))
+
+
+def _sampled(each: Sampled, plant: Plant) -> Finding:
+    unit = find(f"{each.kind}@{each.component}").quantities()[each.parameter].unit
+    spread = 0.05 * each.value
+    estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
+    name = Name(each.component, each.kind)
+    return Finding(name, {each.parameter: estimate}, SURE, (name,), 1.0)
+
+
+def _deviation(each: Deviation) -> Finding:
+    name = Name("controller", each.kind)
+    spread = 1e-3 * abs(each.used) if each.exact else 0.1 * abs(each.used)
+    estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
+    return Finding(name, {each.name: estimate}, SURE if each.exact else 0.6, (name,), 1.0)
+
+
+def _where(
+    evidence: Evidence,
+    found: Attribution,
+    plant: Plant,
+    kept: tuple[Effect, ...],
+    disturbed: tuple[Disturbed, ...],
+    best: Fit,
+) -> list[Place]:
+    places: dict[str, Place] = {}
+    own = evidence.predicted(plant)
+    for effect in kept:
+        without = with_effects(evidence.plant, best, [other for other in kept if other != effect])
+        change = [a - b for a, b in zip(own, evidence.predicted(without), strict=True)]
+        share = min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0)
+        place = placed(evidence, effect.component, share, change)
+        if effect.component not in places or places[effect.component].share < share:
+            places[effect.component] = place
+    if disturbed:
+        foremost = disturbed[0]
+        share = 1.0 - (found.explained if kept else 0.0)
+        words = "what is left goes with " + ", ".join(foremost.forms) if foremost.forms else "what is left has no plain form"
+        left = evidence.differences(plant)
+        place = placed(evidence, foremost.component, share, left, words)
+        places.setdefault(foremost.component, place)
+    return sorted(places.values(), key=lambda place: -place.share)
+
+
+def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
+    def level(of: Plant) -> float:
+        powers = [p[e.fade.max(axis=0) > 0.5] for p, e in zip(power(evidence, of), evidence.lines, strict=True)]
+        ticks = sum(len(each) for each in powers)
+        return float((sum(each.sum() for each in powers) / max(ticks, 1)) ** 0.5)
+
+    recording, nominal = evidence.recordings[0], evidence.configurations[0]
+    corrected = _corrected(nominal, plant, sampled)
+    replays = replay_levels(recording, nominal, nominal._replace(plant=plant))
+    loop = closed_loop(recording, nominal, corrected, _noisy(corrected.plant, evidence))
+    held_out = outcome.held_out
+    return Gap(level(evidence.plant), level(plant), 1.0, outcome.predicted, held_out, outcome.data, replays, loop)
+
+
+def _noisy(plant: Plant, evidence: Evidence) -> Plant:
+    """The plant with the white noise that the recording has."""
+    for name, noise in zip(("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell"), evidence.lines[0].noise, strict=True):
+        plant = plant._replace(**{name: getattr(plant, name)._replace(white=float(noise))})
+    return plant
+
+
+def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled]) -> Configuration:
+    for each in sampled:
+        plant = plant._replace(**{each.component: getattr(plant, each.component)._replace(**{each.parameter: each.value})})
+    return nominal._replace(plant=plant)
+
+
+def _next(
+    found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]
+) -> NextTest | None:
+    if not tests or found.best is None or not kept:
+        return None
+    likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]
+    if all(effect.confidence >= UNSURE and len(effect.alternatives) == 1 for effect in effects) or len(likely) < 2:
+        return None
+    return proposed([found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests)
+
+
+def _unseen(found: Attribution) -> tuple[Unseen, ...]:
+    why = "no size tried changes these data by more than their noise"
+    return tuple(Unseen(effect.component, effect.kind.name, why) for effect in found.silent)
+
+
+def _sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
+    if verdict == "no gap":
+        return "No gap: the twin predicts this rig to within its sensors' noise and declared tolerances."
+    if verdict == "unknown":
+        place = where[0] if where else None
+        at = f" at the {place.component.replace('_', ' ')}; {place.evidence}" if place else ""
+        return f"Something that this library has no name for acts{at}."
+    parts = []
+    for effect in effects:
+        name, estimate = next(iter(effect.parameters.items()))
+        unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+        likely = f"{100 * effect.confidence:.0f} %"
+        was = "no such effect" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
+        parts.append(f"{effect.name} ({name} {estimate.value:.4g}{unit} instead of {was}, confidence {likely})")
+    closes = f"; it closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
+    shown = closes if gap.before > 1.05 and any(e.name.kind not in ("noise", "hum", "quantisation", "setting") for e in effects) else ""
+    more = "; something that has no name here is left" if verdict == "partly explained" else ""
+    return " and ".join(parts) + shown + more + "."

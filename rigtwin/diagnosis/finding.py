@@ -1,0 +1,156 @@
+"""What a diagnosis says, as frozen data and as the JSON that other programs read."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value with its 95 % interval, and what it is nominally, in its unit."""
+
+    value: float
+    low: float
+    high: float
+    nominal: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Name:
+    """A kind of effect at a component."""
+
+    component: str
+    kind: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}@{self.component}"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect. confidence: probability that it is this one; alternatives: the effects that these data cannot tell from it,
+    itself first (`class` in JSON); share: of the gap, what would come back without it; for an effect read off a sensor or the
+    controller alone, of that one's own gap."""
+
+    name: Name
+    parameters: dict[str, Estimate]
+    confidence: float
+    alternatives: tuple[Name, ...]
+    share: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a gap lies. band_hz: where the middle 80 % of its power lies; region: of operation; evidence: in words."""
+
+    component: str
+    share: float
+    band_hz: tuple[float, float]
+    region: str
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """A gap before and after the correction, and what noise alone leaves."""
+
+    before: float
+    after: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """before, after, floor: rms of all sensors less what the twin predicts from the commands, in units of their white noise.
+    shrinkage: share of the gap above the floor that the correction closes, predicted from the data of the fit, and achieved on
+    data held out of it. replays: each component's own; closed_loop: dB between the spectra of the recording and of the twin's
+    own run, which no phase of a limit cycle changes."""
+
+    before: float
+    after: float
+    floor: float
+    shrinkage_predicted: float
+    shrinkage_held_out: Interval
+    held_out: str
+    replays: dict[str, Level]
+    closed_loop: Level | None
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """The test that would separate the explanations that remain best. command: ready to run; separates: χ² between them."""
+
+    experiment: str
+    command: str
+    separates: float
+    between: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """An effect that these data could not show, and why."""
+
+    component: str
+    kind: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know."""
+
+    verdict: Verdict
+    sentence: str
+    effects: tuple[Finding, ...]
+    where: tuple[Place, ...]
+    gap: Gap | None
+    ranking: tuple[tuple[str, float], ...]
+    next_test: NextTest | None
+    not_observable: tuple[Unseen, ...]
+    faults: tuple[str, ...]
+    notes: tuple[str, ...]
+    recordings: tuple[str, ...]
+    seconds: float
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        gap = None
+        if self.gap is not None:
+            gap = asdict(self.gap)
+        return {
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "effects": [
+                {
+                    "component": effect.name.component,
+                    "kind": effect.name.kind,
+                    "parameters": {name: asdict(value) for name, value in effect.parameters.items()},
+                    "confidence": effect.confidence,
+                    "class": [asdict(name) for name in effect.alternatives],
+                    "share": effect.share,
+                }
+                for effect in self.effects
+            ],
+            "where": [asdict(place) for place in self.where],
+            "gap": gap,
+            "ranking": [{"explanation": name, "probability": probability} for name, probability in self.ranking],
+            "next_test": None if self.next_test is None else asdict(self.next_test),
+            "not_observable": [asdict(each) for each in self.not_observable],
+            "faults": list(self.faults),
+            "notes": list(self.notes),
+            "recordings": list(self.recordings),
+            "seconds": self.seconds,
+        }

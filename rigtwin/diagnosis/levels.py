@@ -1,0 +1,106 @@
+"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and after a correction."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from controllers import Measurements, Mode
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration, Safety
+from rigtwin.diagnosis.finding import Level
+from rigtwin.diagnosis.noise import spectrum
+from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
+from rigtwin.errors import RigtwinError
+from rigtwin.loop import run_compiled
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording
+from rigtwin.twin import Twin
+
+COMPONENTS = ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder")
+"""Replays whose levels are reported."""
+LOWEST, HIGHEST = 0.4, 40.0
+"""Hz, between which spectra are compared."""
+BANDS_PER_OCTAVE = 2
+SEEDS = (2**31 - 1, 2**31 - 2)
+"""Of the twin's noise: runs that differ in nothing else show how far spectra differ by chance."""
+SHORTEST = 5.0
+"""s; spectra of shorter tests are chance."""
+
+
+def replay_levels(recording: Recording, before: Configuration, after: Configuration) -> dict[str, Level]:
+    """Each component's replay, in units of its noise floor."""
+
+    def ratios(configuration: Configuration) -> dict[str, float]:
+        replays = Replays(recording, configuration)
+        found = {}
+        for name in COMPONENTS:
+            try:
+                found[name] = REPLAYS[name](replays).ratio
+            except Undetermined:
+                continue
+        return found
+
+    with ThreadPoolExecutor(2) as pool:
+        one, other = pool.map(ratios, (before, after))
+    return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
+
+
+def closed_loop(recording: Recording, before: Configuration, after: Configuration, own: Plant) -> Level | None:
+    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too short.
+    own: the corrected plant with the noise that the recording has.
+    """
+    if recording.ticks * recording.period < SHORTEST:
+        return None
+    demands = np.column_stack([recording.column("/command", name) for name in ("ground", "structure", "force")])
+    measured = _bands(np.stack([recording.column("/sensor", name) for name in Measurements._fields]), recording.period)
+    nominal = before._replace(plant=_with_noise_of(own, before.plant))
+    corrected = after._replace(plant=own)
+    runs = ((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1]))
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            one, other, again = pool.map(lambda run: _bands(_run(*run, demands), recording.period), runs)
+    except RigtwinError:
+        return None
+    return Level(_apart(measured, one), _apart(measured, other), _apart(other, again))
+
+
+def _with_noise_of(noisy: Plant, plant: Plant) -> Plant:
+    """The plant with the white noise and hum of another's sensors."""
+    for name in Measurements._fields:
+        like = getattr(noisy, name)
+        plant = plant._replace(**{name: getattr(plant, name)._replace(white=like.white, hum=like.hum)})
+    return plant
+
+
+def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
+    free = configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+    twin = Twin(free, float(demands[0, 0]), seed)
+    return np.concatenate([block.measurements for block in run_compiled(twin, free, demands)]).T
+
+
+def _bands(signals: Array, period: float) -> Array:
+    """Mean spectral density of each signal in bands of equal ratio, shape (4, bands)."""
+    edges = LOWEST * 2.0 ** (np.arange(math.ceil(BANDS_PER_OCTAVE * math.log2(HIGHEST / LOWEST)) + 1) / BANDS_PER_OCTAVE)
+    rows = []
+    for signal in signals:
+        frequency, density = spectrum(signal - np.mean(signal), period)
+        rows.append(
+            [float(np.mean(density[(frequency >= a) & (frequency < b)])) if ((frequency >= a) & (frequency < b)).any() else math.nan
+             for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        )
+    return np.array(rows)
+
+
+def _apart(one: Array, other: Array) -> float:
+    """rms difference in dB over all bands that both have."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decibels = 10.0 * np.log10(one / other)
+    return float(np.sqrt(np.nanmean(decibels[np.isfinite(decibels)] ** 2)))
+
+
+def is_closed(configuration: Configuration) -> bool:
+    """Whether the test has a model in the loop."""
+    return configuration.controller.mode == Mode.MIL

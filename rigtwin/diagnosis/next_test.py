@@ -1,0 +1,64 @@
+"""Which test to run next, where explanations remain: the one whose outcome they predict most differently."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from rigtwin.configuration import Configuration, Safety, flattened
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import NextTest
+from rigtwin.diagnosis.fit import Fit, Space
+from rigtwin.loop import run_compiled
+from rigtwin.recording import Recording
+from rigtwin.twin import Twin
+
+SEED = 1
+"""Of the tests that are tried on the twin, and of the one proposed."""
+LONGEST = 20.0
+"""s, to which a test is cut when it is tried."""
+WORTH = 25.0
+"""χ² below which a test would separate nothing."""
+
+Test = tuple[str, Configuration, Callable[[Configuration, int], np.ndarray]]
+"""Name, settings, and what it demands of the rig for (settings, seed)."""
+
+
+def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recording:
+    """The recording that a test would make on a rig of that configuration."""
+    free = configuration._replace(safety=Safety(1.0, 1e5, 1.0))
+    twin = Twin(free, float(demands[0, 0]), SEED)
+    found = list(run_compiled(twin, free, demands))
+    commands, sensed = (np.concatenate([getattr(block, part) for block in found]) for part in ("commands", "measurements"))
+    columns = {
+        "/command": dict(zip(Commands._fields, commands.T.copy(), strict=True)),
+        "/sensor": dict(zip(Measurements._fields, sensed.T.copy(), strict=True)),
+    }
+    period = configuration.timing.period
+    controller = flattened(configuration)["controller"]
+    return Recording(Path(name), "suspension-rig", name, period, np.arange(len(commands)) * period, columns, controller)
+
+
+def proposed(fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
+    """The test of a menu that separates explanations best; None if none would. fits: two or more; the first is the likeliest."""
+    if len(fits) < 2:
+        return None
+    best: NextTest | None = None
+    for name, configuration, demanded in tests:
+        timing = configuration.timing._replace(duration=min(configuration.timing.duration, LONGEST))
+        twin = configuration._replace(plant=fits[0].plant, timing=timing)
+        recording = tried(name, twin, demanded(twin, SEED))
+        evidence = Evidence([recording], [configuration._replace(plant=fits[0].plant, timing=timing)])
+        space = Space(evidence, fits[0].plant)
+        own = evidence.predicted(fits[0].plant)
+        apart = []
+        for other in fits[1:]:
+            difference = [a - b for a, b in zip(own, evidence.predicted(other.plant), strict=True)]
+            apart.append(space.misfit(evidence.whitened(difference)))
+        least = min(apart)
+        if least > WORTH and (best is None or least > best.separates):
+            best = NextTest(name, f"rigtwin run {name} --seed {SEED}", least, tuple(fit.name for fit in fits))
+    return best

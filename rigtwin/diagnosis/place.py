@@ -1,0 +1,84 @@
+"""Where in frequency, speed, force and time a difference lies."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers import Measurements
+from rigtwin.arrays import Array
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import Place
+from rigtwin.diagnosis.noise import band
+
+CONCENTRATED = 1.6
+"""Times the average power from which a region is where a difference lies."""
+STRETCHES = 8
+"""Of time."""
+SLOW, FAST, LARGE = 0.2, 1.5, 1.5
+"""In rms of the motion's speed, or of the force about its mean."""
+REST = 0.25
+"""s without motion is rest."""
+LEAST = 0.1
+"""Share of a difference's power that a region must hold."""
+
+
+def region(difference: Array, speed: Array, force: Array, period: float) -> str:
+    """The operating region in which a difference is concentrated, or `throughout`. All shape (ticks,)."""
+    power = difference**2
+    total = float(np.sum(power))
+    if total <= 0.0:
+        return "throughout"
+    typical = float(np.sqrt(np.mean(speed**2))) or 1.0
+    swing = force - np.mean(force)
+    still = np.abs(speed) < 0.02 * typical
+    length = max(1, round(REST / period))
+    rest = np.convolve(still, np.ones(length), mode="same") >= length - 0.5
+    regions: dict[str, NDArray[np.bool_]] = {
+        "at rest": rest,
+        "velocity reversal": (np.abs(speed) < SLOW * typical) & ~rest,
+        "high speed": np.abs(speed) > FAST * typical,
+        "large force": np.abs(swing) > LARGE * float(np.std(force)),
+    }
+    edges = np.linspace(0, len(power), STRETCHES + 1).astype(int)
+    for start, end in zip(edges[:-1], edges[1:], strict=True):
+        stretch = np.zeros(len(power), bool)
+        stretch[start:end] = True
+        regions[f"{start * period:.1f} to {end * period:.1f} s"] = stretch
+    best, name = 0.0, "throughout"
+    for label, inside in regions.items():
+        share = float(np.sum(power[inside])) / total
+        concentration = share / max(float(np.mean(inside)), 1e-9)
+        # A stretch of time is no explanation where a signal's own swing is.
+        threshold = CONCENTRATED * (1.6 if label.endswith(" s") else 1.0)
+        if share > LEAST and concentration > threshold and concentration / threshold > best:
+            best, name = concentration / threshold, label
+    return name
+
+
+def speed_of(component: str, true: Array, period: float) -> Array:
+    """The speed that a component's region goes by, m/s. true: ideal sensors' values, shape (4, ticks)."""
+    if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
+        position = true[2]
+    elif component.startswith("ground"):
+        position = true[0]
+    elif component.startswith("structure"):
+        position = true[1]
+    else:
+        position = true[1] - true[2]
+    return np.gradient(position, period)
+
+
+def placed(evidence: Evidence, component: str, share: float, differences: list[Array], plant: Plant, words: str = "") -> Place:
+    """The place of differences, shape (4, ticks) for each recording, that a component causes."""
+    noise = evidence.lines[0].noise
+    power = [sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2 for row in range(4)]
+    row = int(np.argmax(power))
+    longest = int(np.argmax([d.shape[1] for d in differences]))
+    difference, recording = differences[longest][row], evidence.recordings[longest]
+    true = evidence.plants[longest].true(evidence.plant)
+    where = region(difference, speed_of(component, true, recording.period), true[3], recording.period)
+    low, high = band(difference, recording.period)
+    sensor = Measurements._fields[row]
+    return Place(component, share, (low, high), where, words or f"most of it seen by {sensor}")
+
