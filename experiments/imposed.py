@@ -28,7 +28,9 @@ def fast_multisines(configuration: Configuration, seed: int) -> Array:
     time, random = time_of(configuration), random_of(seed)
     ground = multisine(time, 0.2, 10.0, 0.1, 0.5, 0.0025, random)
     structure = configuration.controller.start + multisine(time, 0.2, 20.0, 0.1, 0.5, 0.004, random)
-    force = FORCE_MEAN + multisine(time, 0.5, 20.0, 0.1, 0.5, 20.0, random) + multisine(time, 20.0, 120.0, 0.1, 0.0, 45.0, random)
+    force = (
+        FORCE_MEAN + multisine(time, 0.5, 20.0, 0.1, 0.5, 20.0, random) + multisine(time, 20.0, 120.0, 0.1, 0.0, 45.0, random)
+    )
     return np.column_stack([ground, structure, force])
 
 

@@ -114,14 +114,14 @@ def _parser() -> argparse.ArgumentParser:
         "  rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap\n"
         "  rigtwin compare rig.mcap --config calibrated.toml",
     )
-    diagnose.add_argument("recordings", type=Path, nargs="+", metavar="recording", help="of one rig; all are explained together")
+    diagnose.add_argument("recordings", type=Path, nargs="+", metavar="recording", help="of one rig, explained together")
     diagnose.add_argument("--json", type=Path, metavar="F.json", help="also write the answer for other programs")
     diagnose.add_argument("--html", type=Path, metavar="F.html", help="also write a report to look at, one file")
     diagnose.add_argument(
         "--without", action="append", default=[], metavar="EFFECT", help="take this out of the twin first, e.g. coulomb@rail"
     )
     diagnose.add_argument(
-        "--held-out", nargs="+", type=Path, default=[], metavar="recording", help="judge the correction on these of the same rig"
+        "--held-out", nargs="+", type=Path, default=[], metavar="recording", help="of the same rig, to judge on"
     )
     diagnose.add_argument("--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config")
     settings(diagnose)
@@ -129,12 +129,14 @@ def _parser() -> argparse.ArgumentParser:
     blindcheck = command(
         "blindcheck",
         "check the diagnosis on recordings of another rig, whose defects are withheld from it",
-        "A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees the files alone;\n"
-        "then the key is opened, checked against its digest, and every answer is scored.",
+        "A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees the files\n"
+        "alone; then the key is opened, checked against its digest, and every answer is scored.",
     )
     blindcheck.add_argument("--cases", type=int, default=200, help="how many (default 200)")
     blindcheck.add_argument("--seed", type=int, default=2026, help="of the referee's draws (default 2026)")
-    blindcheck.add_argument("--folder", type=Path, default=Path("blindcheck"), help="for recordings and answers; a second run goes on")
+    blindcheck.add_argument(
+        "--folder", type=Path, default=Path("blindcheck"), help="of recordings and answers; a second run goes on"
+    )
     blindcheck.add_argument("--baselines", action="store_true", help="also score what cruder methods would have said")
     blindcheck.add_argument("--json", type=Path, metavar="F.json", help="also write the scores to a file")
 

@@ -11,6 +11,7 @@ import numpy as np
 from rigtwin.blindcheck.reference_rig import CELL, LVDT, Array, Law, Truth, quiet
 
 Random = np.random.Generator
+Change = Callable[[Truth, Law], tuple[Truth, Law]]
 SENSORS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
 MATERIAL = 1.0
 """A defect that changes some sensor by less than this many times its white noise, rms, is a trace."""
@@ -27,10 +28,10 @@ class Defect:
     value: float
     nominal: float
     inside: bool
-    change: Callable[[Truth, Law], tuple[Truth, Law]] = field(repr=False)
+    change: Change = field(repr=False)
 
 
-def _to(path: str, **values: float) -> Callable[[Truth, Law], tuple[Truth, Law]]:
+def _to(path: str, **values: float) -> Change:
     """A change of numbers of the rig, or of one of its parts."""
 
     def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
@@ -183,10 +184,11 @@ def _others(random: Random) -> list[Callable[[], Defect]]:
         return Defect("missed_ticks", "controller", value, 0.0, True, _to("", missed=value))
 
     def setting() -> Defect:
-        name = str(random.choice(["kp", "ki", "kff", "filter_force", "limit"][:4]))
+        name = str(random.choice(["kp", "ki", "kff", "filter_force"]))
         told = getattr(Law(), name)
         value = told * (1.0 + _either(random, 0.1, 0.5))
-        return Defect(f"setting:{name}", "controller", value, told, True, lambda truth, law: (truth, law._replace(**{name: value})))
+        change = lambda truth, law: (truth, law._replace(**{name: value}))  # noqa: E731
+        return Defect(f"setting:{name}", "controller", value, told, True, change)
 
     return [mass, stiffness, damping, hardening, late, missed, setting]
 
@@ -196,7 +198,7 @@ def outside(random: Random) -> list[Callable[[], Defect]]:
     any_lvdt = str(random.choice(SENSORS[:3]))
     any_cylinder = str(random.choice(["ground", "structure"]))
 
-    def unnamed(kind: str, component: str, value: float, change: Callable[[Truth, Law], tuple[Truth, Law]]) -> Callable[[], Defect]:
+    def unnamed(kind: str, component: str, value: float, change: Change) -> Callable[[], Defect]:
         return lambda: Defect(kind, component, value, 0.0, False, change)
 
     relaxing, wave, fading = _log(random, 0.15, 0.6), _log(random, 0.25, 0.8), _either(random, 0.15, 0.5)
@@ -219,7 +221,8 @@ def library(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]
     """Every defect that reports have a name for, by component. commands: of the test without defects, shape (ticks, 4)."""
 
     def reach(column: int) -> tuple[float, float]:
-        return float(np.max(np.abs(commands[:, column]))), float(np.quantile(np.abs(np.diff(commands[:, column])) / 1e-3, 0.999))
+        rates = np.abs(np.diff(commands[:, column])) / 1e-3
+        return float(np.max(np.abs(commands[:, column]))), float(np.quantile(rates, 0.999))
 
     carriage_and_tyre, controller = _others(random)[:4], _others(random)[4:]
     return [

@@ -166,7 +166,9 @@ def solved(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: fl
 
 
 @numba.njit(cache=True, nogil=True)
-def passed(drive: Drive, memory: Array, history: Array, count: int, command: float, centred: bool, time: float, late: float) -> float:
+def passed(
+    drive: Drive, memory: Array, history: Array, count: int, command: float, centred: bool, time: float, late: float
+) -> float:
     """A command through a drive, one step. memory: rate limit's, lag's and dead zone's output."""
     length = len(history)
     history[count % length] = command
@@ -253,7 +255,7 @@ def simulate(
     """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); voltages: V, in place of the controller's, or
     empty; noise: of the sensors, shape (ticks, 4); missed: 1 where a tick is missed, shape (ticks,); commands, sensors: what
     is recorded, shape (ticks, 4). Returns ticks."""
-    inner = int(round(1e-3 / STEP))
+    inner = round(1e-3 / STEP)
     size = 2048
     histories = np.empty((3, size))
     memories = np.zeros((3, 3))
@@ -335,7 +337,8 @@ def simulate(
             contact = 0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET)) - 0.25 * ONSET**2 / 0.004
             relaxed += STEP / truth.relaxing_time * (contact - relaxed)
             tyre = truth.tyre * (contact * (1.0 + truth.tyre_hardening * contact))
-            tyre += truth.relaxing * truth.tyre * (contact - relaxed) + (truth.tyre_damping * squeeze if deflection > 0.0 else 0.0)
+            tyre += truth.relaxing * truth.tyre * (contact - relaxed)
+            tyre += truth.tyre_damping * squeeze if deflection > 0.0 else 0.0
             tyre = max(tyre, 0.0) if contact > 0.0 else 0.0
 
             plate = (next_structure - structure + structure_yield - structure_before) / STEP

@@ -6,14 +6,14 @@ The thresholds were set on cases of the withheld-effect check with seeds other t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, with_values
+from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
 from rigtwin.diagnosis.tolerances import tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
@@ -42,13 +42,15 @@ FORM_TEMPER = 0.05
 WITHIN_TOLERANCE = 1.5
 """Tolerances below which a deviation is no finding."""
 REFITTED = 6
-"""Explanations that are fitted again with the tolerances taken at them."""
+"""Explanations that are fitted again with the tolerances taken at them, if they"""
+NEAR = 0.2
+"""lack no more than this share of what the best one explains."""
 BEAM = 3
 """First effects to which a second is sought."""
-SECONDS = 8
-"""Second effects tried in full for each of them, where one leaves much."""
-FEW = 3
-"""Second effects tried in full where one leaves little."""
+MANY, FEW = 10, 3
+"""Pairs fitted in full, where one effect leaves much and where it leaves little."""
+SETTLED_PAIRS = 2
+"""Pairs that are fitted again with the tolerances taken at them."""
 FAR_BEHIND = 0.7
 """Share of what the best effect explains that a first of two may lack."""
 MEMBER = 0.05
@@ -117,7 +119,8 @@ def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
 
 def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: None) -> Attribution:
     """Searches the whole library. progress is called with the number of fits done since its last call."""
-    fitter = Fitter(evidence)
+    least = detectable(evidence)
+    search, fitter = Fitter(evidence.coarser()), Fitter(evidence)
     effects = library(evidence)
     with ThreadPoolExecutor(THREADS) as pool:
 
@@ -128,29 +131,40 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
                 progress(1)
             return results
 
-        singles = mapped(fitter.single, effects)
+        singles = mapped(search.single, effects)
         singles.sort(key=_priced)
-        again = mapped(fitter.settled, singles[:REFITTED])
-        tried = again + singles[REFITTED:]
+        # Those far behind stay there, however the tolerances are taken.
+        near = singles[0].misfit + NEAR * max(search.nothing.misfit - singles[0].misfit, 0.0) + 2.0 * least
+        close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
+        tried = mapped(fitter.settled, close) + singles[len(close) :]
         tried.sort(key=_priced)
         first = tried[0]
         nothing = fitter.settled(fitter.nothing)
         gap = max(nothing.misfit - evidence.expected, 0.0)
-        least = detectable(evidence)
         if nothing.misfit - _priced(first) > least:
             much = _left(first.misfit, evidence) > max(SLACK * gap, UNEXPLAINED * evidence.expected)
-            pairs = []
+            hopes: list[Hope] = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
-                if leader.misfit - first.misfit > FAR_BEHIND * max(nothing.misfit - first.misfit, 0.0):
-                    continue
-                hopeful = fitter.seconds(leader, effects, SECONDS if much else FEW, least)
-                pairs += mapped(lambda pair: fitter.refined(*pair), hopeful)
+                if leader.misfit - first.misfit <= FAR_BEHIND * max(nothing.misfit - first.misfit, 0.0):
+                    hopes += search.seconds(leader, effects, least)
+            hopes.sort(key=lambda hope: hope.promised)
+            hopeful = _once(hopes)[: MANY if much else FEW]
+            pairs = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful)
             pairs.sort(key=_priced)
-            again = mapped(fitter.settled, pairs[:3])
-            tried += [pair for pair in [*again, *pairs[3:]] if first.misfit - pair.misfit > max(least, RELATIVE * gap) and not within_tolerance(pair, evidence)]
-    silent = tuple(effect for effect in effects if fitter.largest(effect) < DETECTED)
+            pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
+            least_more = max(least, RELATIVE * gap)
+            tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
+    silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
     return _judged(nothing, tried, first, evidence, silent)
+
+
+def _once(hopes: Sequence[Hope]) -> list[Hope]:
+    """Each pair of effects once, however it was come by."""
+    found: dict[frozenset[str], Hope] = {}
+    for hope in hopes:
+        found.setdefault(frozenset(effect.name for effect in hope.effects), hope)
+    return list(found.values())
 
 
 def _priced(fit: Fit) -> float:
@@ -174,9 +188,7 @@ def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence, sil
     temper = TEMPER + FORM_TEMPER * _left(best.misfit, evidence)
     weights = np.array([math.exp(-min((_priced(fit) - _priced(best)) / (2.0 * temper), 700.0)) for fit in pool])
     weights /= weights.sum()
-    ranking = tuple(
-        Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True)
-    )
+    ranking = tuple(Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
     found = nothing.misfit - _priced(best) > detectable(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False

@@ -147,7 +147,8 @@ class ControllerReplay:
         told = float(getattr(self._settings, name))
         size = max(abs(told), 0.01 * min(meaning.high, 1.0))
         # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.
-        grid = np.unique(np.clip(told + size * np.array([-2, -1, -0.75, -0.5, -0.25, 0.25, 0.5, 1, 2, 4]), meaning.low, meaning.high))
+        away = size * np.array([-2, -1, -0.75, -0.5, -0.25, 0.25, 0.5, 1, 2, 4])
+        grid = np.unique(np.clip(told + away, meaning.low, meaning.high))
 
         def left(value: float) -> float:
             return self.misfit(self.commands(self._with(name, value)))

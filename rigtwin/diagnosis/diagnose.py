@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from threadpoolctl import threadpool_limits
 
+from controllers import Measurements
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
 from rigtwin.diagnosis.checks import check
@@ -47,7 +48,9 @@ UNSURE = 0.9
 """Confidence below which another test is proposed."""
 WIDER = 2.5
 """Times the statistical interval that is reported: a model's form is never exact."""
-SOMETHING = 0.05
+UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
+"""Kinds that are read off signals or commands, and change no replay."""
+SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
 
@@ -84,7 +87,7 @@ def diagnose(
     base: Configuration,
     held_out: Sequence[Recording] = (),
     tests: Sequence[Test] = (),
-    progress: Callable[[str, int], object] = lambda stage, steps: None,
+    progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Outcome:
     """Diagnoses recordings of one rig against the twin of `base`. tests: the menu that a next one is chosen from; progress is
     called with a stage's name and the steps done in it.
@@ -130,7 +133,7 @@ def _diagnosed(
     sampled = outstanding(evidence.recordings, evidence.predicted(plant), evidence.plant)
     effects = [
         *_findings(found, verdict_of_data.kept, evidence),
-        *(_sampled(each, evidence.plant) for each in sampled),
+        *(_sampled(each) for each in sampled),
         *(_deviation(each) for each in deviations if each.kind != "unknown"),
     ]
     odd_controller = any(each.kind == "unknown" or not each.exact for each in deviations)
@@ -227,7 +230,7 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     return tuple(dict.fromkeys(names))
 
 
-def _sampled(each: Sampled, plant: Plant) -> Finding:
+def _sampled(each: Sampled) -> Finding:
     unit = find(f"{each.kind}@{each.component}").quantities()[each.parameter].unit
     spread = 0.05 * each.value
     estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
@@ -285,7 +288,7 @@ def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sa
 
 def _noisy(plant: Plant, evidence: Evidence) -> Plant:
     """The plant with the white noise that the recording has."""
-    for name, noise in zip(("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell"), evidence.lines[0].noise, strict=True):
+    for name, noise in zip(Measurements._fields, evidence.lines[0].noise, strict=True):
         plant = plant._replace(**{name: getattr(plant, name)._replace(white=float(noise))})
     return plant
 
@@ -296,9 +299,7 @@ def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled])
     return nominal._replace(plant=plant)
 
 
-def _next(
-    found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]
-) -> NextTest | None:
+def _next(found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]) -> NextTest | None:
     if not tests or found.best is None or not kept:
         return None
     likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]
@@ -327,6 +328,7 @@ def _sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Plac
         was = "no such effect" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
         parts.append(f"{effect.name} ({name} {estimate.value:.4g}{unit} instead of {was}, confidence {likely})")
     closes = f"; it closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
-    shown = closes if gap.before > 1.05 and any(e.name.kind not in ("noise", "hum", "quantisation", "setting") for e in effects) else ""
+    moves = any(effect.name.kind not in UNMOVING for effect in effects)
+    shown = closes if gap.before > 1.05 and moves else ""
     more = "; something that has no name here is left" if verdict == "partly explained" else ""
     return " and ".join(parts) + shown + more + "."

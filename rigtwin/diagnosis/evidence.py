@@ -8,6 +8,7 @@ share of the signal, since no model is exact. The mains line says nothing of the
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,7 @@ UNSEEN = 0.3
 """Share of that which does not count at all."""
 COARSE_BIT = 2.0
 """Bits of this many times the white noise are seen in the signal."""
+LOAD_CELL = Measurements._fields.index("load_cell")
 SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
@@ -163,6 +165,12 @@ class Evidence:
             noise = np.sum(each.fade**2, axis=1) * each.noise**2
             self.expected += float(np.sum(noise[:, None] * each.weight**2))
 
+    def coarser(self) -> Evidence:
+        """The same with half as many integration steps: for a search, not for its result."""
+        like = copy(self)
+        like.plants = [plant.coarser() for plant in self.plants]
+        return like
+
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
         for each, reduced in zip(self.lines, self.plants, strict=True):
@@ -178,8 +186,9 @@ class Evidence:
             for row in range(4):
                 bit = smallest_step(each.measured[row])
                 if bit > COARSE_BIT * each.noise[row]:
-                    power = np.abs(rfft(each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row]), each.length)) ** 2
-                    variance = 0.5 * COARSE * _smoothed(power[: len(each.frequency)])
+                    rounded = each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row])
+                    power = np.abs(rfft(rounded, each.length))[: len(each.frequency)] ** 2
+                    variance = 0.5 * COARSE * _smoothed(power)
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def predicted(self, plant: Plant) -> list[Array]:
@@ -195,8 +204,8 @@ class Evidence:
         found = []
         for each, predicted in zip(self.lines, predictions, strict=True):
             difference = each.measured - predicted
-            for row, noise in zip(difference, each.noise, strict=True):
-                despike(row, SPIKE * float(noise))
+            # Friction jumps; of what is sensed, only the force jumps with it.
+            despike(difference[LOAD_CELL], SPIKE * float(each.noise[LOAD_CELL]))
             found.append(difference)
         return found
 

@@ -87,6 +87,10 @@ class Space:
         """The residual less what the tolerances take up."""
         return residual + self._columns @ (self._used - self.nuisances(residual))
 
+    def apart(self, responses: Array) -> Array:
+        """Responses, shape (size, count), less what tolerances without bounds take up."""
+        return responses - self._columns @ np.linalg.solve(self._normal, self._columns.T @ responses)
+
     def misfit(self, residual: Array) -> float:
         """min over tolerances of |residual − what they do|² + their prior."""
         found = self.nuisances(residual)
@@ -102,6 +106,16 @@ class Space:
         shared = columns.T @ jacobian
         normal = jacobian.T @ jacobian - shared.T @ np.linalg.solve(self._normal[np.ix_(free, free)], shared)
         return normal, jacobian.T @ (residual + self._columns @ (self._used - found))
+
+
+@dataclass(frozen=True)
+class Hope:
+    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start from; space: tolerances."""
+
+    promised: float
+    effects: tuple[Effect, ...]
+    values: Values
+    space: Space = field(repr=False)
 
 
 class Fitter:
@@ -137,28 +151,26 @@ class Fitter:
         """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
         return max(self.space.misfit(response.astype(np.float64)) for _, response in self._responses[effect])
 
-    def seconds(self, first: Fit, effects: Sequence[Effect], count: int, least: float) -> list[tuple[tuple[Effect, ...], Values, Space]]:
-        """The likeliest second effects beside `first`, by how well their responses at the nominal plant resemble what it
-        leaves, if they promise to explain at least `least`: effects, values to start from and tolerances, as `refined` takes
-        them."""
+    def seconds(self, first: Fit, effects: Sequence[Effect], least: float) -> list[Hope]:
+        """Second effects beside `first` that promise to explain at least `least`, by how well their responses at the nominal
+        plant resemble what it leaves."""
         space = Space(self.evidence, first.plant)
         left = space.less(self.evidence.residual(first.plant))
-        scored = []
+        found = []
         for effect in effects:
             if effect in first.effects:
                 continue
-            best = (0.0, self._responses[effect][0][0])
-            for start, raw in self._responses[effect]:
-                response = space.less(raw)
-                power = float(response @ response)
-                share = float(response @ left) / power if power > 0.0 else 0.0
-                # A response may be too strong or too weak, but not the other way round.
-                share = min(max(share, 0.0), 3.0)
-                gain = 2.0 * share * float(response @ left) - share**2 * power
-                best = max(best, (gain, start))
-            scored.append((*best, effect))
-        scored.sort(key=lambda item: -item[0])
-        return [((*first.effects, effect), (*first.values, start), space) for gain, start, effect in scored[:count] if gain > least]
+            starts, responses = zip(*self._responses[effect], strict=True)
+            apart = space.apart(np.stack(responses, axis=1).astype(np.float64))
+            alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+            # A response may be too strong or too weak, but not the other way round.
+            share = np.clip(alike / power, 0.0, 3.0)
+            gains = 2.0 * share * alike - share**2 * power
+            best = int(np.argmax(gains))
+            if gains[best] > least:
+                promised = first.misfit - float(gains[best])
+                found.append(Hope(promised, (*first.effects, effect), (*first.values, starts[best]), space))
+        return found
 
     def settled(self, fit: Fit) -> Fit:
         """The fit again with the tolerances taken at it, and the mechanical ones used in the plant itself."""
@@ -175,7 +187,11 @@ class Fitter:
         return fit
 
     def refined(
-        self, effects: tuple[Effect, ...], start: Sequence[Sequence[float]], space: Space | None = None, base: Plant | None = None
+        self,
+        effects: tuple[Effect, ...],
+        start: Sequence[Sequence[float]],
+        space: Space | None = None,
+        base: Plant | None = None,
     ) -> Fit:
         """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
         base: the plant without the effects."""

@@ -198,9 +198,7 @@ class _Disturbance:
             for number in range(len(here)):
                 there = here.copy()
                 there[number] += 1.0
-                columns.append(
-                    self._evidence.whitened([b - a for a, b in zip(predicted, self.predicted(there), strict=True)])
-                )
+                columns.append(self._evidence.whitened([b - a for a, b in zip(predicted, self.predicted(there), strict=True)]))
             normal, gradient = space.normal_equations(np.stack(columns, axis=1), residual)
             normal += np.diag(1e-6 * np.diag(normal) + 1e-9)
             move = np.linalg.solve(normal, gradient)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from controllers import Measurements, Mode
+from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.finding import Level
 from rigtwin.diagnosis.noise import spectrum
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
-from rigtwin.errors import RigtwinError
 from rigtwin.loop import run_compiled
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
@@ -44,13 +44,14 @@ def replay_levels(recording: Recording, before: Configuration, after: Configurat
         return found
 
     with ThreadPoolExecutor(2) as pool:
-        one, other = pool.map(ratios, (before, after))
+        one, *others = pool.map(ratios, dict.fromkeys((before, after)))
+    other = others[0] if others else one
     return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
 
 
 def closed_loop(recording: Recording, before: Configuration, after: Configuration, own: Plant) -> Level | None:
-    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too short.
-    own: the corrected plant with the noise that the recording has.
+    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too
+    short. own: the corrected plant with the noise that the recording has.
     """
     if recording.ticks * recording.period < SHORTEST:
         return None
@@ -58,12 +59,10 @@ def closed_loop(recording: Recording, before: Configuration, after: Configuratio
     measured = _bands(np.stack([recording.column("/sensor", name) for name in Measurements._fields]), recording.period)
     nominal = before._replace(plant=_with_noise_of(own, before.plant))
     corrected = after._replace(plant=own)
-    runs = ((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1]))
-    try:
-        with ThreadPoolExecutor(2) as pool:
-            one, other, again = pool.map(lambda run: _bands(_run(*run, demands), recording.period), runs)
-    except RigtwinError:
-        return None
+    runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
+    with ThreadPoolExecutor(2) as pool:
+        found = dict(zip(runs, pool.map(lambda run: _bands(_run(*run, demands), recording.period), runs), strict=True))
+    one, other, again = found[nominal, SEEDS[0]], found[corrected, SEEDS[0]], found[corrected, SEEDS[1]]
     return Level(_apart(measured, one), _apart(measured, other), _apart(other, again))
 
 
@@ -87,10 +86,8 @@ def _bands(signals: Array, period: float) -> Array:
     rows = []
     for signal in signals:
         frequency, density = spectrum(signal - np.mean(signal), period)
-        rows.append(
-            [float(np.mean(density[(frequency >= a) & (frequency < b)])) if ((frequency >= a) & (frequency < b)).any() else math.nan
-             for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        )
+        bands = [(frequency >= low) & (frequency < high) for low, high in pairwise(edges)]
+        rows.append([float(np.mean(density[band])) if band.any() else math.nan for band in bands])
     return np.array(rows)
 
 
@@ -99,8 +96,3 @@ def _apart(one: Array, other: Array) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         decibels = 10.0 * np.log10(one / other)
     return float(np.sqrt(np.nanmean(decibels[np.isfinite(decibels)] ** 2)))
-
-
-def is_closed(configuration: Configuration) -> bool:
-    """Whether the test has a model in the loop."""
-    return configuration.controller.mode == Mode.MIL

@@ -43,7 +43,7 @@ def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recor
 
 
 def proposed(fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
-    """The test of a menu that separates explanations best; None if none would. fits: two or more; the first is the likeliest."""
+    """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
     if len(fits) < 2:
         return None
     best: NextTest | None = None

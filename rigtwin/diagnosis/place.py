@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,7 @@ def region(difference: Array, speed: Array, force: Array, period: float) -> str:
         "large force": np.abs(swing) > LARGE * float(np.std(force)),
     }
     edges = np.linspace(0, len(power), STRETCHES + 1).astype(int)
-    for start, end in zip(edges[:-1], edges[1:], strict=True):
+    for start, end in pairwise(edges):
         stretch = np.zeros(len(power), bool)
         stretch[start:end] = True
         regions[f"{start * period:.1f} to {end * period:.1f} s"] = stretch
@@ -69,7 +71,7 @@ def speed_of(component: str, true: Array, period: float) -> Array:
     return np.gradient(position, period)
 
 
-def placed(evidence: Evidence, component: str, share: float, differences: list[Array], plant: Plant, words: str = "") -> Place:
+def placed(evidence: Evidence, component: str, share: float, differences: list[Array], words: str = "") -> Place:
     """The place of differences, shape (4, ticks) for each recording, that a component causes."""
     noise = evidence.lines[0].noise
     power = [sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2 for row in range(4)]
@@ -81,4 +83,3 @@ def placed(evidence: Evidence, component: str, share: float, differences: list[A
     low, high = band(difference, recording.period)
     sensor = Measurements._fields[row]
     return Place(component, share, (low, high), where, words or f"most of it seen by {sensor}")
-

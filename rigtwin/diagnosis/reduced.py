@@ -216,6 +216,10 @@ class Reduced:
         self._last: dict[tuple[object, ...], Array] = {}
         self._plates: dict[tuple[object, ...], Plate] = {}
 
+    def coarser(self) -> Reduced:
+        """The same with half as many steps."""
+        return Reduced(self._ground, self._structure, self._voltage, self._configuration, max(1, self._steps // 2))
+
     def finer(self) -> Reduced:
         """The same with twice as many steps."""
         return Reduced(self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps)
@@ -294,4 +298,3 @@ class Reduced:
             # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
-

@@ -23,7 +23,8 @@ LEVELS = 64
 
 @dataclass(frozen=True)
 class Sampled:
-    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value, nominal: in the sensor's unit."""
+    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value, nominal: in the sensor's
+    unit."""
 
     component: str
     kind: str

@@ -28,6 +28,9 @@ TAPER = 0.1
 """s, over which a part of a recording begins and ends to count."""
 
 
+Effects = tuple[Effect, ...]
+
+
 @dataclass(frozen=True)
 class Blocks:
     """Power of what is left, in units of the sensors' white noise power, by blocks of time: with the nominal plant and with the
@@ -65,7 +68,7 @@ def blocks(evidence: Evidence, before: Plant, after: Plant, counted: Sequence[Ar
 
 
 def shrinkage(before: float, after: float) -> float:
-    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's: 1 all, negative if worse."""
+    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's; negative if worse."""
     gap, left = math.sqrt(max(before - 1.0, 0.0)), math.sqrt(max(after - 1.0, 0.0))
     return 1.0 - left / gap if gap > 0.0 else 0.0
 
@@ -109,9 +112,7 @@ def _refitted(evidence: Evidence, fit: Fit) -> Fit:
     return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
 
 
-def judged(
-    evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration]
-) -> Judged:
+def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration]) -> Judged:
     """Judges a fit on held-out recordings; without any, on each half of the recordings after a fit to the other half."""
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if held_out:
@@ -153,7 +154,7 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
-def gated(effects: tuple[Effect, ...], across: Callable[[tuple[Effect, ...]], Blocks]) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+def gated(effects: Effects, across: Callable[[Effects], Blocks]) -> tuple[Effects, Effects]:
     """(kept, rejected) effects: none stays that makes held-out data worse. across: what is left with some of the effects."""
     kept = effects
     for effect in effects:

@@ -18,7 +18,8 @@ def described(diagnosis: Diagnosis) -> str:
     for fault in diagnosis.faults:
         lines.append(f"  fault: {fault}")
     for effect in diagnosis.effects:
-        lines.append(f"  {effect.name}, confidence {100 * effect.confidence:.0f} %, share of the gap {100 * effect.share:.0f} %")
+        sure, share = 100 * effect.confidence, 100 * effect.share
+        lines.append(f"  {effect.name}, confidence {sure:.0f} %, share of the gap {share:.0f} %")
         for name, estimate in effect.parameters.items():
             lines.append(f"    {name} = {number(estimate)}")
         if len(effect.alternatives) > 1:

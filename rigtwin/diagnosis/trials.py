@@ -52,81 +52,84 @@ def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
     return found
 
 
+Searched = Callable[[Effect, Plant, Swing], Trials]
+
+
 def _single(values: tuple[float, ...], step: float) -> Trials:
     return Trials(tuple((value,) for value in values), (step,))
 
 
-def _around(nominal: float, shares: tuple[float, ...], step: float) -> Trials:
-    return _single(tuple(nominal * share for share in shares), abs(nominal) * step)
+def _friction(effect: Effect, plant: Plant) -> tuple[float, float]:
+    """Coulomb friction there is, and a size to try changes of."""
+    there = float(getattr(plant, effect.group).coulomb)
+    return there, max(there, LEAST_FRICTION)
 
 
-def _friction(effect: Effect, plant: Plant, swing: Swing) -> float:
-    return max(getattr(plant, effect.group).coulomb, LEAST_FRICTION)
+def _coulomb(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
+    there, base = _friction(effect, plant)
+    return _single(tuple(max(there + share * base, 0.0) for share in (-0.7, -0.3, 0.3, 1.0, 3.0)), 0.03 * base)
 
 
-def _coulomb(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-    nominal, base = getattr(plant, effect.group).coulomb, _friction(effect, plant, swing)
-    return _single(tuple(max(nominal + share * base, 0.0) for share in (-0.7, -0.3, 0.3, 1.0, 3.0)), 0.03 * base)
-
-
-def _stribeck(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-    base = _friction(effect, plant, swing)
+def _stribeck(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
+    _, base = _friction(effect, plant)
     amplitudes = (-0.5 * base, 0.5 * base, 2.0 * base)
     return Trials(tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.1))), (0.05 * base, 0.001))
 
 
-def _asymmetry(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-    base = _friction(effect, plant, swing)
+def _asymmetry(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
+    _, base = _friction(effect, plant)
     return _single((-base, -0.3 * base, 0.3 * base, base), 0.03 * base)
 
 
-def _cogging(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+def _cogging(_effect: Effect, _plant: Plant, _swing: Swing) -> Trials:
     pitches = (0.008, 0.012, 0.016, 0.02, 0.025, 0.03, 0.036, 0.045, 0.06, 0.08)
     phases = (0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi)
     return Trials(tuple(product((8.0,), pitches, phases)), (0.5, 2e-4, 0.05))
 
 
-def _offset(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+def _offset(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
     if isinstance(getattr(plant, effect.group), Lvdt):
         return _single((-2e-3, -3e-4, 3e-4, 2e-3), 1e-5)
     return _single((-20.0, -4.0, 4.0, 20.0), 0.1)
 
 
-def _deadband(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+def _deadband(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
     if isinstance(getattr(plant, effect.group), Motor):
         return _single((0.02, 0.08, 0.3), 0.004)
     return _single((1e-4, 5e-4, 2e-3, 6e-3), 2e-5)
 
 
-def _saturation(effect: Effect, plant: Plant, swing: Swing) -> Trials:
+def _saturation(_effect: Effect, _plant: Plant, swing: Swing) -> Trials:
     return _limits(swing.largest)
 
 
 def _rate_limit(effect: Effect, plant: Plant, swing: Swing) -> Trials:
     component = getattr(plant, effect.group)
     if isinstance(component, Cylinder):
-        return _limits(tuple(min(fastest, share * component.speed_limit) for fastest, share in zip(swing.fastest, BELOW, strict=True)))
+        known = [share * component.speed_limit for share in BELOW]
+        return _limits(tuple(min(pair) for pair in zip(swing.fastest, known, strict=True)))
     return _limits(swing.fastest)
 
 
 def _limits(values: tuple[float, ...]) -> Trials:
     """A limit at each of these values."""
     tried = tuple(max(value, 1e-3 * max(values), 1e-6) for value in values)
-    return Trials(tuple((value,) for value in tried), (0.004 * max(float(np.median(tried)), 1e-6),))
+    return _single(tried, 0.004 * max(float(np.median(tried)), 1e-6))
 
 
-def _nominal(shares: tuple[float, ...], step: float) -> Callable[[Effect, Plant, Swing], Trials]:
-    def around(effect: Effect, plant: Plant, swing: Swing) -> Trials:
-        return _around(effect.nominal(plant)[effect.kind.parameters[0]], shares, step)
+def _nominal(shares: tuple[float, ...], step: float) -> Searched:
+    def around(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
+        nominal = effect.nominal(plant)[effect.kind.parameters[0]]
+        return _single(tuple(nominal * share for share in shares), abs(nominal) * step)
 
     return around
 
 
-def _fixed(values: tuple[float, ...], step: float) -> Callable[[Effect, Plant, Swing], Trials]:
-    return lambda effect, plant, swing: _single(values, step)
+def _fixed(values: tuple[float, ...], step: float) -> Searched:
+    return lambda _effect, _plant, _swing: _single(values, step)
 
 
-TRIALS: dict[str, Callable[[Effect, Plant, Swing], Trials]] = {
+TRIALS: dict[str, Searched] = {
     "coulomb": _coulomb,
     "viscous": _fixed((20.0, 100.0, 400.0, 1500.0), 5.0),
     "stribeck": _stribeck,
@@ -151,4 +154,5 @@ TRIALS: dict[str, Callable[[Effect, Plant, Swing], Trials]] = {
 
 def trials(effect: Effect, plant: Plant, swing: dict[str, Swing]) -> Trials:
     """Where to start, and how finely to step."""
-    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, Swing((0.0,) * len(SHARES), (0.0,) * len(SHARES))))
+    none = Swing((0.0,) * len(SHARES), (0.0,) * len(SHARES))
+    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, none))

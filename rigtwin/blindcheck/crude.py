@@ -1,0 +1,54 @@
+"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit named."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from controllers import Measurements
+from rigtwin.configuration import Configuration, Safety
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.fit import with_values
+from rigtwin.diagnosis.noise import white_noise
+from rigtwin.diagnosis.trials import TRIALS, swings, trials
+from rigtwin.effects import candidates
+from rigtwin.loop import run_compiled
+from rigtwin.parameters import Plant
+from rigtwin.recording import load
+from rigtwin.twin import Twin
+
+TRIED = 40
+"""Cases that it is tried on: it runs the twin some two hundred times for each."""
+SECONDS = 6.0
+"""s of each test."""
+BETTER = 0.98
+"""Share of the nominal misfit below which an effect counts as found."""
+
+
+def black_box(path: Path) -> str:
+    """The effect whose closed loop comes nearest to a recording tick by tick, or `none`."""
+    recording = load(path)
+    configuration = configuration_of(recording, Configuration())
+    ticks = min(recording.ticks, round(SECONDS / recording.period))
+    free = configuration._replace(
+        safety=Safety(math.inf, math.inf, math.inf), timing=configuration.timing._replace(timestep=0.5 * recording.period)
+    )
+    demands = np.column_stack([recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")])
+    measured = np.stack([recording.column("/sensor", name)[:ticks] for name in Measurements._fields])
+    noise = np.array([white_noise(row) for row in measured])
+
+    def misfit(plant: Plant) -> float:
+        twin = Twin(free._replace(plant=plant), float(demands[0, 0]), 0)
+        truth = np.concatenate([block.truth for block in run_compiled(twin, free, demands) if block.truth is not None]).T
+        return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
+
+    best, name = BETTER * misfit(configuration.plant), "none"
+    swing = swings((recording,))
+    for effect in candidates(configuration.plant):
+        if effect.kind.name in TRIALS:
+            for start in trials(effect, configuration.plant, swing).starts[:8]:
+                if (value := misfit(with_values(configuration.plant, (effect,), (start,)))) < best:
+                    best, name = value, effect.name
+    return name
