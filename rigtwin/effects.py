@@ -21,39 +21,54 @@ SENSORS = (Lvdt, LoadCell)
 
 @dataclass(frozen=True)
 class Kind:
-    """A sort of effect. at: types of component that can have it; parameters: theirs that it sets, the first its magnitude;
-    meaning: what it does."""
+    """A sort of effect. title: its name in a sentence; at: types of component that can have it; parameters: theirs that it
+    sets, the first its magnitude; meaning: what it does."""
 
     name: str
+    title: str
     at: tuple[type, ...]
     parameters: tuple[str, ...]
     meaning: str
 
 
 KINDS = (
-    Kind("coulomb", SLIDES, ("coulomb",), "dry friction, the same at any speed"),
-    Kind("viscous", SLIDES, ("viscous",), "friction in proportion to the speed"),
-    Kind("stribeck", SLIDES, ("stribeck", "stribeck_velocity"), "dry friction greater near standstill"),
-    Kind("asymmetry", SLIDES, ("asymmetry",), "dry friction greater in positive direction than in negative"),
-    Kind("backlash", SLIDES, ("backlash",), "friction felt only once a gap is taken up after each reversal"),
-    Kind("mass", (Carriage,), ("mass",), "mass"),
-    Kind("stiffness", (Tyre,), ("stiffness",), "stiffness at small deflection"),
-    Kind("damping", (Tyre,), ("damping",), "damping while in contact"),
-    Kind("hardening", (Tyre,), ("hardening",), "stiffness that grows with deflection"),
-    Kind("gain", (*ACTUATORS, *SENSORS), ("gain",), "output by this factor"),
-    Kind("lag", (*ACTUATORS, *SENSORS), ("lag",), "a first-order lag more"),
-    Kind("delay", (*ACTUATORS, *SENSORS, Computer), ("delay",), "a delay more"),
-    Kind("saturation", ACTUATORS, ("saturation",), "command limited to this magnitude"),
-    Kind("deadband", ACTUATORS, ("deadband",), "command without effect within this band"),
-    Kind("rate_limit", (Motor,), ("rate_limit",), "command's rate limited"),
-    Kind("rate_limit", (Cylinder,), ("speed_limit",), "speed limited"),
-    Kind("cogging", (Motor,), ("cogging", "cogging_pitch", "cogging_phase"), "force that alternates along the stroke"),
-    Kind("compliance", (Cylinder,), ("compliance",), "yields under load"),
-    Kind("offset", SENSORS, ("offset",), "output displaced"),
-    Kind("hum", SENSORS, ("hum",), "amplitude of the mains line"),
-    Kind("noise", SENSORS, ("white",), "white noise, rms"),
-    Kind("quantisation", SENSORS, ("resolution",), "size of one bit"),
-    Kind("missed_ticks", (Computer,), ("missed_ticks",), "share of ticks at which the outputs stay as they are"),
+    Kind("coulomb", "Coulomb friction", SLIDES, ("coulomb",), "dry friction, the same at any speed"),
+    Kind("viscous", "viscous friction", SLIDES, ("viscous",), "friction in proportion to the speed"),
+    Kind("stribeck", "Stribeck friction", SLIDES, ("stribeck", "stribeck_velocity"), "dry friction greater near standstill"),
+    Kind(
+        "asymmetry",
+        "asymmetry of friction",
+        SLIDES,
+        ("asymmetry",),
+        "dry friction greater in positive direction than in negative",
+    ),
+    Kind("backlash", "backlash", SLIDES, ("backlash",), "friction felt only once a gap is taken up after each reversal"),
+    Kind("mass", "mass", (Carriage,), ("mass",), "mass"),
+    Kind("stiffness", "stiffness", (Tyre,), ("stiffness",), "stiffness at small deflection"),
+    Kind("damping", "damping", (Tyre,), ("damping",), "damping while in contact"),
+    Kind("hardening", "hardening", (Tyre,), ("hardening",), "stiffness that grows with deflection"),
+    Kind("gain", "gain", (*ACTUATORS, *SENSORS), ("gain",), "output by this factor"),
+    Kind("lag", "lag", (*ACTUATORS, *SENSORS), ("lag",), "a first-order lag more"),
+    Kind("delay", "delay", (*ACTUATORS, *SENSORS, Computer), ("delay",), "a delay more"),
+    Kind("saturation", "saturation", ACTUATORS, ("saturation",), "command limited to this magnitude"),
+    Kind("deadband", "deadband", ACTUATORS, ("deadband",), "command without effect within this band"),
+    Kind("rate_limit", "rate limit", (Motor,), ("rate_limit",), "command's rate limited"),
+    Kind("rate_limit", "rate limit", (Cylinder,), ("speed_limit",), "speed limited"),
+    Kind(
+        "cogging", "cogging", (Motor,), ("cogging", "cogging_pitch", "cogging_phase"), "force that alternates along the stroke"
+    ),
+    Kind("compliance", "compliance", (Cylinder,), ("compliance",), "yields under load"),
+    Kind("offset", "offset", SENSORS, ("offset",), "output displaced"),
+    Kind("hum", "mains hum", SENSORS, ("hum",), "amplitude of the mains line"),
+    Kind("noise", "white noise", SENSORS, ("white",), "white noise, rms"),
+    Kind("quantisation", "quantisation", SENSORS, ("resolution",), "size of one bit"),
+    Kind(
+        "missed_ticks",
+        "share of missed ticks",
+        (Computer,),
+        ("missed_ticks",),
+        "share of ticks at which the outputs stay as they are",
+    ),
 )
 """Every kind of effect. `setting@controller` is besides: any setting that is not what the operator wrote down."""
 

@@ -29,7 +29,7 @@ class Rail(NamedTuple):
     coulomb: Annotated[float, Quantity("N", 0.0, 1000.0, "breakaway, thesis §6.1.3")] = 50.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e4, _NONE)] = 0.0
     stribeck: Annotated[float, Quantity("N", -500.0, 1000.0, _NONE)] = 0.0
-    stribeck_velocity: Annotated[float, Quantity("m/s", 1e-4, 1.0, "of the order seen in rail guides, assumed")] = 0.01
+    stribeck_velocity: Annotated[float, Quantity("m/s", 1e-4, 0.1, "of the order seen in rail guides, assumed")] = 0.01
     asymmetry: Annotated[float, Quantity("N", -500.0, 500.0, _NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, _NONE)] = 0.0
 
@@ -53,7 +53,7 @@ class Motor(NamedTuple):
     coulomb: Annotated[float, Quantity("N", 0.0, 500.0, "0.15 V step is 2·F_c, thesis §4.4: 0.15·186/2")] = 14.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e4, _NONE)] = 0.0
     stribeck: Annotated[float, Quantity("N", -500.0, 500.0, _NONE)] = 0.0
-    stribeck_velocity: Annotated[float, Quantity("m/s", 1e-4, 1.0, "of the order seen in rail guides, assumed")] = 0.01
+    stribeck_velocity: Annotated[float, Quantity("m/s", 1e-4, 0.1, "of the order seen in rail guides, assumed")] = 0.01
     asymmetry: Annotated[float, Quantity("N", -500.0, 500.0, _NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, _NONE)] = 0.0
     gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: the amplifier as specified")] = 1.0

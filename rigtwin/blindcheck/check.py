@@ -19,8 +19,9 @@ from rigtwin.errors import RigtwinError
 
 @dataclass(frozen=True)
 class Result:
-    """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON document a case; crude: what
-    the black-box baseline named, of the cases it was tried on; commitment: SHA-256 of salt and key, given before any answer."""
+    """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON document a case; crude:
+    what the black-box baseline named, of the cases it was tried on; commitment: SHA-256 of salt and key, given before any
+    answer."""
 
     seed: int
     commitment: str
@@ -40,7 +41,8 @@ def check(folder: Path, cases: int, seed: int, baselines: bool, progress: Callab
     answers.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "rigtwin.blindcheck.referee", str(recordings), str(cases), str(seed)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as referee:
-        assert referee.stdin is not None and referee.stdout is not None
+        assert referee.stdin is not None
+        assert referee.stdout is not None
         commitment = ""
         for line in referee.stdout:
             word, _, rest = line.partition(" ")

@@ -35,7 +35,7 @@ def _road(time: Array, speed: float, low: float, high: float, random: np.random.
 
 def asked(test: str, random: np.random.Generator) -> tuple[Law, Array]:
     """The controller's settings and the demands, shape (ticks, 3), of a test of that name."""
-    time = np.arange(round(SECONDS[test] / 1e-3)) * 1e-3
+    time: Array = np.arange(round(SECONDS[test] / 1e-3), dtype=np.float64) * 1e-3
     demands = np.zeros((len(time), 3))
     if test in ("imposed", "tripped"):
         demands[:, 0] = _sines(time, 0.2, 10.0, 1.0, 0.005, random)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
+from rigtwin.diagnosis.fit import Fit, Fitter, Hope, Values, with_values
 from rigtwin.diagnosis.tolerances import tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
@@ -49,7 +49,9 @@ BEAM = 3
 """First effects to which a second is sought."""
 MANY, FEW = 10, 3
 """Pairs fitted in full, where one effect leaves much and where it leaves little."""
-SETTLED_PAIRS = 2
+FAMILIES = ({"lag", "delay"}, {"coulomb", "stribeck"})
+"""Kinds that are easily taken for one another."""
+SETTLED_PAIRS = 3
 """Pairs that are fitted again with the tolerances taken at them."""
 FAR_BEHIND = 0.7
 """Share of what the best effect explains that a first of two may lack."""
@@ -152,11 +154,36 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             hopeful = _once(hopes)[: MANY if much else FEW]
             pairs = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful)
             pairs.sort(key=_priced)
+            if pairs:
+                siblings = _siblings(pairs[0], effects, search)
+                pairs += mapped(lambda pair: search.refined(pair[0], pair[1]), siblings)
+                pairs.sort(key=_priced)
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
             least_more = max(least, RELATIVE * gap)
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
     return _judged(nothing, tried, first, evidence, silent)
+
+
+def _siblings(pair: Fit, effects: Sequence[Effect], search: Fitter) -> list[tuple[tuple[Effect, ...], Values]]:
+    """The pair with each effect replaced by those of its component that are most like it."""
+    found = []
+    for number, effect in enumerate(pair.effects):
+        for other in effects:
+            alike = any({effect.kind.name, other.kind.name} <= family for family in FAMILIES)
+            if other.group == effect.group and other != effect and alike:
+                changed, values = list(pair.effects), list(pair.values)
+                changed[number] = other
+                # Of one family and one unit: what fits the one is a start for the other.
+                values[number] = (_like(effect, other, values[number][0], search), *search.trials(other).starts[0][1:])
+                found.append((tuple(changed), tuple(values)))
+    return found
+
+
+def _like(effect: Effect, other: Effect, value: float, search: Fitter) -> float:
+    """A magnitude of `other` as far from nominal as `value` is for `effect`."""
+    here, there = (each.nominal(search.plant)[each.kind.parameters[0]] for each in (effect, other))
+    return there + value - here
 
 
 def _once(hopes: Sequence[Hope]) -> list[Hope]:

@@ -13,7 +13,7 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.diagnosis.noise import rms, white_noise
+from rigtwin.diagnosis.noise import rms, smallest_step, white_noise
 from rigtwin.recording import Recording
 
 MACHINE = "suspension-rig"
@@ -21,12 +21,16 @@ SHORTEST = 200
 """Ticks below which a noise floor cannot be estimated."""
 STUCK = 200
 """Equal samples in a row of a sensor that has noise: it is not alive."""
+COARSE = 20.0
+"""Times its nominal bit from which a sensor is coarse."""
 FLAT = 8
 """Equal samples in a row at a signal's very end of range: it is cut off there."""
 MOVES = 10.0
 """A motion this many times its sensor's noise says what its scale is."""
 FAR_OFF = 5.0
 """A scale this far from 1 either way is a unit, no gain."""
+WOUND_UP = 0.05
+"""Share of ticks with the motor's voltage at its limit from which its force loop is no measure of the load cell."""
 UNITS = {"m": ((1e3, "mm"), (1e2, "cm"), (39.37, "inch")), "N": ((1e-3, "kN"), (0.2248, "lbf"), (9.81**-1, "kgf"))}
 """SI unit → (how many of another make one, its name)."""
 MOVED_BY = {
@@ -58,7 +62,7 @@ def check(recording: Recording, configuration: Configuration) -> tuple[Fault, ..
         lambda: _presence(recording),
         lambda: _time(recording),
         lambda: _numbers(recording),
-        lambda: _alive(recording),
+        lambda: _alive(recording, configuration),
         lambda: _order(recording, configuration),
         lambda: _scale(recording, configuration),
     )
@@ -105,17 +109,21 @@ def _numbers(recording: Recording) -> Iterator[Fault]:
                 yield Fault("implausible", f"{topic}.{name}", message)
 
 
-def _alive(recording: Recording) -> Iterator[Fault]:
+def _alive(recording: Recording, configuration: Configuration) -> Iterator[Fault]:
     for name in Measurements._fields:
         signal = recording.column("/sensor", name)
         where, first, length = f"/sensor.{name}", *longest_run(signal, np.ones(len(signal), bool))
         throughout = length == len(signal)
         if throughout and not any(np.ptp(recording.column("/command", command)) > 0 for command in MOVED_BY[name]):
             continue
-        if length >= STUCK:
+        # Bits as coarse as that stand still while the signal moves between them.
+        coarse = smallest_step(signal) > COARSE * getattr(configuration.plant, name).resolution
+        if length >= STUCK and (throughout or not coarse):
             since = f"for {length * recording.period:.3g} s from {recording.time[first]:.3f} s"
             span = "throughout" if throughout else since
             yield Fault("dead", where, f"{where} does not change {span}: a dead or disconnected sensor")
+            continue
+        if coarse:
             continue
         for end, extreme in (("above", signal.max()), ("below", signal.min())):
             at_end = signal == extreme
@@ -154,11 +162,11 @@ def expected(recording: Recording, configuration: Configuration) -> dict[str, Ar
 
 def _scale(recording: Recording, configuration: Configuration) -> Iterator[Fault]:
     """Units and signs, by how much a signal goes with what is expected of it."""
+    odd: dict[str, float] = {}
     for name, model in expected(recording, configuration).items():
         signal, where = recording.column("/sensor", name), f"/sensor.{name}"
-        unit = "N" if name == "load_cell" else "m"
         # Motions have a zero that may be displaced; a force has its preload, which says its scale even at rest.
-        a, b = (signal, model) if unit == "N" else (signal - signal.mean(), model - model.mean())
+        a, b = (signal, model) if name == "load_cell" else (signal - signal.mean(), model - model.mean())
         if rms(b) < MOVES * white_noise(signal) / max(rms(a) / max(rms(b), 1e-12), 1e-12):
             continue
         slope = float(a @ b / (b @ b))
@@ -168,9 +176,20 @@ def _scale(recording: Recording, configuration: Configuration) -> Iterator[Fault
         if slope < 0:
             yield Fault("sign", where, f"{where} has the wrong sign: it goes against what was commanded")
         elif not 1 / FAR_OFF < slope < FAR_OFF:
-            factor, guess = min(UNITS[unit], key=lambda pair: abs(np.log(pair[0] / slope)))
-            name_of = f", as if in {guess}" if abs(np.log(factor / slope)) < 0.5 else ""
-            yield Fault("unit", where, f"{where} is {slope:.3g} times what was commanded{name_of}; expected {unit}")
+            odd[name] = slope
+    voltage = np.abs(recording.column("/command", "voltage"))
+    if float(np.mean(voltage >= 0.99 * configuration.controller.voltage_limit)) > WOUND_UP:
+        # A force loop at its limit says that the force is not to be had; whose fault it is, is for the diagnosis.
+        odd.pop("load_cell", None)
+    if {"structure_lvdt", "suspension_lvdt"} <= set(odd) and 0.5 < odd["structure_lvdt"] / odd["suspension_lvdt"] < 2.0:
+        # Two sensors that agree on a plate that hardly moves: it hardly moves.
+        del odd["structure_lvdt"], odd["suspension_lvdt"]
+    for name, slope in odd.items():
+        unit = "N" if name == "load_cell" else "m"
+        factor, guess = min(UNITS[unit], key=lambda pair: abs(np.log(pair[0] / slope)))
+        name_of = f", as if in {guess}" if abs(np.log(factor / slope)) < 0.5 else ""
+        where = f"/sensor.{name}"
+        yield Fault("unit", where, f"{where} is {slope:.3g} times what was commanded{name_of}; expected {unit}")
 
 
 def _order(recording: Recording, configuration: Configuration) -> Iterator[Fault]:

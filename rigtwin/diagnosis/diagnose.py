@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from threadpoolctl import threadpool_limits
 
 from controllers import Measurements
+from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
 from rigtwin.diagnosis.checks import check
@@ -130,7 +131,7 @@ def _diagnosed(
     left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
     something = found.unknown or bool(verdict_of_data.rejected) or (left - disturbed[0].misfit) > SOMETHING * evidence.expected
     deviations = _deviations(evidence)
-    sampled = outstanding(evidence.recordings, evidence.predicted(plant), evidence.plant)
+    sampled = outstanding(evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant)
     effects = [
         *_findings(found, verdict_of_data.kept, evidence),
         *(_sampled(each) for each in sampled),
@@ -257,7 +258,7 @@ def _where(
     own = evidence.predicted(plant)
     for effect in kept:
         without = with_effects(evidence.plant, best, [other for other in kept if other != effect])
-        change = [a - b for a, b in zip(own, evidence.predicted(without), strict=True)]
+        change: list[Array] = [a - b for a, b in zip(own, evidence.predicted(without), strict=True)]
         share = min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0)
         place = placed(evidence, effect.component, share, change)
         if effect.component not in places or places[effect.component].share < share:
@@ -325,10 +326,13 @@ def _sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Plac
         name, estimate = next(iter(effect.parameters.items()))
         unit = "" if estimate.unit == "1" else f" {estimate.unit}"
         likely = f"{100 * effect.confidence:.0f} %"
-        was = "no such effect" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
-        parts.append(f"{effect.name} ({name} {estimate.value:.4g}{unit} instead of {was}, confidence {likely})")
-    closes = f"; it closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
+        was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
+        title = f"setting {name}" if effect.name.kind == "setting" else find(str(effect.name)).kind.title
+        owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
+        parts.append(f"the {owner} has a {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
+    closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
     moves = any(effect.name.kind not in UNMOVING for effect in effects)
     shown = closes if gap.before > 1.05 and moves else ""
     more = "; something that has no name here is left" if verdict == "partly explained" else ""
-    return " and ".join(parts) + shown + more + "."
+    text = " and ".join(parts) + shown + more + "."
+    return text[0].upper() + text[1:]

@@ -12,8 +12,9 @@ from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.fft import rfft, rfftfreq
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft, rfftfreq
+from scipy.fft import next_fast_len
 
 from controllers import Measurements
 from rigtwin.arrays import Array
@@ -36,8 +37,10 @@ STARTED = 0.7
 """s, from which a test counts in full: by then the plates have left whatever they started from."""
 UNSEEN = 0.3
 """Share of that which does not count at all."""
+COARSER = 30.0
+"""How much more variance than rounding the prediction shows is put down to a coarse sensor's bits."""
 COARSE_BIT = 2.0
-"""Bits of this many times the white noise are seen in the signal."""
+"""Bits of this many times the noise, which they themselves then are, are seen in the signal."""
 LOAD_CELL = Measurements._fields.index("load_cell")
 SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
@@ -51,13 +54,14 @@ SMOOTHED = 8
 class Lines:
     """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
     multiplied by, shape (4, lines); fade: what a difference is multiplied by before, shape (4, ticks); measured: shape
-    (4, ticks); noise: white, of each sensor, shape (4,)."""
+    (4, ticks); noise: white, of each sensor, shape (4,); bit: size of one of each sensor, shape (4,)."""
 
     frequency: Array
     weight: Array
     fade: Array
     measured: Array
     noise: Array
+    bit: Array
     length: int
 
 
@@ -65,7 +69,7 @@ def lines(recording: Recording, mains: float, counted: Array) -> Lines:
     """The lines of a recording's sensors, and their weights. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
     measured = np.stack([recording.column("/sensor", name) for name in Measurements._fields])
     ticks = measured.shape[1]
-    length = next_fast_len(ticks, real=True)
+    length = int(next_fast_len(ticks, real=True) or ticks)
     frequency = rfftfreq(length, recording.period)
     kept = frequency <= min(HIGHEST, 0.4 / recording.period)
     width = max(MAINS_WIDTH, 2.0 / (ticks * recording.period))
@@ -79,8 +83,10 @@ def lines(recording: Recording, mains: float, counted: Array) -> Lines:
         swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
         variance = 0.5 * (float(fade[row] @ fade[row]) * floor[row] ** 2 + FORM**2 * _smoothed(power)) + 1e-300
+        # What a signal's swing is held to says nothing of its mean.
+        variance[0] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2 + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
-    return Lines(frequency[kept], weight, fade, measured, floor, length)
+    return Lines(frequency[kept], weight, fade, measured, floor, resolution, length)
 
 
 def cut_off(row: Array) -> NDArray[np.bool_]:
@@ -151,7 +157,13 @@ class Evidence:
             for recording, c, part in zip(recordings, configurations, counted, strict=True)
         ]
         self.plants = [
-            Reduced(*(recording.column("/command", name) for name in ("ground", "structure", "voltage")), c, steps)
+            Reduced(
+                recording.column("/command", "ground"),
+                recording.column("/command", "structure"),
+                recording.column("/command", "voltage"),
+                c,
+                steps,
+            )
             for recording, c in zip(recordings, configurations, strict=True)
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
@@ -184,11 +196,11 @@ class Evidence:
         """Adds what the bits of a coarse sensor leave, which is no white noise but follows the signal."""
         for each, predicted in zip(self.lines, self.predicted(self.plant), strict=True):
             for row in range(4):
-                bit = smallest_step(each.measured[row])
+                bit = float(each.bit[row])
                 if bit > COARSE_BIT * each.noise[row]:
                     rounded = each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row])
                     power = np.abs(rfft(rounded, each.length))[: len(each.frequency)] ** 2
-                    variance = 0.5 * COARSE * _smoothed(power)
+                    variance = 0.5 * COARSER * _smoothed(power)
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def predicted(self, plant: Plant) -> list[Array]:

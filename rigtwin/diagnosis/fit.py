@@ -136,16 +136,37 @@ class Fitter:
         """The best fit of one effect."""
         scored: list[tuple[float, tuple[float, ...]]] = []
         responses = []
-        for start in self.trials(effect).starts:
+        found = self.trials(effect)
+        for start in found.starts:
             residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
             scored.append((self.space.misfit(residual), start))
             responses.append((start, (self._nominal - residual).astype(np.float32)))
         self._responses[effect] = responses
+        if found.quadrature:
+            scored += self._blended(effect, responses)
         scored.sort()
         # Another start is followed too where it comes near the best; where none helps, the best is followed alone.
         enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
         followed = [start for number, (misfit, start) in enumerate(scored[:REFINED]) if number == 0 or misfit < enough]
         return min((self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit)
+
+    def _blended(
+        self, effect: Effect, responses: list[tuple[tuple[float, ...], Array]]
+    ) -> list[tuple[float, tuple[float, ...]]]:
+        """The blends of neighbouring quadratures that promise most, with their misfits."""
+        left = self.space.less(self._nominal)
+        blends = []
+        for (start, one), (_, other) in zip(responses[::2], responses[1::2], strict=True):
+            apart = self.space.apart(np.stack([one, other], axis=1).astype(np.float64))
+            strengths = np.linalg.lstsq(apart, left, rcond=None)[0]
+            gain = float(np.sum((apart @ strengths) ** 2))
+            amplitude = start[0] * float(np.hypot(*strengths))
+            blends.append((gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0])))))
+        blends.sort(reverse=True)
+        return [
+            (self.space.misfit(self.evidence.residual(with_values(self.plant, (effect,), (start,)))), start)
+            for _, start in blends[:REFINED]
+        ]
 
     def largest(self, effect: Effect) -> float:
         """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
@@ -180,7 +201,7 @@ class Fitter:
         for _ in range(SETTLING):
             found = space.nuisances(residual)
             used = np.array([share if t.mechanical else 0.0 for t, share in zip(TOLERANCES, found, strict=True)])
-            base = shifted(self.plant, self.plant, used)
+            base = shifted(self.plant, self.plant, used.tolist())
             space = Space(self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects)
             fit = self.refined(fit.effects, fit.values, space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
@@ -225,15 +246,15 @@ class Fitter:
             normal, gradient = space.normal_equations(jacobian, left)
             damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
             move = -np.linalg.solve(damped, gradient) * steps
-            better = False
+            gained = 0.0
             for share in (1.0, 0.5, 0.2, 0.05):
                 there = np.clip(here + share * move, low, high)
                 tried = residual(there)
                 if (value := space.misfit(tried)) < misfit:
-                    gained, better = misfit - value, True
+                    gained = misfit - value
                     here, left, misfit = there, tried, value
                     break
-            if not better or gained < 0.2:
+            if gained < 0.2:
                 break
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
         return Fit(effects, split(here), misfit, split(spread), with_values(self.plant, effects, split(here)))

@@ -202,16 +202,16 @@ class _Disturbance:
             normal, gradient = space.normal_equations(np.stack(columns, axis=1), residual)
             normal += np.diag(1e-6 * np.diag(normal) + 1e-9)
             move = np.linalg.solve(normal, gradient)
-            better = False
+            gained = 0.0
             for share in (1.0, 0.5, 0.2):
                 tried = self.predicted(here + share * move)
                 left = self._evidence.unlike(tried)
                 if (value := space.misfit(left)) < misfit:
-                    gained, better = misfit - value, True
+                    gained = misfit - value
                     here, predicted, residual, misfit = here + share * move, tried, left, value
                     break
             worth = here**2 / np.diag(np.linalg.inv(normal))
-            if not better or gained < 0.02 * misfit:
+            if gained < 0.02 * misfit:
                 break
         return misfit, here, worth
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 
@@ -61,7 +61,9 @@ def closed_loop(recording: Recording, before: Configuration, after: Configuratio
     corrected = after._replace(plant=own)
     runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
     with ThreadPoolExecutor(2) as pool:
-        found = dict(zip(runs, pool.map(lambda run: _bands(_run(*run, demands), recording.period), runs), strict=True))
+        found = dict(
+            zip(runs, pool.map(lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs), strict=True)
+        )
     one, other, again = found[nominal, SEEDS[0]], found[corrected, SEEDS[0]], found[corrected, SEEDS[1]]
     return Level(_apart(measured, one), _apart(measured, other), _apart(other, again))
 

@@ -21,6 +21,8 @@ SLOW, FAST, LARGE = 0.2, 1.5, 1.5
 """In rms of the motion's speed, or of the force about its mean."""
 REST = 0.25
 """s without motion is rest."""
+GROWS = 5.0
+"""Times the power of the first third that the last third has if a difference grows."""
 LEAST = 0.1
 """Share of a difference's power that a region must hold."""
 
@@ -42,6 +44,9 @@ def region(difference: Array, speed: Array, force: Array, period: float) -> str:
         "high speed": np.abs(speed) > FAST * typical,
         "large force": np.abs(swing) > LARGE * float(np.std(force)),
     }
+    third = len(power) // 3
+    if third and float(np.sum(power[-third:])) > GROWS * float(np.sum(power[:third])):
+        return "growing with time"
     edges = np.linspace(0, len(power), STRETCHES + 1).astype(int)
     for start, end in pairwise(edges):
         stretch = np.zeros(len(power), bool)

@@ -178,7 +178,7 @@ def _mechanics(
                 motor = (h * forward, h * backward)
                 bias = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
             free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias + pushed[tick])
-            rhs, total = free, inertia
+            rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
                 spring = now.stiffness * deflection * max(1.0 + now.hardening * deflection, 0.0)
                 rhs, total = free + h * (spring + now.damping * ground_velocity), inertia + h * now.damping

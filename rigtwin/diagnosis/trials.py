@@ -34,10 +34,13 @@ class Swing:
 
 @dataclass(frozen=True)
 class Trials:
-    """Values to start from, one tuple each in the order of the effect's parameters; steps: fine ones for derivatives."""
+    """Values to start from, one tuple each in the order of the effect's parameters; steps: fine ones for derivatives.
+    quadrature: whether starts come in pairs a quarter of a wave apart, (amplitude, pitch, 0) and (amplitude, pitch, π/2), so
+    that any phase is a blend of both."""
 
     starts: tuple[tuple[float, ...], ...]
     steps: tuple[float, ...]
+    quadrature: bool = False
 
 
 def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
@@ -52,6 +55,8 @@ def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
     return found
 
 
+SHORTEST_WAVE, LONGEST_WAVE, WAVES = 0.008, 0.1, 20
+"""m; of cogging, and how many lengths are tried."""
 Searched = Callable[[Effect, Plant, Swing], Trials]
 
 
@@ -73,7 +78,7 @@ def _coulomb(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
 def _stribeck(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
     _, base = _friction(effect, plant)
     amplitudes = (-0.5 * base, 0.5 * base, 2.0 * base)
-    return Trials(tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.1))), (0.05 * base, 0.001))
+    return Trials(tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.08))), (0.05 * base, 0.001))
 
 
 def _asymmetry(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
@@ -82,9 +87,10 @@ def _asymmetry(effect: Effect, plant: Plant, _swing: Swing) -> Trials:
 
 
 def _cogging(_effect: Effect, _plant: Plant, _swing: Swing) -> Trials:
-    pitches = (0.008, 0.012, 0.016, 0.02, 0.025, 0.03, 0.036, 0.045, 0.06, 0.08)
-    phases = (0.0, 0.5 * np.pi, np.pi, -0.5 * np.pi)
-    return Trials(tuple(product((8.0,), pitches, phases)), (0.5, 2e-4, 0.05))
+    # Waves that fit a stroke of some 80 mm a different number of times.
+    pitches = 1.0 / np.linspace(1.0 / LONGEST_WAVE, 1.0 / SHORTEST_WAVE, WAVES)
+    starts = tuple((5.0, float(pitch), phase) for pitch in pitches for phase in (0.0, 0.5 * np.pi))
+    return Trials(starts, (0.5, 1e-4, 0.05), quadrature=True)
 
 
 def _offset(effect: Effect, plant: Plant, _swing: Swing) -> Trials:

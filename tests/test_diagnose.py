@@ -1,0 +1,368 @@
+"""Whole diagnoses: what is named, how surely, what is not, and what other programs read of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments import EXPERIMENTS
+from rigtwin.cli import main
+from rigtwin.configuration import Configuration, from_toml, overridden
+from rigtwin.diagnosis.calibrated import toml
+from rigtwin.diagnosis.controller import ControllerReplay
+from rigtwin.diagnosis.diagnose import Outcome, diagnose
+from rigtwin.diagnosis.fit import Fitter
+from rigtwin.diagnosis.freeform import located
+from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.place import region
+from rigtwin.diagnosis.sampling import outstanding
+from rigtwin.diagnosis.shrink import Blocks, gated, halves, interval, shrinkage
+from rigtwin.effects import find, without
+from rigtwin.errors import RigtwinError
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording
+from tests.conftest import rig_recording
+from tests.test_fit import evidence_of, recorded
+
+
+def answered(*recordings: Recording, base: Configuration | None = None, held_out: tuple[Recording, ...] = ()) -> Outcome:
+    return diagnose(recordings, base or Configuration(), held_out)
+
+
+def names(outcome: Outcome) -> set[str]:
+    return {str(effect.name) for effect in outcome.diagnosis.effects}
+
+
+@pytest.mark.parametrize("name", ["nominal-imposed", "nominal-road10", "nominal-drop"])
+def test_a_rig_without_defects_has_no_gap(name):
+    outcome = answered(rig_recording(name))
+    assert outcome.diagnosis.verdict == "no gap"
+    assert not outcome.diagnosis.effects
+    assert not outcome.diagnosis.where
+
+
+KNOWN = {
+    "known-coulomb-motor": ("coulomb@motor", "coulomb", 24.0, 14.0),
+    "known-viscous-rail": ("viscous@rail", "viscous", 450.0, 0.0),
+    "known-gain-load_cell": ("gain@load_cell", "gain", 1.05, 1.0),
+    "known-delay-structure_cylinder": ("delay@structure_cylinder", "delay", 0.010, 0.0),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_known_effect_is_named_with_its_magnitude(name):
+    effect, parameter, value, nominal = KNOWN[name]
+    outcome = answered(rig_recording(name))
+    assert outcome.diagnosis.verdict == "explained"
+    assert names(outcome) == {effect}
+    found = outcome.diagnosis.effects[0]
+    assert found.confidence > 0.9
+    assert found.parameters[parameter].value - nominal == pytest.approx(value - nominal, rel=0.05)
+    assert found.parameters[parameter].nominal == nominal
+    assert outcome.diagnosis.where[0].component == effect.partition("@")[2]
+    gap = outcome.diagnosis.gap
+    assert gap is not None
+    assert gap.after < 1.1 < gap.before
+    assert gap.shrinkage_held_out.value == pytest.approx(gap.shrinkage_predicted, abs=0.05)
+
+
+@pytest.fixture(scope="module")
+def friction() -> Outcome:
+    return answered(recorded("imposed", ("coulomb@rail=75",)))
+
+
+def test_the_document_has_every_field(friction):
+    document = json.loads(json.dumps(friction.diagnosis.document()))
+    assert document["verdict"] == "explained"
+    (effect,) = document["effects"]
+    assert set(effect) == {"component", "kind", "parameters", "confidence", "class", "share"}
+    assert set(effect["parameters"]["coulomb"]) == {"value", "low", "high", "nominal", "unit"}
+    assert effect["class"][0] == {"component": "rail", "kind": "coulomb"}
+    assert set(document["where"][0]) >= {"component", "share", "band_hz", "region"}
+    assert set(document["gap"]) >= {"before", "after", "floor", "shrinkage_predicted", "shrinkage_held_out"}
+    assert set(document["gap"]["shrinkage_held_out"]) == {"value", "low", "high"}
+    assert {"next_test", "not_observable", "seconds"} <= set(document)
+
+
+def test_the_corrected_twin_is_one_that_run_and_compare_take(friction, tmp_path):
+    path = tmp_path / "twin.toml"
+    path.write_text(toml(friction))
+    assert from_toml(Configuration(), path).plant == friction.corrected.plant
+    assert "coulomb = " in toml(friction)
+
+
+def test_the_same_data_give_the_same_answer(friction):
+    again = answered(recorded("imposed", ("coulomb@rail=75",)))
+    assert replace(again.diagnosis, seconds=0.0) == replace(friction.diagnosis, seconds=0.0)
+
+
+def test_a_friction_taken_out_of_the_twin_is_found():
+    base = without(Configuration(), "coulomb@rail")
+    assert base.plant.rail.coulomb == 0.0
+    outcome = answered(recorded("imposed"), base=base)
+    assert names(outcome) == {"coulomb@rail"}
+    estimate = outcome.diagnosis.effects[0].parameters["coulomb"]
+    assert estimate.value == pytest.approx(50.0, rel=0.05)
+    assert estimate.nominal == 0.0
+
+
+def test_what_is_not_there_cannot_be_taken_out():
+    with pytest.raises(RigtwinError, match=r"none to take out; it has coulomb@rail, coulomb@motor"):
+        without(Configuration(), "viscous@rail")
+    with pytest.raises(RigtwinError, match="unknown effect"):
+        without(Configuration(), "nonsense@rail")
+
+
+def test_a_model_in_the_loop_is_diagnosed_too():
+    outcome = answered(recorded("road10", ("coulomb@rail=80",), 12.0))
+    assert names(outcome) == {"coulomb@rail"}
+
+
+def test_three_seconds_are_enough_for_a_large_effect():
+    outcome = answered(recorded("imposed", ("gain@load_cell=1.08",), 3.0))
+    assert names(outcome) == {"gain@load_cell"}
+
+
+def test_several_recordings_are_explained_together():
+    effects = ("viscous@rail=150",)
+    outcome = answered(recorded("imposed", effects, 6.0), recorded("road10", effects, 6.0, 8))
+    assert names(outcome) == {"viscous@rail"}
+    assert len(outcome.diagnosis.recordings) == 2
+
+
+def test_held_out_recordings_judge_the_correction():
+    effects = ("coulomb@rail=75",)
+    outcome = answered(recorded("imposed", effects), held_out=(recorded("imposed", effects, 8.0, 9),))
+    gap = outcome.diagnosis.gap
+    assert gap is not None
+    assert gap.held_out == "1 held-out recording"
+    assert gap.shrinkage_held_out.value > 0.9
+    assert gap.shrinkage_held_out.low <= gap.shrinkage_held_out.value <= gap.shrinkage_held_out.high
+
+
+def test_a_correction_that_worsens_held_out_data_is_rejected():
+    outcome = answered(recorded("imposed", ("coulomb@rail=75",)), held_out=(recorded("imposed", (), 8.0, 9),))
+    assert not outcome.diagnosis.effects
+    assert outcome.diagnosis.verdict == "unknown"
+    assert any("rejected" in note for note in outcome.diagnosis.notes)
+
+
+def drifting() -> Recording:
+    """A load cell that drifts: no effect of the library."""
+    recording = recorded("imposed")
+    cell = recording.column("/sensor", "load_cell") + 4.0 * recording.time
+    return replace(recording, columns={**recording.columns, "/sensor": {**recording.columns["/sensor"], "load_cell": cell}})
+
+
+def test_what_has_no_name_is_not_named_but_placed():
+    outcome = answered(drifting())
+    assert outcome.diagnosis.verdict == "unknown"
+    assert not outcome.diagnosis.effects
+    place = outcome.diagnosis.where[0]
+    assert place.component == "load_cell"
+    assert place.region == "growing with time"
+    assert "time" in place.evidence
+
+
+@pytest.mark.parametrize(
+    "effect", ["viscous@rail=300", "gain@motor=1.06", "delay@structure_cylinder=0.008", "gain@ground_lvdt=0.95"]
+)
+def test_a_free_disturbance_finds_the_component_without_the_library(effect):
+    evidence = evidence_of(recorded("imposed", (effect,)))
+    name = effect.partition("=")[0].partition("@")[2]
+    assert located(evidence, evidence.plant)[0].component == name
+
+
+SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}
+
+
+@pytest.mark.parametrize(("name", "value"), SETTINGS.items())
+def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
+    recording = recorded("road1.6", (f"setting@controller={name}:{value}",), 5.0)
+    told = EXPERIMENTS["road1.6"].configuration.controller
+    recording = replace(recording, controller={**recording.controller, name: getattr(told, name)})
+    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    deviation = ControllerReplay(recording, settings).deviation()
+    assert deviation is not None
+    assert (deviation.kind, deviation.name, deviation.exact) == ("setting", name, True)
+    assert deviation.used == pytest.approx(value, rel=1e-3)
+
+
+def test_missed_ticks_are_counted():
+    recording = recorded("imposed", ("missed_ticks@controller=0.04",))
+    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    deviation = ControllerReplay(recording, settings).deviation()
+    assert deviation is not None
+    assert deviation.kind == "missed_ticks"
+    assert deviation.used == pytest.approx(0.04, rel=0.2)
+
+
+def test_a_controller_as_told_has_no_deviation():
+    recording = recorded("imposed")
+    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    assert ControllerReplay(recording, settings).deviation() is None
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("noise@load_cell=9", 9.0), ("hum@structure_lvdt=0.0015", 0.0015), ("quantisation@suspension_lvdt=0.0006", 0.0006)],
+)
+def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
+    evidence = evidence_of(recorded("imposed", (text,)))
+    (found,) = outstanding(evidence.recordings, [list(rows) for rows in evidence.predicted(Plant())], Plant())
+    assert f"{found.kind}@{found.component}" == text.partition("=")[0]
+    assert found.value == pytest.approx(value, rel=0.1)
+
+
+def test_noise_that_all_sensors_share_is_the_laboratorys():
+    louder = [
+        f"noise@{name}={3 * getattr(Plant(), name).white}"
+        for name in Plant()._fields
+        if hasattr(getattr(Plant(), name), "white")
+    ]
+    outcome = answered(recorded("imposed", tuple(louder)))
+    assert outcome.diagnosis.verdict == "no gap"
+
+
+def test_shrinkage_is_of_the_gap_above_the_floor():
+    assert shrinkage(5.0, 1.0) == 1.0
+    assert shrinkage(5.0, 2.0) == 0.5
+    assert shrinkage(2.0, 5.0) == -1.0
+    assert shrinkage(0.9, 0.8) == 0.0
+
+
+def test_the_interval_covers_the_value_and_narrows_with_more_blocks():
+    random = np.random.default_rng(1)
+    few = Blocks(3.0 + random.random(10), 1.2 + 0.1 * random.random(10))
+    many = Blocks(3.0 + random.random(400), 1.2 + 0.1 * random.random(400))
+    for blocks in (few, many):
+        found = interval(blocks)
+        assert found.low <= found.value <= found.high
+    assert interval(many).high - interval(many).low < interval(few).high - interval(few).low
+
+
+def test_the_gate_keeps_what_helps_and_drops_what_harms():
+    good, bad = find("coulomb@rail"), find("viscous@rail")
+
+    def across(kept):
+        left = 5.0 - 3.0 * (good in kept) + 1.0 * (bad in kept)
+        return Blocks(np.full(4, 5.0), np.full(4, left))
+
+    assert gated((good, bad), across) == ((good,), (bad,))
+
+
+def test_halves_share_every_tick_out():
+    recording = recorded("imposed")
+    first, second = halves((recording,))
+    assert np.allclose(first[0] + second[0], 1.0)
+    assert first[0][0] == 1.0
+    assert second[0][-1] == 1.0
+
+
+def test_regions_are_told_apart():
+    time = np.arange(8000) * 1e-3
+    speed = np.sin(2 * np.pi * time)
+    force = np.cos(2 * np.pi * 0.7 * time)
+    quiet = 1e-3 * np.ones_like(time)
+    assert region(quiet + (np.abs(speed) < 0.1), speed, force, 1e-3) == "velocity reversal"
+    assert region(quiet + speed**9, speed, force, 1e-3) == "high speed"
+    assert region(quiet, speed, force, 1e-3) == "throughout"
+    assert region(time**2, speed, force, 1e-3) == "growing with time"
+    assert region(quiet + ((time > 3.0) & (time < 4.0)), speed, force, 1e-3) == "3.0 to 4.0 s"
+
+
+def test_the_fast_multisine_tells_a_delay_from_a_lag():
+    evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",)))
+    fitter = Fitter(evidence)
+    fits = [fitter.single(find("delay@motor")), fitter.single(find("lag@motor"))]
+    tests = [(e.name, e.configuration, e.demands) for e in EXPERIMENTS.values() if e.name in ("imposed-fast", "drop")]
+    found = proposed(fits, tests)
+    assert found is not None
+    assert found.experiment == "imposed-fast"
+    assert found.command.startswith("rigtwin run imposed-fast")
+
+
+def spoilt(change: str) -> Recording:
+    recording = recorded("imposed")
+    sensors = dict(recording.columns["/sensor"])
+    machine, time = recording.machine, recording.time
+    match change:
+        case "missing":
+            del sensors["load_cell"]
+        case "swapped":
+            sensors["ground_lvdt"], sensors["structure_lvdt"] = sensors["structure_lvdt"], sensors["ground_lvdt"]
+        case "unit":
+            sensors["suspension_lvdt"] = 1e3 * sensors["suspension_lvdt"]
+        case "dead":
+            sensors["ground_lvdt"] = np.full(recording.ticks, 0.001)
+        case "gap":
+            time = time + 0.5 * (time > 4.0)
+        case "machine":
+            machine = "another"
+    return replace(recording, machine=machine, time=time, columns={**recording.columns, "/sensor": sensors})
+
+
+FAULTS = {
+    "missing": "load_cell is missing",
+    "swapped": "swapped",
+    "unit": "as if in mm",
+    "dead": "dead",
+    "gap": "gaps in time",
+    "machine": "machine",
+}
+
+
+@pytest.mark.parametrize("change", FAULTS)
+def test_data_that_are_not_fit_are_named_and_not_diagnosed(change):
+    outcome = answered(spoilt(change))
+    assert outcome.diagnosis.verdict == "unusable"
+    assert not outcome.diagnosis.effects
+    assert FAULTS[change] in outcome.diagnosis.faults[0]
+
+
+def test_a_sensor_cut_off_is_named_and_its_ticks_left_out():
+    recording = recorded("imposed", ("coulomb@rail=75",))
+    cell = recording.column("/sensor", "load_cell")
+    clipped = np.minimum(cell, float(np.quantile(cell, 0.97)))
+    columns = {**recording.columns, "/sensor": {**recording.columns["/sensor"], "load_cell": clipped}}
+    outcome = answered(replace(recording, columns=columns))
+    assert names(outcome) == {"coulomb@rail"}
+    assert any("cut off" in note for note in outcome.diagnosis.notes)
+
+
+def test_the_command_writes_what_it_says(tmp_path, capsys):
+    rig = tmp_path / "rig.mcap"
+    assert main(["run", "imposed", "--set", "timing.duration=6", "--effect", "viscous@rail=200", "--out", str(rig)]) == 0
+    report, answer, twin = tmp_path / "r.html", tmp_path / "a.json", tmp_path / "t.toml"
+    assert main(["diagnose", str(rig), "--html", str(report), "--json", str(answer), "--save-twin", str(twin)]) == 0
+    said = capsys.readouterr().out
+    assert "viscous@rail" in said
+    assert json.loads(answer.read_text())["effects"][0]["kind"] == "viscous"
+    assert main(["compare", str(rig), "--config", str(twin)]) == 0
+    assert main(["run", "drop", "--config", str(twin), "--set", "timing.duration=1", "--out", str(tmp_path / "d.mcap")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{rig}", "{rig}"], "named twice"),
+        (["{rig}", "--held-out", "{rig}"], "named twice"),
+        (["{rig}", "--json", "{rig}"], "is the input"),
+        (["{rig}", "--html", "{folder}/none/r.html"], "folder does not exist"),
+        (["{rig}", "--set", "controller.kp=1"], "recording's own"),
+        (["{rig}", "--without", "viscous@rail"], "none to take out"),
+        (["{folder}/none.mcap"], "none.mcap"),
+    ],
+)
+def test_wrong_use_is_one_clear_line(arguments, message, tmp_path, capsys):
+    rig = tmp_path / "rig.mcap"
+    main(["run", "imposed", "--set", "timing.duration=1", "--out", str(rig)])
+    filled = [a.format(rig=rig, folder=tmp_path) for a in arguments]
+    capsys.readouterr()
+    assert main(["diagnose", *filled]) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert len(error.strip().splitlines()) == 1

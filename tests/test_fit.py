@@ -1,0 +1,153 @@
+"""Fits: every effect that the data show is found again at the size it was made with; tolerances stay within their bounds."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from experiments import EXPERIMENTS
+from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
+from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.next_test import tried
+from rigtwin.diagnosis.tolerances import TOLERANCES, shifted, tolerance_of
+from rigtwin.diagnosis.trials import TRIALS
+from rigtwin.effects import KINDS, applied, find
+from rigtwin.parameters import Plant
+from rigtwin.recording import Recording
+
+DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
+"""Kinds that are read off the signals."""
+
+
+@cache
+def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5) -> Recording:
+    """A test on the twin with effects."""
+    configuration = EXPERIMENTS[name].configuration
+    configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
+    demands = EXPERIMENTS[name].demands(configuration, seed)
+    return tried(name, applied(configuration, list(effects)), demands)
+
+
+def evidence_of(*recordings: Recording) -> Evidence:
+    return Evidence(recordings, [configuration_of(recording) for recording in recordings])
+
+
+@pytest.fixture(scope="module")
+def nominal() -> Evidence:
+    return evidence_of(recorded("imposed"))
+
+
+def test_every_kind_is_searched_for_or_read_off_the_signals():
+    assert set(TRIALS) | DIRECT == {kind.name for kind in KINDS}
+    assert not set(TRIALS) & DIRECT
+
+
+def test_trials_lie_within_bounds_and_away_from_nominal(nominal):
+    fitter = Fitter(nominal)
+    for effect in library(nominal):
+        found = fitter.trials(effect)
+        quantities = list(effect.quantities().values())
+        assert len(found.steps) == len(quantities)
+        for start in found.starts:
+            assert len(start) == len(quantities)
+            assert all(q.low <= value <= q.high for q, value in zip(quantities, start, strict=True)), effect.name
+
+
+def test_the_nominal_twin_leaves_what_noise_leaves(nominal):
+    fit = Fitter(nominal).nothing
+    assert 0.85 < fit.misfit / nominal.expected < 1.08
+
+
+MADE = {
+    "coulomb@rail=70": 0.05,
+    "coulomb@motor=20": 0.05,
+    "viscous@rail=200": 0.03,
+    "mass@carriage=38": 0.05,
+    "stiffness@tyre=55000": 0.05,
+    "damping@tyre=300": 0.05,
+    "gain@motor=1.05": 0.06,
+    "lag@load_cell=0.004": 0.05,
+    "delay@structure_cylinder=0.006": 0.05,
+    "gain@suspension_lvdt=0.96": 0.06,
+    "offset@load_cell=6": 0.1,
+    "saturation@ground_cylinder=0.007": 0.02,
+    "deadband@motor=0.1": 0.1,
+}
+"""Effect → relative error of its magnitude, as a deviation from nominal, that tolerances and noise may cause in 8 s."""
+
+
+@pytest.mark.parametrize("text", MADE)
+def test_an_effect_is_found_at_its_size(text):
+    name, _, value = text.partition("=")
+    effect = find(name)
+    evidence = evidence_of(recorded("imposed", (text,)))
+    fitter = Fitter(evidence)
+    fit = fitter.single(effect)
+    nominal = effect.nominal(Plant())[effect.kind.parameters[0]]
+    wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
+    assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])
+    assert fitter.nothing.misfit - fit.misfit > detectable(evidence)
+
+
+def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
+    plant = nominal.plant
+    space = Space(nominal, plant)
+    small = shifted(plant, plant, [0.8 if t.parameter in ("mass", "constant") else 0.0 for t in TOLERANCES])
+    large = shifted(plant, plant, [8.0 if t.parameter == "mass" else 0.0 for t in TOLERANCES])
+    clean = nominal.residual(plant)
+
+    def cost(other: Plant) -> float:
+        difference = [a - b for a, b in zip(nominal.predicted(other), nominal.predicted(plant), strict=True)]
+        despike(difference[0][3], 6.0)
+        return space.misfit(clean - nominal.whitened(difference)) - space.misfit(clean)
+
+    assert cost(small) < 40.0
+    assert cost(large) > 400.0
+    assert np.max(np.abs(space.nuisances(clean - 50.0 * nominal.nuisances(plant)[:, 0]))) <= BEYOND
+
+
+def test_a_deviation_within_tolerance_is_no_finding(nominal):
+    effect = find("mass@carriage")
+    tolerance = tolerance_of("carriage", "mass")
+    assert tolerance is not None
+
+    def fit(value: float) -> Fit:
+        return Fit((effect,), ((value,),), 0.0, ((0.0,),), with_values(Plant(), (effect,), ((value,),)))
+
+    assert within_tolerance(fit(34.0 * 1.005), nominal)
+    assert not within_tolerance(fit(34.0 * 1.02), nominal)
+
+
+def test_spikes_go_and_steps_stay():
+    signal = np.zeros(100)
+    signal[50:] = 20.0
+    signal[20] = signal[70] = 90.0
+    despike(signal, 4.0)
+    assert not signal[:50].any()
+    assert (signal[50:] == 20.0).all()
+
+
+def test_ticks_where_a_sensor_is_cut_off_do_not_count():
+    signal = np.sin(np.linspace(0, 20, 2000)) + 1e-3 * np.random.default_rng(0).standard_normal(2000)
+    assert not cut_off(signal).any()
+    clipped = np.minimum(signal, 0.8)
+    assert np.array_equal(cut_off(clipped), clipped == 0.8)
+
+
+def test_no_effect_is_named_where_there_is_none(nominal):
+    found = attribute(nominal)
+    assert found.best is None
+    assert not found.unknown
+    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)
+
+
+def test_two_effects_are_told_apart():
+    evidence = evidence_of(recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96")))
+    found = attribute(evidence)
+    assert found.best is not None
+    assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}
+    assert sum(found.shares.values()) == pytest.approx(found.explained)
