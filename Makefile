@@ -1,4 +1,4 @@
-.PHONY: setup demo test check benchmark system clean
+.PHONY: setup demo test check benchmark system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 OUT := out
 
 help:
-	@echo "make demo       set up, run a drop test on the twin, compare a rig recording with the twin, plot and film both"
+	@echo "make demo       set up, record a rig with a defect, diagnose it, plot and film a drop test"
 	@echo "make test       set up, run all tests"
 	@echo "make setup      make $(VENV) with everything in it"
 	@echo "make check      ruff and pyright"
@@ -27,14 +27,18 @@ system: setup
 
 demo: setup system
 	@mkdir -p $(OUT)
-	$(BIN)/rigtwin run drop --out $(OUT)/drop.mcap
-	$(BIN)/rigtwin compare examples/nominal-imposed.mcap --json $(OUT)/compare.json
+	$(BIN)/rigtwin run imposed --effect viscous@motor=50 --effect gain@suspension_lvdt=0.965 --out $(OUT)/rig.mcap
+	$(BIN)/rigtwin diagnose $(OUT)/rig.mcap --html $(OUT)/report.html --save-twin $(OUT)/calibrated.toml
+	$(BIN)/rigtwin run drop --config $(OUT)/calibrated.toml --out $(OUT)/drop.mcap
 	$(BIN)/rigtwin plot $(OUT)/drop.mcap -o $(OUT)/drop.png
 	$(BIN)/rigtwin video $(OUT)/drop.mcap -o $(OUT)/drop.mp4 --until 10
-	@echo "look at $(OUT)/drop.png and $(OUT)/drop.mp4"
+	@echo "look at $(OUT)/report.html, $(OUT)/drop.png and $(OUT)/drop.mp4"
 
-test: setup system
+test: setup system browser
 	$(BIN)/python -m pytest -n auto
+
+browser:
+	@bash scripts/browser.sh
 
 check: setup
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import statistics
 import subprocess
 import sys
@@ -16,6 +17,10 @@ import numpy as np
 
 from experiments import EXPERIMENTS
 from rigtwin.compiling import kernel, step
+from rigtwin.configuration import Configuration, Timing
+from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.next_test import tried
+from rigtwin.effects import applied
 from rigtwin.loop import BLOCK, run_compiled
 from rigtwin.plant import Simulation
 from rigtwin.runner import record
@@ -87,12 +92,44 @@ def _side_by_side(title: str, goal: str, ours: Callable[[], object], against: Ca
     print(f"{title:58s} {mine:7.3f} s / {theirs:7.3f} s = {statistics.median(ratios):5.2f} ({spread}); goal {goal}", flush=True)
 
 
+def _diagnosed(seconds: float) -> Callable[[], object]:
+    """The whole library on an imposed test of that length with one effect, and its report's figures."""
+    imposed = EXPERIMENTS["imposed"]
+    configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
+    recording = tried("imposed", applied(configuration, ["coulomb@motor=20"]), imposed.demands(configuration, 0))
+    return lambda: diagnose([recording], Configuration())
+
+
+def _twenty_runs() -> None:
+    imposed = EXPERIMENTS["imposed"]
+    configuration = imposed.configuration._replace(timing=Timing(duration=30.0))
+    demands = imposed.demands(configuration, 0)
+    for _ in range(20):
+        for _ in run_compiled(Twin(configuration, 0.0, 0), configuration, demands):
+            pass
+
+
+def _diagnosis() -> None:
+    """A diagnosis of 30 s beside a thousand bare runs of the twin of that length, of which twenty are timed."""
+    once, _ = _diagnosed(30.0), _diagnosed(30.0)()
+    pairs = [(_seconds(once), _seconds(_twenty_runs)) for _ in range(3)]
+    mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
+    print(
+        f"diagnosis of 30 s {mine:.1f} s / 1000 runs of the twin {50 * theirs:.0f} s = {mine / (50 * theirs):.3f}; goal <= 15 s"
+    )
+    short = statistics.median(_seconds(_diagnosed(15.0)) for _ in range(3))
+    print(f"diagnosis of 30 s / of 15 s {mine:.1f} s / {short:.1f} s = {mine / short:.2f}; goal <= 2, linear")
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"most memory of all this {peak:.0f} MiB; goal <= 1024 MiB", flush=True)
+
+
 def main() -> None:
     print(f"mujoco {mujoco.__version__}, numpy {np.__version__}, alternating rounds")
     _side_by_side("closed loop with all controllers / bare mj_step", "<= 1.5", _closed_loop, _bare)
     _side_by_side("16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3)
     _side_by_side("45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False))
     _side_by_side("rigtwin --help / starting Python", "< 0.5 s", _help, _python)
+    _diagnosis()
 
 
 if __name__ == "__main__":

@@ -185,17 +185,23 @@ def test_sensor_in_closed_form():
 def test_friction_in_closed_form():
     dry = friction(Rail(coulomb=50.0, stribeck=20.0, stribeck_velocity=0.01))
     gap = gap_at(0.0)
-    assert breakaway(dry, gap, 0.0, 0.0) == 70.0
-    assert breakaway(dry, gap, 0.0, 0.01) == pytest.approx(50 + 20 * math.exp(-1))
-    assert breakaway(dry, gap, 0.0, 1.0) == pytest.approx(50.0)
+    assert breakaway(dry, gap, 0.0, 0.0) == (70.0, 70.0)
+    assert breakaway(dry, gap, 0.0, 0.01)[0] == pytest.approx(50 + 20 * math.exp(-1))
+    assert breakaway(dry, gap, 0.0, 1.0)[1] == pytest.approx(50.0)
+    uneven = friction(Rail(coulomb=50.0, asymmetry=12.0))
+    assert breakaway(uneven, gap, 0.0, 0.1) == (56.0, 44.0)
+
+
+def test_backlash_is_felt_only_where_the_gap_is_taken_up():
     loose = friction(Rail(coulomb=50.0, backlash=0.004))
     gap = gap_at(0.0)
     path = np.concatenate([np.linspace(0, 0.01, 101), np.linspace(0.01, 0, 101)])
-    felt = np.array([breakaway(loose, gap, float(x), 0.1) for x in path]) > 0
-    assert np.all(felt[21:101])
+    felt = np.array([breakaway(loose, gap, float(x), 0.1) for x in path])
+    assert np.all(felt[21:101] == (50.0, 0.0)), "pushes its element on, and may come back freely"
     assert not np.any(felt[:20])
-    after = path[101:][~felt[101:]]
+    after = path[101:][~felt[101:].any(axis=1)]
     assert np.ptp(after) == pytest.approx(0.004, abs=2e-4), "free over the gap after the reversal"
+    assert np.all(felt[-1] == (0.0, 50.0))
 
 
 def steady_force(plant: Plant, velocity: float) -> float:

@@ -31,7 +31,7 @@ UNEXPLAINED = 0.10
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
 ENOUGH = 0.97
 """Share of the gap that effects must explain for them to be named at all, if something is left."""
-TOO_MUCH = 1.0
+TOO_MUCH = 0.4
 """χ² per degree of freedom above 1 from which what is left forbids to name anything."""
 SLACK = 0.01
 """Share of the gap that the form of an effect may leave without anything else being wrong."""

@@ -19,8 +19,6 @@ from rigtwin.recording import Recording
 
 EXACT = 20.0
 """Roundings of a recorded command within which a replay is exact."""
-MUCH_BETTER = 0.02
-"""Share of the misfit that another setting may leave to be the one in use."""
 REPEATED = 0.2
 """Share of ticks above which equal commands are no missed ticks but a command that does not change."""
 STATE_SIZE = len(State._fields)
@@ -52,15 +50,15 @@ def _replayed(
 
 @dataclass(frozen=True)
 class Deviation:
-    """What the controller did other than told. kind: `setting`, `missed_ticks` or `delay`; name: of the setting, or of the
-    parameter; told: the operator's value, or none; used: the value that reproduces the commands; exact: whether it does."""
+    """What the controller did other than told. kind: `setting`, `missed_ticks` or `delay`, or `unknown` if nothing reproduces
+    its commands; name: of the setting, or of the parameter; told: the operator's value; used: the value that reproduces the
+    commands exactly."""
 
     kind: str
     name: str
     told: float
     used: float
     unit: str
-    exact: bool
 
 
 class ControllerReplay:
@@ -93,14 +91,10 @@ class ControllerReplay:
         return max(rms(column) / floor for column, floor in zip(difference.T, self._floor, strict=True))
 
     def deviation(self) -> Deviation | None:
-        """What explains that the commands are not those of the settings; None if they are. kind `unknown` if nothing does."""
-        told = self.misfit(self.commands(self._settings))
-        if told <= EXACT:
+        """What explains that the commands are not those of the settings; None if they are."""
+        if self.misfit(self.commands(self._settings)) <= EXACT:
             return None
-        tries = (self._missed(), self._late(), self._setting(told))
-        found = [each for each in tries if each is not None]
-        exact = [each for each in found if each.exact]
-        return next(iter(exact or found), Deviation("unknown", "", 0.0, 0.0, "1", False))
+        return self._missed() or self._late() or self._setting() or Deviation("unknown", "", 0.0, 0.0, "1")
 
     def _missed(self) -> Deviation | None:
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=0) == 0.0, axis=1)])
@@ -110,16 +104,16 @@ class ControllerReplay:
         skipping = self.misfit(self.commands(self._settings, repeated))
         if min(running, skipping) > EXACT:
             return None
-        return Deviation("missed_ticks", "missed_ticks", 0.0, float(repeated.mean()), "1", True)
+        return Deviation("missed_ticks", "missed_ticks", 0.0, float(repeated.mean()), "1")
 
     def _late(self) -> Deviation | None:
         for late in range(1, LATE + 1):
             if self.misfit(self.commands(self._settings, late=late)) <= EXACT:
-                return Deviation("delay", "delay", 0.0, late * self._period, "s", True)
+                return Deviation("delay", "delay", 0.0, late * self._period, "s")
         return None
 
-    def _setting(self, told: float) -> Deviation | None:
-        """The one setting that, at another value, reproduces the commands best."""
+    def _setting(self) -> Deviation | None:
+        """The one setting that, at another value, reproduces the commands."""
         best: tuple[float, Deviation] | None = None
         for name, meaning in fields(Settings).items():
             if name == "mode":
@@ -134,8 +128,8 @@ class ControllerReplay:
                 unit = meaning.unit
             if best is None or left < best[0]:
                 told_value = float(getattr(self._settings, name))
-                best = left, Deviation("setting", name, told_value, value, unit, bool(left <= EXACT))
-        if best is None or best[0] > max(MUCH_BETTER * told, EXACT):
+                best = left, Deviation("setting", name, told_value, value, unit)
+        if best is None or best[0] > EXACT:
             return None
         return best[1]
 

@@ -137,7 +137,7 @@ def _diagnosed(
         *(_sampled(each) for each in sampled),
         *(_deviation(each) for each in deviations if each.kind != "unknown"),
     ]
-    odd_controller = any(each.kind == "unknown" or not each.exact for each in deviations)
+    odd_controller = any(each.kind == "unknown" for each in deviations)
     verdict: Verdict
     if effects:
         verdict = "partly explained" if something or odd_controller else "explained"
@@ -241,9 +241,9 @@ def _sampled(each: Sampled) -> Finding:
 
 def _deviation(each: Deviation) -> Finding:
     name = Name("controller", each.kind)
-    spread = 1e-3 * abs(each.used) if each.exact else 0.1 * abs(each.used)
+    spread = 1e-3 * abs(each.used)
     estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
-    return Finding(name, {each.name: estimate}, SURE if each.exact else 0.6, (name,), 1.0)
+    return Finding(name, {each.name: estimate}, SURE, (name,), 1.0)
 
 
 def _where(

@@ -17,7 +17,7 @@ CONCENTRATED = 1.6
 """Times the average power from which a region is where a difference lies."""
 STRETCHES = 8
 """Of time."""
-SLOW, FAST, LARGE = 0.2, 1.5, 1.5
+SLOW, FAST, LARGE = 0.2, 1.2, 1.2
 """In rms of the motion's speed, or of the force about its mean."""
 REST = 0.25
 """s without motion is rest."""

@@ -1,0 +1,205 @@
+"""The withheld-effect check: a referee that knows nothing of the twin, a key that cannot be changed, scores that are right."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rigtwin.blindcheck.check import Result
+from rigtwin.blindcheck.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
+from rigtwin.blindcheck.referee import case, operator, sorts, write
+from rigtwin.blindcheck.reference_rig import Law, Truth, quiet, run
+from rigtwin.blindcheck.score import misses, rows, table, wilson
+from rigtwin.blindcheck.tests_asked import TESTS, asked
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.effects import candidates
+from rigtwin.parameters import Plant
+from rigtwin.recording import load
+
+KNOWN = {effect.name for effect in candidates(Plant())} | {"setting@controller"}
+
+
+def test_the_referee_imports_nothing_of_the_twin():
+    code = "import sys, rigtwin.blindcheck.referee; print('\\n'.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+    own = {name for name in loaded if name.partition(".")[0] in ("rigtwin", "controllers", "experiments", "mujoco", "models")}
+    assert {name for name in own if not name.startswith("rigtwin.blindcheck")} == {"rigtwin"}
+
+
+def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
+    for test in ("imposed", "road1.6"):
+        law, demands = asked(test, np.random.default_rng(4))
+        path = tmp_path / f"{test}.mcap"
+        write(path, law, *run(Truth(), law, demands[:8000], np.random.default_rng(4)))
+        recording = load(path)
+        evidence = Evidence([recording], [configuration_of(recording)])
+        residual = evidence.residual(evidence.plant)
+        assert 0.85 < float(residual @ residual) / evidence.expected < 1.1
+
+
+def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
+    from rigtwin.diagnosis.controller import ControllerReplay
+
+    law, demands = asked("road10", np.random.default_rng(4))
+    path = tmp_path / "road.mcap"
+    write(path, law, *run(Truth(), law, demands[:3000], np.random.default_rng(4)))
+    recording = load(path)
+    assert ControllerReplay(recording, configuration_of(recording).controller).deviation() is None
+
+
+def test_its_two_frictions_agree_where_they_should():
+    law, demands = asked("imposed", np.random.default_rng(2))
+    commands, _ = run(Truth(), law, demands[:5000], np.random.default_rng(2))
+    hard, bristle = quiet(Truth(), law, commands), quiet(Truth(bristle=1e9), law, commands)
+    difference = np.sqrt(np.mean((hard - bristle) ** 2, axis=0))
+    assert np.all(difference[:3] < 2e-5)
+    assert difference[3] < 2.0
+
+
+def test_every_defect_inside_the_library_has_a_name_there_and_changes_the_rig():
+    random = np.random.default_rng(3)
+    law, demands = asked("imposed", random)
+    commands, _ = run(Truth(), law, demands[:4000], random)
+    for group in library(commands, random):
+        for make in group:
+            defect = make()
+            assert f"{defect.kind.partition(':')[0]}@{defect.component}" in KNOWN
+            assert defect.change(Truth(), law) != (Truth(), law)
+
+
+def test_defects_outside_the_library_have_no_name_there():
+    kinds = set()
+    for seed in range(5):
+        for make in outside(np.random.default_rng(seed)):
+            defect = make()
+            assert f"{defect.kind}@{defect.component}" not in KNOWN
+            kinds.add(defect.kind)
+    assert len(kinds) >= 5
+
+
+def test_tolerances_stay_within_what_is_declared():
+    for seed in range(20):
+        rig = tolerated(np.random.default_rng(seed))
+        assert abs(rig.mass / 34.0 - 1.0) <= 0.005
+        assert abs(rig.tyre / 50_000.0 - 1.0) <= 0.01
+        assert abs(rig.rail.coulomb / 50.0 - 1.0) <= 0.03
+        assert all(abs(getattr(rig, name).gain - 1.0) <= 0.002 for name in SENSORS)
+
+
+def test_sorts_have_their_shares_and_cases_their_effects():
+    order = sorts(100, np.random.default_rng(1))
+    assert [order.count(name) for name in ("single", "null", "pair", "outside")] == [45, 30, 10, 15]
+    for sort, count in (("null", 0), ("single", 1), ("outside", 1)):
+        entry, recordings = case(sort, np.random.default_rng(8))
+        assert len(entry["effects"]) == count
+        assert len(recordings) == 2
+        assert entry["test"] in TESTS
+
+
+def test_a_size_is_the_change_in_units_of_noise():
+    law, demands = asked("imposed", np.random.default_rng(2))
+    commands, _ = run(Truth(), law, demands[:4000], np.random.default_rng(2))
+    groups = library(commands, np.random.default_rng(2))
+    defect = next(d for group in groups for make in group for d in [make()] if (d.kind, d.component) == ("offset", "load_cell"))
+    assert effect_size(Truth(), law, defect, commands) == pytest.approx(abs(defect.value) / Truth().load_cell.white, rel=0.01)
+    assert MATERIAL == 1.0
+
+
+def test_a_referees_key_is_committed_to_before_it_is_opened(tmp_path):
+    command = [sys.executable, "-m", "rigtwin.blindcheck.referee", str(tmp_path), "2", "3"]
+    done = subprocess.run(command, input="open\n", capture_output=True, text=True, check=True)
+    lines = done.stdout.splitlines()
+    assert lines[:2] == ["case 0", "case 1"]
+    commitment, salt = lines[2].partition(" ")[2], lines[3].partition(" ")[2]
+    assert hashlib.sha256((salt + lines[4]).encode()).hexdigest() == commitment
+    assert len(json.loads(lines[4])) == 2
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "000.mcap",
+        "000-held-out.mcap",
+        "001.mcap",
+        "001-held-out.mcap",
+    }
+    text = (tmp_path / "000.mcap").read_bytes()
+    for word in (b"seed", b"truth", b"effect"):
+        assert word not in text
+
+
+def test_the_operators_settings_are_those_of_the_format():
+    from controllers import Settings
+
+    assert set(operator(Law())) == set(Settings._fields)
+
+
+def test_wilson_intervals_are_those_of_the_textbook():
+    # Newcombe 1998, table I: 81 of 263, and the limits at 0 and all.
+    low, high = wilson(81, 263)
+    assert (low, high) == (pytest.approx(0.2553, abs=1e-4), pytest.approx(0.3662, abs=1e-4))
+    assert wilson(0, 20)[0] == pytest.approx(0.0, abs=1e-12)
+    assert wilson(20, 20)[1] == pytest.approx(1.0)
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def entry(sort: str, *effects: tuple[str, str, float, float]) -> dict:
+    inside = sort != "outside"
+    return {
+        "sort": sort,
+        "test": "imposed",
+        "effects": [
+            {"kind": k, "component": c, "value": v, "nominal": n, "inside": inside, "size": 9.0, "material": True}
+            for k, c, v, n in effects
+        ],
+    }
+
+
+def said(verdict: str, *effects: tuple[str, str, float], where: str = "") -> dict:
+    return {
+        "verdict": verdict,
+        "effects": [
+            {"kind": k, "component": c, "parameters": {k: {"value": v}}, "confidence": 0.95, "class": [], "share": 1.0}
+            for k, c, v in effects
+        ],
+        "where": [{"component": where}] if where else [],
+        "gap": {"before": 2.0, "shrinkage_predicted": 0.9, "shrinkage_held_out": {"value": 0.8}},
+        "seconds": 3.0,
+    }
+
+
+def test_scores_count_what_they_say():
+    key = [
+        entry("single", ("coulomb", "rail", 60.0, 50.0)),
+        entry("single", ("viscous", "rail", 100.0, 0.0)),
+        entry("null"),
+        entry("null"),
+        entry("outside", ("heating", "motor", 0.2, 0.0)),
+        entry("pair", ("gain", "motor", 1.1, 1.0), ("mass", "carriage", 40.0, 34.0)),
+    ]
+    answers = [
+        said("explained", ("coulomb", "rail", 61.0), where="rail"),
+        said("explained", ("damping", "tyre", 90.0), where="tyre"),
+        said("no gap"),
+        said("explained", ("lag", "motor", 0.001), where="motor"),
+        said("unknown", where="motor"),
+        said("explained", ("gain", "motor", 1.1), ("mass", "carriage", 41.0), where="motor"),
+    ]
+    result = Result(1, "x", key, answers, {})
+    values = {row.measure: row.value for row in rows(result)}
+    assert values["top-1 right, material single effects"].startswith("1 of 2")
+    assert values["false alarms on nulls"].startswith("1 of 2")
+    assert values["effect not in the library: flagged"].startswith("1 of 1")
+    assert values["both of two effects"].startswith("1 of 1")
+    assert values["a wrong name among them"].startswith("0 of 1")
+    assert values["magnitude error, median / 90th percentile"].startswith("10.0 %")
+    assert values["predicted - achieved shrinkage, median / 90th percentile"].startswith("0.100")
+    assert values["right when confidence >= 0.9"].startswith("3 of 5")
+    assert len(misses(result)) == 2
+    assert "viscous@rail" in table(result)
+    worse = replace(result, answers=[said("no gap")] * 6)
+    assert {row.measure: row.value for row in rows(worse)}["top-1 right, material single effects"].startswith("0 of 2")
