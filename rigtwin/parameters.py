@@ -63,7 +63,7 @@ class Motor(NamedTuple):
     saturation: Annotated[float, Quantity("V", 1e-3, UNLIMITED, _NONE)] = UNLIMITED
     rate_limit: Annotated[float, Quantity("V/s", 1e-3, UNLIMITED, _NONE)] = UNLIMITED
     cogging: Annotated[float, Quantity("N", 0.0, 200.0, _NONE)] = 0.0
-    cogging_pitch: Annotated[float, Quantity("m", 1e-3, 0.2, "pole pitch of such a motor, assumed")] = 0.03
+    cogging_pitch: Annotated[float, Quantity("m", 1e-3, 0.12, "pole pitch of such a motor, assumed")] = 0.03
     cogging_phase: Annotated[float, Quantity("rad", -6.3, 6.3, "0 at zero travel, assumed")] = 0.0
 
 

@@ -19,7 +19,7 @@ from rigtwin.parameters import Plant
 from rigtwin.recording import load
 from rigtwin.twin import Twin
 
-TRIED = 40
+TRIED = 24
 """Cases that it is tried on: it runs the twin some two hundred times for each."""
 SECONDS = 6.0
 """s of each test."""

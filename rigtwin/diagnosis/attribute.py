@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Hope, Values, with_values
+from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
 from rigtwin.diagnosis.tolerances import tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
@@ -25,16 +25,16 @@ DETECTED = 60.0
 """χ² that an effect must explain to be a finding,"""
 NOTICEABLE = 0.015
 """and share of what noise alone leaves: less is a trace that no closed loop shows."""
-RELATIVE = 0.002
-"""Share of the gap that a second effect must explain to be named."""
+SECOND, MOST = 2.0, 0.5
+"""A second effect must explain so many times what a first must, and this share of what the first leaves."""
 UNEXPLAINED = 0.10
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
 ENOUGH = 0.97
 """Share of the gap that effects must explain for them to be named at all, if something is left."""
 TOO_MUCH = 0.4
 """χ² per degree of freedom above 1 from which what is left forbids to name anything."""
-SLACK = 0.01
-"""Share of the gap that the form of an effect may leave without anything else being wrong."""
+MUCH = 0.03
+"""Share of what noise leaves from which what one effect leaves is worth a search among many pairs."""
 TEMPER = 4.0
 """χ² by which explanations must differ for the better one to be e^½ times as likely."""
 FORM_TEMPER = 0.05
@@ -49,9 +49,9 @@ BEAM = 3
 """First effects to which a second is sought."""
 MANY, FEW = 10, 3
 """Pairs fitted in full, where one effect leaves much and where it leaves little."""
-FAMILIES = ({"lag", "delay"}, {"coulomb", "stribeck"})
-"""Kinds that are easily taken for one another."""
-SETTLED_PAIRS = 3
+LOOKED_AGAIN = 2
+"""Times that the best pair's effects are replaced by what resembles them."""
+SETTLED_PAIRS = 4
 """Pairs that are fitted again with the tolerances taken at them."""
 FAR_BEHIND = 0.7
 """Share of what the best effect explains that a first of two may lack."""
@@ -142,9 +142,8 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
         tried.sort(key=_priced)
         first = tried[0]
         nothing = fitter.settled(fitter.nothing)
-        gap = max(nothing.misfit - evidence.expected, 0.0)
         if nothing.misfit - _priced(first) > least:
-            much = _left(first.misfit, evidence) > max(SLACK * gap, UNEXPLAINED * evidence.expected)
+            much = _left(first.misfit, evidence) > MUCH * evidence.expected
             hopes: list[Hope] = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
@@ -154,36 +153,16 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             hopeful = _once(hopes)[: MANY if much else FEW]
             pairs = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful)
             pairs.sort(key=_priced)
-            if pairs:
-                siblings = _siblings(pairs[0], effects, search)
-                pairs += mapped(lambda pair: search.refined(pair[0], pair[1]), siblings)
+            for _ in range(LOOKED_AGAIN if pairs else 0):
+                known = {frozenset(pair.effects) for pair in pairs}
+                fresh = [pair for pair in search.alike(pairs[0], effects) if frozenset(pair[0]) not in known]
+                pairs += mapped(lambda pair: search.refined(*pair), fresh)
                 pairs.sort(key=_priced)
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
-            least_more = max(least, RELATIVE * gap)
+            least_more = max(SECOND * least, MOST * _left(first.misfit, evidence))
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
     return _judged(nothing, tried, first, evidence, silent)
-
-
-def _siblings(pair: Fit, effects: Sequence[Effect], search: Fitter) -> list[tuple[tuple[Effect, ...], Values]]:
-    """The pair with each effect replaced by those of its component that are most like it."""
-    found = []
-    for number, effect in enumerate(pair.effects):
-        for other in effects:
-            alike = any({effect.kind.name, other.kind.name} <= family for family in FAMILIES)
-            if other.group == effect.group and other != effect and alike:
-                changed, values = list(pair.effects), list(pair.values)
-                changed[number] = other
-                # Of one family and one unit: what fits the one is a start for the other.
-                values[number] = (_like(effect, other, values[number][0], search), *search.trials(other).starts[0][1:])
-                found.append((tuple(changed), tuple(values)))
-    return found
-
-
-def _like(effect: Effect, other: Effect, value: float, search: Fitter) -> float:
-    """A magnitude of `other` as far from nominal as `value` is for `effect`."""
-    here, there = (each.nominal(search.plant)[each.kind.parameters[0]] for each in (effect, other))
-    return there + value - here
 
 
 def _once(hopes: Sequence[Hope]) -> list[Hope]:

@@ -45,6 +45,8 @@ from rigtwin.recording import Recording
 
 SURE = 0.98
 """Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
+LESS_SURE = 0.88
+"""The same in one of two effects, or beside something that has no name: so often such names were right."""
 UNSURE = 0.9
 """Confidence below which another test is proposed."""
 WIDER = 2.5
@@ -193,11 +195,12 @@ def _findings(found: Attribution, kept: tuple[Effect, ...], evidence: Evidence) 
     if found.best is None:
         return []
     fit = found.best.fit
+    surest = SURE if len(fit.effects) == 1 and not found.unknown else LESS_SURE
     return [
         Finding(
             Name(effect.component, effect.kind.name),
             _estimates(effect, values, widths, evidence.plant),
-            min(SURE, _probability(found.ranking, effect)),
+            min(surest, _probability(found.ranking, effect)),
             _class(found.ranking, found.best, effect),
             min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
         )

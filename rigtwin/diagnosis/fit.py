@@ -27,6 +27,10 @@ WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
 
 
+LOOKALIKES, RESEMBLES = 3, 0.6
+"""Effects that are tried in another's place at most, if they can explain this share of what it does."""
+LIMITS = ("saturation", "rate_limit")
+"""Kinds whose magnitude is no measure of what they do."""
 Values = tuple[tuple[float, ...], ...]
 """Of effects, one tuple each, in the order of its parameters."""
 
@@ -190,7 +194,43 @@ class Fitter:
             best = int(np.argmax(gains))
             if gains[best] > least:
                 promised = first.misfit - float(gains[best])
-                found.append(Hope(promised, (*first.effects, effect), (*first.values, starts[best]), space))
+                start = self._scaled(effect, starts[best], float(share[best]))
+                found.append(Hope(promised, (*first.effects, effect), (*first.values, start), space))
+        return found
+
+    def _scaled(self, effect: Effect, start: tuple[float, ...], share: float) -> tuple[float, ...]:
+        """A start with that share of its magnitude; limits, which nothing can be scaled from, as they are."""
+        nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+        if effect.kind.name in LIMITS:
+            return start
+        return (nominal + share * (start[0] - nominal), *start[1:])
+
+    def alike(self, fit: Fit, effects: Sequence[Effect]) -> list[tuple[tuple[Effect, ...], Values]]:
+        """The effects of a fit with each in turn replaced by those whose response is most like its own, and values to start
+        from: what was found first may only resemble what is there."""
+        found = []
+        here = self.evidence.residual(fit.plant)
+        for number in range(len(fit.effects)):
+            rest = [place for place in range(len(fit.effects)) if place != number]
+            plant = with_values(self.plant, [fit.effects[p] for p in rest], [fit.values[p] for p in rest])
+            own = self.space.apart((self.evidence.residual(plant) - here)[:, None])[:, 0]
+            scored = []
+            for other in effects:
+                if other in fit.effects:
+                    continue
+                starts, responses = zip(*self._responses[other], strict=True)
+                apart = self.space.apart(np.stack(responses, axis=1).astype(np.float64))
+                along, power = apart.T @ own, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+                resemblance = np.maximum(along, 0.0) ** 2 / power
+                best = int(np.argmax(resemblance))
+                share = min(float(along[best] / power[best]), 3.0)
+                scored.append((float(resemblance[best]), number, other, self._scaled(other, starts[best], share)))
+            scored.sort(key=lambda item: -item[0])
+            for gain, place, other, start in scored[:LOOKALIKES]:
+                if gain > RESEMBLES * float(own @ own):
+                    changed, values = list(fit.effects), list(fit.values)
+                    changed[place], values[place] = other, start
+                    found.append((tuple(changed), tuple(values)))
         return found
 
     def settled(self, fit: Fit) -> Fit:
