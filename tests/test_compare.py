@@ -96,7 +96,8 @@ def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, name, fault):
         if component in OWN_FAULTS[fault]:
             assert found[component] > 1.5, component
         else:
-            assert found[component] < 1.2, component
+            # With another tyre the plate starts elsewhere, which its cylinder's replay sees for half a second.
+            assert found[component] < (1.35 if component == "structure_cylinder" else 1.2), component
     assert found["controller"] < 1e-3
     # With the fault in the twin too, noise is left.
     recording = load(path)

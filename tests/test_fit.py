@@ -86,7 +86,7 @@ def test_an_effect_is_found_at_its_size(text):
     effect = find(name)
     evidence = evidence_of(recorded("imposed", (text,)))
     fitter = Fitter(evidence)
-    fit = fitter.single(effect)
+    fit = fitter.settled(fitter.single(effect))
     nominal = effect.nominal(Plant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])

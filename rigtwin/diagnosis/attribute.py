@@ -108,14 +108,11 @@ def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
 
 def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
     parameter = effect.kind.parameters[0]
-    of = {("motor", "gain"): ("motor", "constant")}.get((effect.group, parameter), (effect.group, parameter))
-    tolerance = tolerance_of(*of)
+    tolerance = tolerance_of(effect.group, parameter)
     if tolerance is None:
         return False
-    plant = evidence.plant
-    nominal, width = getattr(getattr(plant, effect.group), parameter), tolerance.width(plant)
-    if of[1] != parameter:
-        width /= getattr(getattr(plant, effect.group), of[1])
+    nominal = effect.nominal(evidence.plant)[parameter]
+    width = tolerance.half_width * (abs(nominal) if tolerance.relative else 1.0)
     return abs(value - nominal) <= WITHIN_TOLERANCE * width
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.arrays import Array
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.tolerances import TOLERANCES, shifted
+from rigtwin.diagnosis.tolerances import TOLERANCES, shifted, tolerance_of
 from rigtwin.diagnosis.trials import Trials, swings, trials
 from rigtwin.effects import Effect
 from rigtwin.parameters import Plant
@@ -18,6 +18,8 @@ PRIOR = 1.0
 """χ² that a tolerance costs at its half width."""
 BEYOND = 1.2
 """Half widths that no tolerance exceeds: what is more is a finding."""
+SHAKES = (0.88, 0.95, 1.05, 1.12)
+"""Shares of a magnitude at which a fit is tried to be better yet."""
 SETTLING = 2
 """Times that the tolerances are taken anew at a fit."""
 ITERATIONS = 8
@@ -65,9 +67,8 @@ class Space:
     def __init__(self, evidence: Evidence, plant: Plant, used: Array | None = None, effects: Sequence[Effect] = ()) -> None:
         """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
         self._columns = evidence.nuisances(plant)
-        for number, tolerance in enumerate(TOLERANCES):
-            if any(e.group == tolerance.group and tolerance.parameter in e.kind.parameters for e in effects):
-                self._columns[:, number] = 0.0
+        own = [tolerance_of(effect.group, parameter) for effect in effects for parameter in effect.kind.parameters]
+        self._columns[:, [tolerance in own for tolerance in TOLERANCES]] = 0.0
         self._used = np.zeros(len(TOLERANCES)) if used is None else used
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
@@ -243,8 +244,22 @@ class Fitter:
             used = np.array([share if t.mechanical else 0.0 for t, share in zip(TOLERANCES, found, strict=True)])
             base = shifted(self.plant, self.plant, used.tolist())
             space = Space(self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects)
-            fit = self.refined(fit.effects, fit.values, space, base)
+            fit = self._shaken(self.refined(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
+        return fit
+
+    def _shaken(self, fit: Fit, space: Space, base: Plant) -> Fit:
+        """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
+        Gauss-Newton does not climb it."""
+        for number, effect in enumerate(fit.effects):
+            nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+            if effect.kind.name in LIMITS:
+                nominal = 0.0
+            for share in SHAKES:
+                magnitude = nominal + share * (fit.values[number][0] - nominal)
+                values = (*fit.values[:number], (magnitude, *fit.values[number][1:]), *fit.values[number + 1 :])
+                if space.misfit(self.evidence.residual(with_values(base, fit.effects, values))) < fit.misfit:
+                    fit = min(fit, self.refined(fit.effects, values, space, base), key=lambda each: each.misfit)
         return fit
 
     def refined(

@@ -59,6 +59,11 @@ def shifted(plant: Plant, nominal: Plant, widths: Sequence[float]) -> Plant:
     return plant
 
 
+SAME = {("motor", "gain"): "constant"}
+"""(Group, parameter) → the parameter that has the same meaning and the declared tolerance."""
+
+
 def tolerance_of(group: str, parameter: str) -> Tolerance | None:
-    """The declared tolerance of a parameter, if there is one."""
-    return next((each for each in TOLERANCES if (each.group, each.parameter) == (group, parameter)), None)
+    """The declared tolerance of a parameter, or of one that means the same, if there is one."""
+    wanted = (group, SAME.get((group, parameter), parameter))
+    return next((each for each in TOLERANCES if (each.group, each.parameter) == wanted), None)
