@@ -196,7 +196,7 @@ def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence, sil
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
     left = _left(best.misfit, evidence) / expected
-    explained = (nothing.misfit - best.misfit) / gap if gap > 0.0 else 0.0
+    explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
     more = left > UNEXPLAINED
     named = ranking[0] if found and not (more and (explained < ENOUGH or left > TOO_MUCH)) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}

@@ -38,6 +38,7 @@ from rigtwin.diagnosis.next_test import Test, proposed
 from rigtwin.diagnosis.place import placed
 from rigtwin.diagnosis.sampling import Sampled, outstanding
 from rigtwin.diagnosis.shrink import Judged, judged, power, with_effects
+from rigtwin.diagnosis.text import sentence
 from rigtwin.effects import Effect, find
 from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Plant
@@ -51,8 +52,6 @@ UNSURE = 0.9
 """Confidence below which another test is proposed."""
 WIDER = 2.5
 """Times the statistical interval that is reported: a model's form is never exact."""
-UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
-"""Kinds that are read off signals or commands, and change no replay."""
 SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
@@ -156,7 +155,7 @@ def _diagnosed(
     seconds = time.perf_counter() - started
     diagnosis = Diagnosis(
         verdict,
-        _sentence(verdict, effects, where, gap),
+        sentence(verdict, effects, where, gap),
         tuple(effects),
         tuple(where),
         gap,
@@ -315,27 +314,3 @@ def _next(found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ..
 def _unseen(found: Attribution) -> tuple[Unseen, ...]:
     why = "no size tried changes these data by more than their noise"
     return tuple(Unseen(effect.component, effect.kind.name, why) for effect in found.silent)
-
-
-def _sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
-    if verdict == "no gap":
-        return "No gap: the twin predicts this rig to within its sensors' noise and declared tolerances."
-    if verdict == "unknown":
-        place = where[0] if where else None
-        at = f" at the {place.component.replace('_', ' ')}; {place.evidence}" if place else ""
-        return f"Something that this library has no name for acts{at}."
-    parts = []
-    for effect in effects:
-        name, estimate = next(iter(effect.parameters.items()))
-        unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-        likely = f"{100 * effect.confidence:.0f} %"
-        was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
-        title = f"setting {name}" if effect.name.kind == "setting" else find(str(effect.name)).kind.title
-        owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
-        parts.append(f"the {owner} has a {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
-    closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
-    moves = any(effect.name.kind not in UNMOVING for effect in effects)
-    shown = closes if gap.before > 1.05 and moves else ""
-    more = "; something that has no name here is left" if verdict == "partly explained" else ""
-    text = " and ".join(parts) + shown + more + "."
-    return text[0].upper() + text[1:]

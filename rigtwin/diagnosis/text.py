@@ -1,8 +1,14 @@
-"""A diagnosis as a few lines for a terminal."""
+"""A diagnosis in words: one sentence, and a few lines for a terminal."""
 
 from __future__ import annotations
 
-from rigtwin.diagnosis.finding import Diagnosis, Estimate
+from collections.abc import Sequence
+
+from rigtwin.diagnosis.finding import Diagnosis, Estimate, Finding, Gap, Place, Verdict
+from rigtwin.effects import find
+
+UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
+"""Kinds that are read off signals or commands, and change no replay."""
 
 
 def number(estimate: Estimate) -> str:
@@ -44,3 +50,28 @@ def described(diagnosis: Diagnosis) -> str:
     lines += [f"  note: {note}" for note in diagnosis.notes]
     lines.append(f"  {diagnosis.seconds:.1f} s")
     return "\n".join(lines)
+
+
+def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
+    """The answer in one sentence."""
+    if verdict == "no gap":
+        return "No gap: the twin predicts this rig to within its sensors' noise and declared tolerances."
+    if verdict == "unknown":
+        place = where[0] if where else None
+        at = f" at the {place.component.replace('_', ' ')}; {place.evidence}" if place else ""
+        return f"Something that this library has no name for acts{at}."
+    parts = []
+    for effect in effects:
+        name, estimate = next(iter(effect.parameters.items()))
+        unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+        likely = f"{100 * effect.confidence:.0f} %"
+        was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
+        title = f"setting {name}" if effect.name.kind == "setting" else find(str(effect.name)).kind.title
+        owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
+        parts.append(f"the {owner} has a {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
+    closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
+    moves = any(effect.name.kind not in UNMOVING for effect in effects)
+    shown = closes if gap.before > 1.05 and moves else ""
+    more = "; something that has no name here is left" if verdict == "partly explained" else ""
+    text = " and ".join(parts) + shown + more + "."
+    return text[0].upper() + text[1:]
