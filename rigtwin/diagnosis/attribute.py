@@ -125,9 +125,14 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
 
         def mapped(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
             results = []
-            for fit in pool.map(function, items):
-                results.append(fit)
-                progress(1)
+            try:
+                for fit in pool.map(function, items):
+                    results.append(fit)
+                    progress(1)
+            except BaseException:
+                # Interrupted: what has not begun need not be done.
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
             return results
 
         singles = mapped(search.single, effects)

@@ -1,0 +1,52 @@
+"""What all commands share: settings from the command line, outputs that are no inputs, tables, JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin.configuration import Configuration
+
+
+def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
+    from rigtwin.configuration import from_assignments, from_toml
+
+    if parsed.config is not None:
+        configuration = from_toml(configuration, parsed.config)
+    return from_assignments(configuration, parsed.set)
+
+
+def apart(out: Path, *inputs: Path) -> Path:
+    """The output's path. Raises RigtwinError if it is one of the inputs, which would be lost."""
+    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
+        raise RigtwinError(f"{out} is the input; name another output")
+    return out
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def finite(document: object) -> object:
+    """The document with null for what is not a finite number, which JSON does not have."""
+    if isinstance(document, float):
+        return document if math.isfinite(document) else None
+    if isinstance(document, dict):
+        return {key: finite(value) for key, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [finite(value) for value in document]
+    return document
+
+
+def write_json(path: Path, document: object) -> None:
+    try:
+        path.write_text(json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
