@@ -46,7 +46,7 @@ KINDS = (
     Kind("mass", "mass", (Carriage,), ("mass",), "mass"),
     Kind("stiffness", "stiffness", (Tyre,), ("stiffness",), "stiffness at small deflection"),
     Kind("damping", "damping", (Tyre,), ("damping",), "damping while in contact"),
-    Kind("hardening", "hardening", (Tyre,), ("hardening",), "stiffness that grows with deflection"),
+    Kind("hardening", "hardening", (Tyre,), ("hardening", "hardening_power"), "stiffness that grows with deflection"),
     Kind("gain", "gain", (*ACTUATORS, *SENSORS), ("gain",), "output by this factor"),
     Kind("lag", "lag", (*ACTUATORS, *SENSORS), ("lag",), "a first-order lag more"),
     Kind("delay", "delay", (*ACTUATORS, *SENSORS, Computer), ("delay",), "a delay more"),

@@ -35,11 +35,12 @@ class Rail(NamedTuple):
 
 
 class Tyre(NamedTuple):
-    """Tyre: a compliant contact that only pushes, stiffness·δ·(1 + hardening·δ) + damping·dδ/dt."""
+    """Tyre: a compliant contact that only pushes, stiffness·δ·(1 + hardening·δ·(δ/10 mm)^(power − 1)) + damping·dδ/dt."""
 
     stiffness: Annotated[float, Quantity("N/m", 1e3, 1e7, "best match of the tests, thesis §6.3")] = 50_000.0
     damping: Annotated[float, Quantity("Ns/m", 0.0, 1e4, "0 in the ideal model, thesis Table 7.1")] = 0.0
     hardening: Annotated[float, Quantity("1/m", -50.0, 500.0, _NONE)] = 0.0
+    hardening_power: Annotated[float, Quantity("1", 1.0, 3.0, "1: a quadratic law, assumed; 2: a cubic one")] = 1.0
 
 
 class Motor(NamedTuple):

@@ -18,6 +18,8 @@ from rigtwin.friction import Friction, breakaway, friction, gap_at
 from rigtwin.model import Handles, build, handles
 from rigtwin.parameters import Plant
 
+SCALE = 0.01
+"""m; at this deflection a tyre hardens as much whatever the power of its law."""
 YIELDING = 5e-3
 """s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
 
@@ -37,6 +39,7 @@ class Contacts(NamedTuple):
     stiffness: float
     damping: float
     hardening: float
+    hardening_power: float
     ground_compliance: float
     structure_compliance: float
     yielded: Array
@@ -79,6 +82,7 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
         tyre.stiffness,
         tyre.damping,
         tyre.hardening,
+        tyre.hardening_power,
         *compliances,
         np.zeros(2),
     )
@@ -140,6 +144,14 @@ def brace(mechanics: Handles) -> None:
 
 
 @compilable
+def stiffening(now: Contacts, deflection: float) -> float:
+    """How many times its nominal secant stiffness the tyre has at a deflection, m."""
+    if now.hardening == 0.0 or deflection <= 0.0:
+        return 1.0
+    return max(1.0 + now.hardening * deflection * (deflection / SCALE) ** (now.hardening_power - 1.0), 0.0)
+
+
+@compilable
 def touch(mechanics: Handles, now: Contacts) -> None:
     """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
     if not now.changing:
@@ -156,7 +168,7 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
     mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
-    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * max(1.0 + now.hardening * deflection, 0.0)
+    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffening(now, deflection)
 
 
 @compilable

@@ -23,7 +23,7 @@ from rigtwin.converters import seen, sensors
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
 from rigtwin.friction import breakaway
 from rigtwin.parameters import Computer, Cylinder, Motor, Plant
-from rigtwin.plant import YIELDING, Contacts, contacts
+from rigtwin.plant import YIELDING, Contacts, contacts, stiffening
 
 KEPT = 64
 """Motions of plates that are kept."""
@@ -180,7 +180,7 @@ def _mechanics(
             free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias + pushed[tick])
             rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
-                spring = now.stiffness * deflection * max(1.0 + now.hardening * deflection, 0.0)
+                spring = now.stiffness * deflection * stiffening(now, deflection)
                 rhs, total = free + h * (spring + now.damping * ground_velocity), inertia + h * now.damping
             velocity = sliding(rhs, total, rail, motor, plate_velocity)
             tyre = 0.0

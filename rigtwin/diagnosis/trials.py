@@ -144,7 +144,9 @@ TRIALS: dict[str, Searched] = {
     "mass": _nominal((0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
     "stiffness": _nominal((0.7, 0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
     "damping": _fixed((30.0, 150.0, 600.0, 1500.0), 10.0),
-    "hardening": _fixed((-15.0, 5.0, 20.0, 60.0, 150.0), 1.0),
+    "hardening": lambda _effect, _plant, _swing: Trials(
+        tuple(product((-15.0, 5.0, 20.0, 60.0, 150.0), (1.0, 2.0))), (1.0, 0.05)
+    ),
     "gain": _fixed((0.8, 0.93, 1.07, 1.2), 0.004),
     "lag": _fixed((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4),
     "delay": _fixed((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4),
