@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rigtwin.blindcheck.asked import TESTS, asked
 from rigtwin.blindcheck.check import Result
 from rigtwin.blindcheck.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
 from rigtwin.blindcheck.referee import case, operator, sorts, write
 from rigtwin.blindcheck.reference_rig import Law, Truth, quiet, run
 from rigtwin.blindcheck.score import misses, rows, table, wilson
-from rigtwin.blindcheck.tests_asked import TESTS, asked
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.effects import candidates

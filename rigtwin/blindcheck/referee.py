@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from rigtwin.blindcheck.asked import TESTS, asked
 from rigtwin.blindcheck.draw import MATERIAL, Defect, effect_size, library, outside, summary, tolerated
-from rigtwin.blindcheck.reference_rig import Array, Law, Truth, run
-from rigtwin.blindcheck.tests_asked import TESTS, asked
+from rigtwin.blindcheck.reference_rig import Array, Law, run
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
 """Of all cases."""
@@ -145,8 +145,6 @@ def main(arguments: list[str]) -> int:
     print(opened, flush=True)
     return 0
 
-
-__all__ = ["Truth", "main"]
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

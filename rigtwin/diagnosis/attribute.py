@@ -19,6 +19,7 @@ from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import Effect, candidates
 
 THREADS = 2
+"""That fit at a time: the compiled plants leave the interpreter free."""
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
 DETECTED = 60.0
@@ -76,8 +77,8 @@ class Explanation:
 class Attribution:
     """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be named, None for none;
     ranking: all tried, the likeliest first; explained: share of the gap; left: χ² per degree of freedom above 1 after it;
-    unknown: whether what is left is a gap; single: the best single effect, whatever becomes of it; shares: of the gap, of each
-    effect named; silent: effects that no size tried makes noticeable on this evidence."""
+    unknown: whether what is left is a gap; shares: of the gap, of each effect named; silent: effects that no size tried makes
+    noticeable on this evidence."""
 
     nothing: Fit
     expected: float
@@ -86,14 +87,8 @@ class Attribution:
     explained: float
     left: float
     unknown: bool
-    single: Fit
     shares: dict[str, float]
     silent: tuple[Effect, ...]
-
-    @property
-    def gap(self) -> float:
-        """χ² of the nominal twin above noise alone."""
-        return max(self.nothing.misfit - self.expected, 0.0)
 
 
 def library(evidence: Evidence) -> list[Effect]:
@@ -164,7 +159,7 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             least_more = max(SECOND * least, MOST * _left(first.misfit, evidence))
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
-    return _judged(nothing, tried, first, evidence, silent)
+    return _judged(nothing, tried, evidence, silent)
 
 
 def _once(hopes: Sequence[Hope]) -> list[Hope]:
@@ -188,7 +183,7 @@ def detectable(evidence: Evidence) -> float:
     return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
-def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence, silent: tuple[Effect, ...]) -> Attribution:
+def _judged(nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...]) -> Attribution:
     expected = evidence.expected
     gap = max(nothing.misfit - expected, 0.0)
     pool = sorted([*tried, nothing], key=_priced)
@@ -205,7 +200,7 @@ def _judged(nothing: Fit, tried: list[Fit], single: Fit, evidence: Evidence, sil
     more = left > UNEXPLAINED
     named = ranking[0] if found and not (more and (explained < ENOUGH or left > TOO_MUCH)) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
-    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, single, shares, silent)
+    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, shares, silent)
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:

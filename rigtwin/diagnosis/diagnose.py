@@ -58,13 +58,11 @@ SOMETHING = 0.03
 
 @dataclass(frozen=True)
 class Outcome:
-    """A diagnosis, and what pictures of it are drawn from. plant: the twin's with the effects that were found."""
+    """A diagnosis, what pictures of it are drawn from, and the corrected twin's configuration."""
 
     diagnosis: Diagnosis
     evidence: Evidence | None
-    nominal: Configuration
     corrected: Configuration
-    disturbed: tuple[Disturbed, ...]
 
 
 def unusable(recordings: Sequence[Recording], configurations: Sequence[Configuration], started: float) -> Diagnosis | None:
@@ -100,7 +98,7 @@ def diagnose(
     with threadpool_limits(1):
         configurations = [configuration_of(recording, base) for recording in recordings]
         if (bad := unusable(recordings, configurations, started)) is not None:
-            return Outcome(bad, None, configurations[0], configurations[0], ())
+            return Outcome(bad, None, configurations[0])
         others = [configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
             for fault in check(recording, configuration):
@@ -167,7 +165,7 @@ def _diagnosed(
         tuple(str(recording.path) for recording in evidence.recordings),
         seconds,
     )
-    return Outcome(diagnosis, evidence, evidence.configurations[0], corrected, disturbed)
+    return Outcome(diagnosis, evidence, corrected)
 
 
 def _clipped(evidence: Evidence) -> list[str]:
@@ -211,7 +209,13 @@ def _findings(found: Attribution, kept: tuple[Effect, ...], evidence: Evidence) 
 def _estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], plant: Plant) -> dict[str, Estimate]:
     nominal = effect.nominal(plant)
     return {
-        name: Estimate(value, value - WIDER * width, value + WIDER * width, nominal[name], quantity.unit)
+        name: Estimate(
+            value,
+            max(value - WIDER * width, quantity.low),
+            min(value + WIDER * width, quantity.high),
+            nominal[name],
+            quantity.unit,
+        )
         for (name, quantity), value, width in zip(effect.quantities().items(), values, widths, strict=True)
     }
 

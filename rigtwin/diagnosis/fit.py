@@ -27,8 +27,6 @@ REFINED = 3
 """Starts that are followed to their end at most."""
 WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
-
-
 LOOKALIKES, RESEMBLES = 3, 0.6
 """Effects that are tried in another's place at most, if they can explain this share of what it does."""
 LIMITS = ("saturation", "rate_limit")
@@ -43,9 +41,9 @@ class Fit:
     deviation of each value; plant: with them."""
 
     effects: tuple[Effect, ...]
-    values: tuple[tuple[float, ...], ...]
+    values: Values
     misfit: float
-    widths: tuple[tuple[float, ...], ...]
+    widths: Values
     plant: Plant = field(repr=False)
 
     @property
@@ -279,7 +277,7 @@ class Fitter:
         quantities = [quantity for effect in effects for quantity in effect.quantities().values()]
         low, high = np.array([q.low for q in quantities]), np.array([q.high for q in quantities])
 
-        def split(vector: Array) -> tuple[tuple[float, ...], ...]:
+        def split(vector: Array) -> Values:
             cuts = np.cumsum(sizes)[:-1]
             return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
@@ -294,9 +292,9 @@ class Fitter:
             columns = []
             for number in range(len(here)):
                 step = steps[number] if here[number] + steps[number] <= high[number] else -steps[number]
-                shifted = here.copy()
-                shifted[number] += step
-                columns.append((residual(shifted) - left) / (step / steps[number]))
+                beside = here.copy()
+                beside[number] += step
+                columns.append((residual(beside) - left) / (step / steps[number]))
             jacobian = np.stack(columns, axis=1)
             normal, gradient = space.normal_equations(jacobian, left)
             damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
