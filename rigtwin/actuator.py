@@ -14,6 +14,7 @@ from controllers.compiled import compilable
 from rigtwin.arrays import Array
 from rigtwin.delay import delayed, ring
 from rigtwin.parameters import UNLIMITED, Computer, Cylinder, Motor
+from rigtwin.parts import ForceActuator
 
 
 class Actuator(NamedTuple):
@@ -37,17 +38,17 @@ class ActuatorState(NamedTuple):
     memory: Array
 
 
-def actuator(of: Motor | Cylinder, computer: Computer, timestep: float) -> Actuator:
-    """The conditioning of a motor's voltage or a cylinder's position."""
+def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep: float) -> Actuator:
+    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's command."""
     delay = of.delay + computer.delay
-    rate = of.rate_limit if isinstance(of, Motor) else UNLIMITED
+    rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
     neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (0.0, 0.0, 1.0, UNLIMITED, UNLIMITED, 0.0)
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
     return Actuator(
         neutral,
         delay / timestep,
         of.deadband,
-        isinstance(of, Motor),
+        not isinstance(of, Cylinder),
         of.gain,
         of.saturation,
         rate * timestep if rate < UNLIMITED else UNLIMITED,

@@ -14,6 +14,9 @@ from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.delay import delayed, ring
 from rigtwin.parameters import LoadCell, Lvdt, Plant
+from rigtwin.parts import ForceSensor, PositionSensor, VelocitySensor
+
+Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
 
 
 def sensors(plant: Plant) -> tuple[Lvdt | LoadCell, ...]:
@@ -57,7 +60,7 @@ class Sensing(NamedTuple):
     resolution: Measurements
 
 
-def transducer(sensor: Lvdt | LoadCell, period: float) -> Transducer:
+def transducer(sensor: Sensor, period: float) -> Transducer:
     neutral = (sensor.gain, sensor.offset, sensor.delay, sensor.lag) == (1.0, 0.0, 0.0, 0.0)
     share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
     return Transducer(neutral, sensor.gain, sensor.offset, sensor.delay / period, share)
@@ -93,7 +96,7 @@ def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -
         out[tick] = transduced(sensor, state, true[tick])
 
 
-def seen(sensor: Lvdt | LoadCell, true: Array, period: float) -> Array:
+def seen(sensor: Sensor, true: Array, period: float) -> Array:
     """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
     model, out = transducer(sensor, period), np.empty(len(true))
     if model.neutral:
@@ -102,7 +105,7 @@ def seen(sensor: Lvdt | LoadCell, true: Array, period: float) -> Array:
     return out
 
 
-def unseen(sensor: Lvdt | LoadCell, signal: Array, period: float) -> Array:
+def unseen(sensor: Sensor, signal: Array, period: float) -> Array:
     """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
 
     The lag's inverse is limited to 80 Hz, or it would make much of the noise.

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from controllers.quantity import Quantity, fields
 from rigtwin.configuration import Configuration, overridden
 from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+from rigtwin.parts import JOINT_ACTUATORS, JOINT_SENSORS, Guide, Mass, PositionActuator
 
-SLIDES = (Rail, Motor)
-ACTUATORS = (Motor, Cylinder)
-SENSORS = (Lvdt, LoadCell)
+SLIDES = (Rail, Motor, Guide)
+ACTUATORS = (Motor, Cylinder, *JOINT_ACTUATORS)
+DECLARED = (Lvdt, LoadCell)
+"""Sensors whose noise, hum and bits are declared."""
+SENSORS = (*DECLARED, *JOINT_SENSORS)
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,8 @@ KINDS = (
         "dry friction greater in positive direction than in negative",
     ),
     Kind("backlash", "backlash", SLIDES, ("backlash",), "friction felt only once a gap is taken up after each reversal"),
-    Kind("mass", "mass", (Carriage,), ("mass",), "mass"),
-    Kind("stiffness", "stiffness", (Tyre,), ("stiffness",), "stiffness at small deflection"),
+    Kind("mass", "mass", (Carriage, Mass), ("mass",), "mass"),
+    Kind("stiffness", "stiffness", (Tyre, Guide), ("stiffness",), "stiffness at small deflection"),
     Kind("damping", "damping", (Tyre,), ("damping",), "damping while in contact"),
     Kind("hardening", "hardening", (Tyre,), ("hardening", "hardening_power"), "stiffness that grows with deflection"),
     Kind("gain", "gain", (*ACTUATORS, *SENSORS), ("gain",), "output by this factor"),
@@ -52,16 +56,39 @@ KINDS = (
     Kind("delay", "delay", (*ACTUATORS, *SENSORS, Computer), ("delay",), "a delay more"),
     Kind("saturation", "saturation", ACTUATORS, ("saturation",), "command limited to this magnitude"),
     Kind("deadband", "deadband", ACTUATORS, ("deadband",), "command without effect within this band"),
-    Kind("rate_limit", "rate limit", (Motor,), ("rate_limit",), "command's rate limited"),
+    Kind("rate_limit", "rate limit", (Motor, *JOINT_ACTUATORS), ("rate_limit",), "command's rate limited"),
     Kind("rate_limit", "rate limit", (Cylinder,), ("speed_limit",), "speed limited"),
     Kind(
-        "cogging", "cogging", (Motor,), ("cogging", "cogging_pitch", "cogging_phase"), "force that alternates along the stroke"
+        "cogging",
+        "cogging",
+        (Motor, Guide),
+        ("cogging", "cogging_pitch", "cogging_phase"),
+        "force that alternates along the stroke",
     ),
     Kind("compliance", "compliance", (Cylinder,), ("compliance",), "yields under load"),
-    Kind("offset", "offset", SENSORS, ("offset",), "output displaced"),
-    Kind("hum", "mains hum", SENSORS, ("hum",), "amplitude of the mains line"),
-    Kind("noise", "white noise", SENSORS, ("white",), "white noise, rms"),
-    Kind("quantisation", "quantisation", SENSORS, ("resolution",), "size of one bit"),
+    Kind("compliance", "compliance", (Guide,), ("compliance",), "a spring in series with the dry friction"),
+    Kind("offset", "constant force", (Guide,), ("offset",), "a force that is the same whichever way it moves"),
+    Kind(
+        "viscous_asymmetry",
+        "asymmetry of viscous friction",
+        (Guide,),
+        ("viscous_asymmetry",),
+        "viscous friction greater in positive direction than in negative",
+    ),
+    Kind("drag", "quadratic friction", (Guide,), ("drag",), "friction with the square of the speed"),
+    Kind("relaxation", "relaxation", (Guide,), ("relaxation",), "viscous friction through a spring: it lags by this time"),
+    Kind("two_lags", "pair of lags", (PositionActuator,), ("lag", "second_lag"), "two first-order lags, one after the other"),
+    Kind(
+        "resonance",
+        "natural frequency",
+        (PositionActuator,),
+        ("natural_frequency", "damping_ratio"),
+        "follows as an underdamped system of second order",
+    ),
+    Kind("offset", "offset", (*SENSORS, PositionActuator), ("offset",), "output displaced"),
+    Kind("hum", "mains hum", DECLARED, ("hum",), "amplitude of the mains line"),
+    Kind("noise", "white noise", DECLARED, ("white",), "white noise, rms"),
+    Kind("quantisation", "quantisation", DECLARED, ("resolution",), "size of one bit"),
     Kind(
         "missed_ticks",
         "share of missed ticks",
@@ -78,10 +105,11 @@ NAMES = {"computer": "controller"}
 
 @dataclass(frozen=True)
 class Effect:
-    """A kind at a component of the plant. group: the component's name among the parameters."""
+    """A kind at a component of the plant. group: the component's name among the parameters; of: its type."""
 
     kind: Kind
     group: str
+    of: type
 
     @property
     def component(self) -> str:
@@ -93,11 +121,11 @@ class Effect:
 
     def quantities(self) -> dict[str, Quantity]:
         """Its parameters: name → unit, bounds, source."""
-        meanings = fields(type(getattr(Plant(), self.group)))
+        meanings = fields(self.of)
         found = {name: meanings[name] for name in self.kind.parameters}
         return {name: meaning for name, meaning in found.items() if isinstance(meaning, Quantity)}
 
-    def nominal(self, plant: Plant) -> dict[str, float]:
+    def nominal(self, plant: Any) -> dict[str, float]:
         """Its parameters' values in a plant."""
         return {name: float(getattr(getattr(plant, self.group), name)) for name in self.kind.parameters}
 
@@ -106,17 +134,22 @@ class Effect:
         return overridden(configuration, {self.group: values})
 
 
-def candidates(plant: Plant) -> Iterator[Effect]:
-    """All effects that a plant of these components can have."""
+def candidates(plant: Any) -> Iterator[Effect]:
+    """All effects that a plant of these components, a NamedTuple of them, can have."""
     for group, component in plant._asdict().items():
         for kind in KINDS:
             if isinstance(component, kind.at):
-                yield Effect(kind, group)
+                yield Effect(kind, group, type(component))
 
 
-def find(name: str) -> Effect:
-    """The effect of that name, `kind@component`. Raises RigtwinError with what there is."""
-    effects = {effect.name: effect for effect in candidates(Plant())}
+def title(kind: str) -> str:
+    """What a kind of effect is called in a sentence."""
+    return next((each.title for each in KINDS if each.name == kind), kind)
+
+
+def find(name: str, plant: Any = Plant()) -> Effect:  # noqa: B008
+    """The effect of that name, `kind@component`, of a plant. Raises RigtwinError with what there is."""
+    effects = {effect.name: effect for effect in candidates(plant)}
     if name in effects:
         return effects[name]
     kind, _, component = name.partition("@")

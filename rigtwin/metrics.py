@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from controllers import Skyhook, Travel
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
-from rigtwin.diagnosis.noise import rms
+from rigtwin.noise import rms
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 

@@ -7,7 +7,7 @@ import pytest
 
 from controllers import Measurements
 from rigtwin.converters import Disturbance, converted, sensors
-from rigtwin.diagnosis.noise import white_noise, without_mains
+from rigtwin.noise import white_noise, without_mains
 from rigtwin.parameters import Plant
 
 

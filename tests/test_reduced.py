@@ -9,7 +9,7 @@ from experiments import EXPERIMENTS
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.diagnosis.reduced import Disturbances, Reduced, motor_friction, sliding
+from rigtwin.machine.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.diagnosis.trials import TRIALS, swings, trials
 from rigtwin.effects import Effect, candidates
 from rigtwin.loop import run_compiled

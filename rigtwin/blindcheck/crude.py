@@ -11,7 +11,7 @@ from controllers import Measurements
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.diagnosis.noise import white_noise
+from rigtwin.noise import white_noise
 from rigtwin.diagnosis.trials import TRIALS, swings, trials
 from rigtwin.effects import candidates
 from rigtwin.loop import run_compiled

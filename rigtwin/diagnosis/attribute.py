@@ -14,9 +14,8 @@ import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
-from rigtwin.diagnosis.tolerances import tolerance_of
-from rigtwin.diagnosis.trials import TRIALS
-from rigtwin.effects import Effect, candidates
+from rigtwin.diagnosis.trials import searched
+from rigtwin.effects import Effect
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""
@@ -26,14 +25,10 @@ DETECTED = 60.0
 """χ² that an effect must explain to be a finding,"""
 NOTICEABLE = 0.015
 """and share of what noise alone leaves: less is a trace that no closed loop shows."""
-SECOND, MOST = 2.0, 0.5
-"""A second effect must explain so many times what a first must, and this share of what the first leaves."""
+SECOND = 2.0
+"""Times what a first effect must explain that each further one must."""
 UNEXPLAINED = 0.10
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
-ENOUGH = 0.97
-"""Share of the gap that effects must explain for them to be named at all, if something is left."""
-TOO_MUCH = 0.4
-"""χ² per degree of freedom above 1 from which what is left forbids to name anything."""
 MUCH = 0.03
 """Share of what noise leaves from which what one effect leaves is worth a search among many pairs."""
 TEMPER = 4.0
@@ -61,6 +56,24 @@ MEMBER = 0.05
 
 
 @dataclass(frozen=True)
+class Rules:
+    """When effects are named. most: at once; more: share of what is left that each further one must explain; enough: share of the
+    gap that they must explain to be named at all if something is left; too_much: χ² per degree of freedom above 1 from
+    which what is left forbids to name anything."""
+
+    most: int
+    more: float
+    enough: float
+    too_much: float
+
+
+KNOWN = Rules(2, 0.5, 0.97, 0.4)
+"""For a machine whose nominal values are well known: what is left means that something else is there."""
+ROUGH = Rules(6, 0.08, 0.75, math.inf)
+"""For one whose nominal values are only a start: something is always left; half the gap, in amplitude, must be explained."""
+
+
+@dataclass(frozen=True)
 class Explanation:
     """One way to explain the evidence. probability: of this one among all tried."""
 
@@ -78,7 +91,7 @@ class Attribution:
     """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be named, None for none;
     ranking: all tried, the likeliest first; explained: share of the gap; left: χ² per degree of freedom above 1 after it;
     unknown: whether what is left is a gap; shares: of the gap, of each effect named; silent: effects that no size tried makes
-    noticeable on this evidence."""
+    noticeable on this evidence; chain: the fits as effects were found one after another, the first alone first."""
 
     nothing: Fit
     expected: float
@@ -89,11 +102,12 @@ class Attribution:
     unknown: bool
     shares: dict[str, float]
     silent: tuple[Effect, ...]
+    chain: tuple[Fit, ...] = ()
 
 
 def library(evidence: Evidence) -> list[Effect]:
     """The candidates that are searched for."""
-    return [effect for effect in candidates(evidence.plant) if effect.kind.name in TRIALS]
+    return [effect for effect in evidence.machine.effects() if searched(effect)]
 
 
 def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
@@ -103,17 +117,18 @@ def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
 
 def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
     parameter = effect.kind.parameters[0]
-    tolerance = tolerance_of(effect.group, parameter)
+    tolerance = evidence.machine.tolerance_of(effect.group, parameter)
     if tolerance is None:
         return False
-    nominal = effect.nominal(evidence.plant)[parameter]
-    width = tolerance.half_width * (abs(nominal) if tolerance.relative else 1.0)
-    return abs(value - nominal) <= WITHIN_TOLERANCE * width
+    width = evidence.width(tolerance)
+    if tolerance.relative:
+        width = tolerance.half_width * abs(effect.nominal(evidence.plant)[parameter])
+    return abs(value - effect.nominal(evidence.plant)[parameter]) <= WITHIN_TOLERANCE * width
 
 
 def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: None) -> Attribution:
     """Searches the whole library. progress is called with the number of fits done since its last call."""
-    least = detectable(evidence)
+    least, rules = detectable(evidence), ROUGH if evidence.machine.rough else KNOWN
     search, fitter = Fitter(evidence.coarser()), Fitter(evidence)
     effects = library(evidence)
     with ThreadPoolExecutor(THREADS) as pool:
@@ -156,10 +171,43 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
                 pairs += mapped(lambda pair: search.refined(*pair), fresh)
                 pairs.sort(key=_priced)
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
-            least_more = max(SECOND * least, MOST * _left(first.misfit, evidence))
+            least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
+        chain = sorted(tried, key=_priced)[:1]
+        if chain and len(chain[0].effects) > 1:
+            chain.insert(0, first)
+        while chain and 1 < len(chain[-1].effects) < rules.most:
+            more = _extended(chain[-1], search, fitter, effects, least, mapped)
+            least_more = max(SECOND * least, rules.more * _left(chain[-1].misfit, evidence))
+            more = [m for m in more if chain[-1].misfit - m.misfit > least_more and not within_tolerance(m, evidence)]
+            if not more:
+                break
+            tried += more
+            chain.append(more[0])
+        if chain and rules.most > KNOWN.most:
+            # What may stand in each effect's place, now that the others are known.
+            known = {frozenset(fit.effects) for fit in tried}
+            alike = [pair for pair in search.alike(chain[-1], effects) if frozenset(pair[0]) not in known]
+            others = sorted(mapped(lambda pair: search.refined(*pair), alike), key=_priced)
+            near = [fit for fit in others[:REFITTED] if fit.misfit < chain[-1].misfit + NEAR * _left(nothing.misfit, evidence)]
+            tried += mapped(fitter.settled, near)
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
-    return _judged(nothing, tried, evidence, silent)
+    return _judged(nothing, tried, evidence, silent, rules, chain)
+
+
+def _extended(
+    leader: Fit,
+    search: Fitter,
+    fitter: Fitter,
+    effects: Sequence[Effect],
+    least: float,
+    mapped: Callable[[Callable[..., Fit], Iterable[object]], list[Fit]],
+) -> list[Fit]:
+    """Fits of one effect more than a leader's, the best first."""
+    hopes = sorted(search.seconds(leader, effects, least), key=lambda hope: hope.promised)[:MANY]
+    found = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopes)
+    found.sort(key=_priced)
+    return sorted(mapped(fitter.settled, found[:SETTLED_PAIRS]), key=_priced)
 
 
 def _once(hopes: Sequence[Hope]) -> list[Hope]:
@@ -183,7 +231,9 @@ def detectable(evidence: Evidence) -> float:
     return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
-def _judged(nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...]) -> Attribution:
+def _judged(
+    nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...], rules: Rules, chain: Sequence[Fit]
+) -> Attribution:
     expected = evidence.expected
     gap = max(nothing.misfit - expected, 0.0)
     pool = sorted([*tried, nothing], key=_priced)
@@ -198,9 +248,9 @@ def _judged(nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Ef
     left = _left(best.misfit, evidence) / expected
     explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
     more = left > UNEXPLAINED
-    named = ranking[0] if found and not (more and (explained < ENOUGH or left > TOO_MUCH)) else None
+    named = ranking[0] if found and not (more and (explained < rules.enough or left > rules.too_much)) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
-    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, shares, silent)
+    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, shares, silent, tuple(chain))
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:

@@ -13,7 +13,8 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.diagnosis.noise import rms, smallest_step, white_noise
+from rigtwin.noise import rms, smallest_step, white_noise
+from rigtwin.diagnosis.runs import FLAT, longest_run
 from rigtwin.recording import Recording
 
 MACHINE = "suspension-rig"
@@ -23,8 +24,6 @@ STUCK = 200
 """Equal samples in a row of a sensor that has noise: it is not alive."""
 COARSE = 20.0
 """Times its nominal bit from which a sensor is coarse."""
-FLAT = 8
-"""Equal samples in a row at a signal's very end of range: it is cut off there."""
 MOVES = 10.0
 """A motion this many times its sensor's noise says what its scale is."""
 FAR_OFF = 5.0
@@ -60,7 +59,7 @@ def check(recording: Recording, configuration: Configuration) -> tuple[Fault, ..
     """All faults found, the gravest first. Later checks are left out where earlier ones make them meaningless."""
     stages: tuple[Callable[[], Iterator[Fault]], ...] = (
         lambda: _presence(recording),
-        lambda: _time(recording),
+        lambda: gaps(recording),
         lambda: _numbers(recording),
         lambda: _alive(recording, configuration),
         lambda: _order(recording, configuration),
@@ -86,7 +85,7 @@ def _presence(recording: Recording) -> Iterator[Fault]:
         yield Fault("too short", "recording", f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
 
 
-def _time(recording: Recording) -> Iterator[Fault]:
+def gaps(recording: Recording) -> Iterator[Fault]:
     steps = np.diff(recording.time)
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
@@ -133,17 +132,6 @@ def _alive(recording: Recording, configuration: Configuration) -> Iterator[Fault
                 yield Fault(
                     "clipped", where, f"{where} is cut off {end} {extreme:.4g} ({share:.2g} % of the ticks)", fatal=False
                 )
-
-
-def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
-    """Where the longest run of equal, counted samples starts, and its length."""
-    same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
-    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
-    starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
-    if not len(starts):
-        return 0, 1
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest] - starts[longest]) + 1
 
 
 def expected(recording: Recording, configuration: Configuration) -> dict[str, Array]:

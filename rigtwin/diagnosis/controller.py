@@ -13,7 +13,7 @@ from controllers import Commands, Demand, Measurements, Settings, State, initial
 from controllers.quantity import Quantity, fields
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
-from rigtwin.diagnosis.noise import rms
+from rigtwin.noise import rms
 from rigtwin.diagnosis.residual import rounding
 from rigtwin.recording import Recording
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
-from rigtwin.diagnosis.checks import check
+from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.evidence import Evidence
@@ -33,15 +33,18 @@ from rigtwin.diagnosis.finding import (
 )
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.freeform import Disturbed, located
-from rigtwin.diagnosis.levels import closed_loop, replay_levels
+from rigtwin.diagnosis.formula_replay import formula_deviation
+from rigtwin.diagnosis.leftover import leftovers, steps
+from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
 from rigtwin.diagnosis.next_test import Test, proposed
 from rigtwin.diagnosis.place import placed
 from rigtwin.diagnosis.sampling import Sampled, outstanding
 from rigtwin.diagnosis.shrink import Judged, judged, power, with_effects
 from rigtwin.diagnosis.text import sentence
-from rigtwin.effects import Effect, find
+from rigtwin.effects import Effect, find, title
 from rigtwin.errors import RigtwinError
-from rigtwin.parameters import Plant
+from rigtwin.machine.machine import Machine
+from rigtwin.machine.replaying import Setup, setup_of
 from rigtwin.recording import Recording
 
 SURE = 0.98
@@ -56,26 +59,31 @@ SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
 
+Setting = TypeVar("Setting", Configuration, Setup, "Configuration | Setup")
+
+
 @dataclass(frozen=True)
 class Outcome:
     """A diagnosis, what pictures of it are drawn from, and the corrected twin's configuration."""
 
     diagnosis: Diagnosis
     evidence: Evidence | None
-    corrected: Configuration
+    corrected: Configuration | Setup
 
 
-def unusable(recordings: Sequence[Recording], configurations: Sequence[Configuration], started: float) -> Diagnosis | None:
+def unusable(
+    machine: Machine, recordings: Sequence[Recording], configurations: Sequence[Configuration | Setup], started: float
+) -> Diagnosis | None:
     """The answer if some data are not fit to be diagnosed, else None."""
     faults: list[str] = []
     for recording, configuration in zip(recordings, configurations, strict=True):
-        faults += [f"{recording.path}: {fault.message}" for fault in check(recording, configuration) if fault.fatal]
+        faults += [f"{recording.path}: {fault.message}" for fault in faults_of(machine, recording, configuration) if fault.fatal]
     if not faults:
         return None
     sentence = f"The data cannot be diagnosed: {faults[0]}."
     names = tuple(str(recording.path) for recording in recordings)
     seconds = time.perf_counter() - started
-    return Diagnosis("unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds)
+    return Diagnosis("unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds, machine.name)
 
 
 def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
@@ -83,35 +91,43 @@ def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
 
 def diagnose(
+    machine: Machine,
     recordings: Sequence[Recording],
-    base: Configuration,
+    base: Configuration | Setup,
     held_out: Sequence[Recording] = (),
     tests: Sequence[Test] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Outcome:
-    """Diagnoses recordings of one rig against the twin of `base`. tests: the menu that a next one is chosen from; progress is
+    """Diagnoses recordings of one machine against the twin of `base`. tests: the menu that a next one is chosen from; progress is
     called with a stage's name and the steps done in it.
 
     Raises RigtwinError if the recordings' settings are unknown here, or held-out data are not fit to be compared.
     """
     started = time.perf_counter()
     with threadpool_limits(1):
-        configurations = [configuration_of(recording, base) for recording in recordings]
-        if (bad := unusable(recordings, configurations, started)) is not None:
+        configurations = [setting(machine, recording, base) for recording in recordings]
+        if (bad := unusable(machine, recordings, configurations, started)) is not None:
             return Outcome(bad, None, configurations[0])
-        others = [configuration_of(recording, base) for recording in held_out]
+        others = [setting(machine, recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
-            for fault in check(recording, configuration):
+            for fault in faults_of(machine, recording, configuration):
                 if fault.fatal:
                     raise RigtwinError(f"{recording.path}: {fault.message}")
-        evidence = Evidence(recordings, configurations)
+        evidence = Evidence(machine, recordings, configurations)
         return _diagnosed(evidence, held_out, others, tests, progress, started)
+
+
+def setting(machine: Machine, recording: Recording, base: Configuration | Setup) -> Configuration | Setup:
+    """What the twin of a recording is set to."""
+    if isinstance(base, Configuration):
+        return configuration_of(recording, base)
+    return setup_of(machine, recording, base)
 
 
 def _diagnosed(
     evidence: Evidence,
     held_out: Sequence[Recording],
-    others: Sequence[Configuration],
+    others: Sequence[Configuration | Setup],
     tests: Sequence[Test],
     progress: Callable[[str, int], object],
     started: float,
@@ -130,7 +146,7 @@ def _diagnosed(
     left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
     something = found.unknown or bool(verdict_of_data.rejected) or (left - disturbed[0].misfit) > SOMETHING * evidence.expected
     deviations = _deviations(evidence)
-    sampled = outstanding(evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant)
+    sampled = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant)
     effects = [
         *_findings(found, verdict_of_data.kept, evidence),
         *(_sampled(each) for each in sampled),
@@ -148,7 +164,7 @@ def _diagnosed(
     progress("replaying components", 1)
     gap = _gap(evidence, plant, verdict_of_data, sampled)
     progress("choosing the next test", 1)
-    suggestion = _next(found, effects, verdict_of_data.kept, tests)
+    suggestion = _next(evidence.machine, found, effects, verdict_of_data.kept, tests)
     corrected = _corrected(evidence.configurations[0], plant, sampled)
     seconds = time.perf_counter() - started
     diagnosis = Diagnosis(
@@ -164,6 +180,10 @@ def _diagnosed(
         tuple(notes),
         tuple(str(recording.path) for recording in evidence.recordings),
         seconds,
+        evidence.machine.name,
+        steps(evidence, found.chain, held_out, others) if evidence.machine.rough else (),
+        {row.name: row.unit for row in evidence.machine.rows},
+        tuple(leftovers(evidence, plant, disturbed)) if verdict != "no gap" and evidence.machine.rough else (),
     )
     return Outcome(diagnosis, evidence, corrected)
 
@@ -172,7 +192,7 @@ def _clipped(evidence: Evidence) -> list[str]:
     return [
         f"{recording.path.name}: {fault.message}; those ticks are left out"
         for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True)
-        for fault in check(recording, configuration)
+        for fault in faults_of(evidence.machine, recording, configuration)
         if not fault.fatal
     ]
 
@@ -181,10 +201,13 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     """What the controller did other than told, once for all recordings."""
     found: dict[tuple[str, str], Deviation] = {}
     for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
-        if recording.controller:
+        deviation = None
+        if isinstance(configuration, Setup):
+            deviation = formula_deviation(evidence.machine, recording, configuration)
+        elif recording.controller:
             deviation = ControllerReplay(recording, configuration.controller).deviation()
-            if deviation is not None:
-                found[deviation.kind, deviation.name] = deviation
+        if deviation is not None:
+            found[deviation.kind, deviation.name] = deviation
     return list(found.values())
 
 
@@ -196,25 +219,27 @@ def _findings(found: Attribution, kept: tuple[Effect, ...], evidence: Evidence) 
     return [
         Finding(
             Name(effect.component, effect.kind.name),
-            _estimates(effect, values, widths, evidence.plant),
+            estimates(effect, values, widths, evidence),
             min(surest, _probability(found.ranking, effect)),
             _class(found.ranking, found.best, effect),
             min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
+            effect.kind.title,
         )
         for effect, values, widths in zip(fit.effects, fit.values, fit.widths, strict=True)
         if effect in kept
     ]
 
 
-def _estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], plant: Plant) -> dict[str, Estimate]:
-    nominal = effect.nominal(plant)
+def estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], evidence: Evidence) -> dict[str, Estimate]:
+    """The parameters of an effect as fitted, with their intervals."""
+    nominal = effect.nominal(evidence.plant)
     return {
         name: Estimate(
             value,
             max(value - WIDER * width, quantity.low),
             min(value + WIDER * width, quantity.high),
             nominal[name],
-            quantity.unit,
+            evidence.machine.unit(effect.group, quantity),
         )
         for (name, quantity), value, width in zip(effect.quantities().items(), values, widths, strict=True)
     }
@@ -238,24 +263,25 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
 
 
 def _sampled(each: Sampled) -> Finding:
-    unit = find(f"{each.kind}@{each.component}").quantities()[each.parameter].unit
+    effect = find(f"{each.kind}@{each.component}")
+    unit = effect.quantities()[each.parameter].unit
     spread = 0.05 * each.value
     estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
     name = Name(each.component, each.kind)
-    return Finding(name, {each.parameter: estimate}, SURE, (name,), 1.0)
+    return Finding(name, {each.parameter: estimate}, SURE, (name,), 1.0, effect.kind.title)
 
 
 def _deviation(each: Deviation) -> Finding:
     name = Name("controller", each.kind)
     spread = 1e-3 * abs(each.used)
     estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
-    return Finding(name, {each.name: estimate}, SURE, (name,), 1.0)
+    return Finding(name, {each.name: estimate}, SURE, (name,), 1.0, title(each.kind))
 
 
 def _where(
     evidence: Evidence,
     found: Attribution,
-    plant: Plant,
+    plant: Any,
     kept: tuple[Effect, ...],
     disturbed: tuple[Disturbed, ...],
     best: Fit,
@@ -279,40 +305,44 @@ def _where(
     return sorted(places.values(), key=lambda place: -place.share)
 
 
-def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
-    def level(of: Plant) -> float:
+def _gap(evidence: Evidence, plant: Any, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
+    def level(of: Any) -> float:
         powers = [p[e.fade.max(axis=0) > 0.5] for p, e in zip(power(evidence, of), evidence.lines, strict=True)]
         ticks = sum(len(each) for each in powers)
         return float((sum(each.sum() for each in powers) / max(ticks, 1)) ** 0.5)
 
     recording, nominal = evidence.recordings[0], evidence.configurations[0]
     corrected = _corrected(nominal, plant, sampled)
-    replays = replay_levels(recording, nominal, nominal._replace(plant=plant))
-    loop = closed_loop(recording, nominal, corrected, _noisy(corrected.plant, evidence))
+    loop = None
+    if isinstance(nominal, Configuration) and isinstance(corrected, Configuration):
+        replays = replay_levels(recording, nominal, nominal._replace(plant=plant))
+        loop = closed_loop(recording, nominal, corrected, _noisy(corrected.plant, evidence))
+    else:
+        replays = signal_levels(evidence, plant)
     held_out = outcome.held_out
     return Gap(level(evidence.plant), level(plant), 1.0, outcome.predicted, held_out, outcome.data, replays, loop)
 
 
-def _noisy(plant: Plant, evidence: Evidence) -> Plant:
+def _noisy(plant: Any, evidence: Evidence) -> Any:
     """The plant with the white noise that the recording has."""
-    for name, noise in zip(Measurements._fields, evidence.lines[0].noise, strict=True):
+    for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
         plant = plant._replace(**{name: getattr(plant, name)._replace(white=float(noise))})
     return plant
 
 
-def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled]) -> Configuration:
+def _corrected(nominal: Setting, plant: Any, sampled: Sequence[Sampled]) -> Setting:
     for each in sampled:
         plant = plant._replace(**{each.component: getattr(plant, each.component)._replace(**{each.parameter: each.value})})
     return nominal._replace(plant=plant)
 
 
-def _next(found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]) -> NextTest | None:
+def _next(machine: Machine, found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]) -> NextTest | None:
     if not tests or found.best is None or not kept:
         return None
     likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]
     if all(effect.confidence >= UNSURE and len(effect.alternatives) == 1 for effect in effects) or len(likely) < 2:
         return None
-    return proposed([found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests)
+    return proposed(machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests)
 
 
 def _unseen(found: Attribution) -> tuple[Unseen, ...]:

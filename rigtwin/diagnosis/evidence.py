@@ -10,27 +10,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.fft import rfft, rfftfreq
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
-from rigtwin.diagnosis.checks import FLAT, longest_run
-from rigtwin.diagnosis.noise import smallest_step, white_noise, without_mains
-from rigtwin.diagnosis.reduced import Reduced
-from rigtwin.diagnosis.tolerances import TOLERANCES
-from rigtwin.parameters import Plant
+from rigtwin.diagnosis.runs import FLAT, longest_run
+from rigtwin.machine.machine import Machine
+from rigtwin.machine.predictor import Predictor
+from rigtwin.machine.replaying import Setup, predictor
+from rigtwin.machine.tolerance import Tolerance
+from rigtwin.noise import smallest_step, white_noise, without_mains
 from rigtwin.recording import Recording
 
 HIGHEST = 150.0
 """Hz; above it no component moves and lines would only add noise."""
-FORM = 0.004
-"""Share of a signal that no model is held to."""
 MAINS_WIDTH = 0.8
 """Hz to either side of the mains line that is left out."""
 STARTED = 0.7
@@ -41,7 +40,8 @@ COARSER = 30.0
 """How much more variance than rounding the prediction shows is put down to a coarse sensor's bits."""
 COARSE_BIT = 2.0
 """Bits of this many times the noise, which they themselves then are, are seen in the signal."""
-LOAD_CELL = Measurements._fields.index("load_cell")
+JUMPS = ("force", "command")
+"""What jumps where dry friction does; motions do not."""
 SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
@@ -53,11 +53,13 @@ SMOOTHED = 8
 @dataclass(frozen=True)
 class Lines:
     """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
-    multiplied by, shape (4, lines); fade: what a difference is multiplied by before, shape (4, ticks); measured: shape
-    (4, ticks); noise: white, of each sensor, shape (4,); bit: size of one of each sensor, shape (4,)."""
+    multiplied by, shape (rows, lines); spread: variance of noise alone in each line, shape (rows, lines); fade: what a
+    difference is multiplied by before, shape (rows, ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape
+    (rows,); bit: size of one of each signal, shape (rows,)."""
 
     frequency: Array
     weight: Array
+    spread: Array
     fade: Array
     measured: Array
     noise: Array
@@ -65,10 +67,10 @@ class Lines:
     length: int
 
 
-def lines(recording: Recording, mains: float, counted: Array) -> Lines:
-    """The lines of a recording's sensors, and their weights. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
-    measured = np.stack([recording.column("/sensor", name) for name in Measurements._fields])
-    ticks = measured.shape[1]
+def lines(machine: Machine, recording: Recording, model: Predictor, mains: float, counted: Array) -> Lines:
+    """The lines of a recording's signals, and their weights. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
+    measured = np.stack([recording.column(*row.channel) for row in machine.rows])
+    rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
     frequency = rfftfreq(length, recording.period)
     kept = frequency <= min(HIGHEST, 0.4 / recording.period)
@@ -77,21 +79,34 @@ def lines(recording: Recording, mains: float, counted: Array) -> Lines:
     noise = np.array([white_noise(row) for row in measured])
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
-    weight = np.empty((4, int(kept.sum())))
     fade = np.stack([_fade(ticks, recording.period) * counted * ~cut_off(row) for row in measured])
-    for row in range(4):
+    around = model.noise(floor)
+    if around is not None:
+        floor = np.maximum(np.std(around, axis=1), 1e-300)
+    weight, spread = np.empty((rows, int(kept.sum()))), np.empty((rows, int(kept.sum())))
+    for row in range(rows):
         swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
-        variance = 0.5 * (float(fade[row] @ fade[row]) * floor[row] ** 2 + FORM**2 * _smoothed(power)) + 1e-300
-        # What a signal's swing is held to says nothing of its mean.
-        variance[0] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2 + 1e-300
+        spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
+        if around is not None:
+            spread[row] = 0.5 * _smoothed(np.abs(rfft(fade[row] * around[row], length)[kept]) ** 2)
+        if machine.rough:
+            # A rough model does not know how what it lacks is spread over the lines.
+            variance = spread[row] + 0.5 * machine.form**2 * float(np.mean(power)) + 1e-300
+        else:
+            variance = spread[row] + 0.5 * machine.form**2 * _smoothed(power) + 1e-300
+            # What a signal's swing is held to says nothing of its mean.
+            variance[0] = spread[row, 0] + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
-    return Lines(frequency[kept], weight, fade, measured, floor, resolution, length)
+    return Lines(frequency[kept], weight, spread, fade, measured, floor, resolution, length)
 
 
 def cut_off(row: Array) -> NDArray[np.bool_]:
     """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
     found = np.zeros(len(row), bool)
+    if white_noise(row) < smallest_step(row):
+        # Bits coarser than the noise stand still at rest too.
+        return found
     for extreme in (row.min(), row.max()):
         at_end = row == extreme
         if longest_run(row, at_end)[1] >= FLAT:
@@ -142,40 +157,30 @@ class Evidence:
 
     def __init__(
         self,
+        machine: Machine,
         recordings: Sequence[Recording],
-        configurations: Sequence[Configuration],
+        configurations: Sequence[Configuration | Setup],
         counted: Sequence[Array] | None = None,
         steps: int = 4,
     ) -> None:
-        """configurations: the twin's, one for each recording, alike in their plant; counted: how much each tick counts, 0 to 1;
+        """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0 to 1;
         steps: of integration a tick."""
         counted = counted or [np.ones(recording.ticks) for recording in recordings]
-        self.recordings, self.configurations = tuple(recordings), tuple(configurations)
-        self.plant = self.configurations[0].plant
+        self.machine, self.recordings, self.configurations = machine, tuple(recordings), tuple(configurations)
+        self.names = [row.name for row in machine.rows]
+        self.plant: Any = self.configurations[0].plant
+        self.plants = [predictor(machine, r, c, steps) for r, c in zip(recordings, configurations, strict=True)]
         self.lines = [
-            lines(recording, c.plant.mains.frequency, part)
-            for recording, c, part in zip(recordings, configurations, counted, strict=True)
-        ]
-        self.plants = [
-            Reduced(
-                recording.column("/command", "ground"),
-                recording.column("/command", "structure"),
-                recording.column("/command", "voltage"),
-                c,
-                steps,
-            )
-            for recording, c in zip(recordings, configurations, strict=True)
+            lines(machine, recording, model, c.plant.mains.frequency, part)
+            for recording, model, c, part in zip(recordings, self.plants, configurations, counted, strict=True)
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
-        for each, c, predicted in zip(self.lines, self.configurations, self.predicted(self.plant), strict=True):
+        for each, recording, predicted in zip(self.lines, self.recordings, self.predicted(self.plant), strict=True):
             for row, model in zip(each.measured, predicted, strict=True):
-                row -= (row - model) - without_mains(row - model, c.timing.period, c.plant.mains.frequency)
+                row -= (row - model) - without_mains(row - model, recording.period, self.plant.mains.frequency)
         self._loosen()
         self._round()
-        self.expected = 0.0
-        for each in self.lines:
-            noise = np.sum(each.fade**2, axis=1) * each.noise**2
-            self.expected += float(np.sum(noise[:, None] * each.weight**2))
+        self.expected = sum(float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines)
 
     def coarser(self) -> Evidence:
         """The same with half as many integration steps: for a search, not for its result."""
@@ -188,14 +193,14 @@ class Evidence:
         for each, reduced in zip(self.lines, self.plants, strict=True):
             change = each.fade * (reduced.sensed(self.plant) - reduced.finer().sensed(self.plant))
             power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
-            for row in range(4):
+            for row in range(len(self.names)):
                 variance = COARSE * 0.5 * _smoothed(power[row])
                 each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def _round(self) -> None:
         """Adds what the bits of a coarse sensor leave, which is no white noise but follows the signal."""
         for each, predicted in zip(self.lines, self.predicted(self.plant), strict=True):
-            for row in range(4):
+            for row in range(len(self.names)):
                 bit = float(each.bit[row])
                 if bit > COARSE_BIT * each.noise[row]:
                     rounded = each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row])
@@ -203,12 +208,12 @@ class Evidence:
                     variance = 0.5 * COARSER * _smoothed(power)
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
-    def predicted(self, plant: Plant) -> list[Array]:
-        """The sensors of every recording, shape (4, ticks) each."""
+    def predicted(self, plant: Any) -> list[Array]:
+        """The sensors of every recording, shape (rows, ticks) each."""
         return [reduced.sensed(plant) for reduced in self.plants]
 
-    def differences(self, plant: Plant) -> list[Array]:
-        """Measured less predicted, spikes apart, shape (4, ticks) each: what a friction that changes sign a tick early or late
+    def differences(self, plant: Any) -> list[Array]:
+        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early or late
         leaves says nothing of its size, and jumps when anything changes."""
         return self._despiked(self.predicted(plant))
 
@@ -216,33 +221,45 @@ class Evidence:
         found = []
         for each, predicted in zip(self.lines, predictions, strict=True):
             difference = each.measured - predicted
-            # Friction jumps; of what is sensed, only the force jumps with it.
-            despike(difference[LOAD_CELL], SPIKE * float(each.noise[LOAD_CELL]))
+            for row, meaning in enumerate(self.machine.rows):
+                if meaning.kind in JUMPS:
+                    despike(difference[row], SPIKE * float(each.noise[row]))
             found.append(difference)
         return found
 
     def whitened(self, differences: Sequence[Array]) -> Array:
-        """Differences in the time domain, shape (4, ticks) each, as one whitened vector."""
+        """Differences in the time domain, shape (rows, ticks) each, as one whitened vector."""
         parts = []
         for each, difference in zip(self.lines, differences, strict=True):
             transform = rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
             parts += [transform.real.ravel(), transform.imag.ravel()]
         return np.concatenate(parts)
 
-    def residual(self, plant: Plant) -> Array:
+    def residual(self, plant: Any) -> Array:
         """Measured less predicted."""
         return self.whitened(self.differences(plant))
 
     def unlike(self, predictions: Sequence[Array]) -> Array:
-        """The residual of predictions, shape (4, ticks) each, however they were made."""
+        """The residual of predictions, shape (rows, ticks) each, however they were made."""
         return self.whitened(self._despiked(predictions))
 
-    def nuisances(self, plant: Plant) -> Array:
+    def width(self, tolerance: Tolerance) -> float:
+        """A tolerance's half width here, in its parameter's unit."""
+        return tolerance.width(self.plant, self.recordings[0].period)
+
+    def shifted(self, plant: Any, widths: Sequence[float]) -> Any:
+        """The plant with each tolerance used by so many half widths."""
+        for tolerance, share in zip(self.machine.tolerances, widths, strict=True):
+            if share:
+                plant = tolerance.shifted(plant, share * self.width(tolerance))
+        return plant
+
+    def nuisances(self, plant: Any) -> Array:
         """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""
         before = self.predicted(plant)
         columns = []
-        for tolerance in TOLERANCES:
-            width = tolerance.width(self.plant)
+        for tolerance in self.machine.tolerances:
+            width = self.width(tolerance)
             after, scale = self.predicted(tolerance.shifted(plant, width)), 1.0
             start = before
             if tolerance.mechanical and width > 0.0:

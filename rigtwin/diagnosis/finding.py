@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
@@ -34,13 +34,14 @@ class Name:
 class Finding:
     """One effect. confidence: probability that it is this one; alternatives: the effects that these data cannot tell from it,
     itself first (`class` in JSON); share: of the gap, what would come back without it; for an effect read off a sensor or the
-    controller alone, of that one's own gap."""
+    controller alone, of that one's own gap; title: its kind in a sentence."""
 
     name: Name
     parameters: dict[str, Estimate]
     confidence: float
     alternatives: tuple[Name, ...]
     share: float
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,20 @@ class Unseen:
 
 
 @dataclass(frozen=True)
+class Step:
+    """One effect more. added: its name, or of all that changed; values: of its parameters then; left: rms of what each signal has left
+    over the model, in its unit, on `data`."""
+
+    added: str
+    values: dict[str, Estimate]
+    left: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Diagnosis:
-    """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know."""
+    """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know;
+    steps: what each effect changed as they were found one after another, the nominal machine first; units: of their signals;
+    leftovers: where what is still left lies."""
 
     verdict: Verdict
     sentence: str
@@ -124,6 +137,10 @@ class Diagnosis:
     notes: tuple[str, ...]
     recordings: tuple[str, ...]
     seconds: float
+    machine: str = "suspension-rig"
+    steps: tuple[Step, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
+    leftovers: tuple[Place, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -132,6 +149,7 @@ class Diagnosis:
             gap = asdict(self.gap)
         return {
             "verdict": self.verdict,
+            "machine": self.machine,
             "sentence": self.sentence,
             "effects": [
                 {
@@ -151,6 +169,9 @@ class Diagnosis:
             "not_observable": [asdict(each) for each in self.not_observable],
             "faults": list(self.faults),
             "notes": list(self.notes),
+            "steps": [asdict(step) for step in self.steps],
+            "units": dict(self.units),
+            "leftovers": [asdict(place) for place in self.leftovers],
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from rigtwin.arrays import Array
-from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.tolerances import TOLERANCES, shifted, tolerance_of
-from rigtwin.diagnosis.trials import Trials, swings, trials
+from rigtwin.diagnosis.evidence import JUMPS, Evidence
+from rigtwin.diagnosis.joint_trials import Scales, scales
+from rigtwin.diagnosis.trial import Trials, swings
+from rigtwin.diagnosis.trials import trials
 from rigtwin.effects import Effect
-from rigtwin.parameters import Plant
+from rigtwin.parts import Guide
 
 PRIOR = 1.0
 """χ² that a tolerance costs at its half width."""
@@ -29,8 +31,12 @@ WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
 LOOKALIKES, RESEMBLES = 3, 0.6
 """Effects that are tried in another's place at most, if they can explain this share of what it does."""
-LIMITS = ("saturation", "rate_limit")
+LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
+THROUGH_FRICTION = ("stribeck", "backlash", "compliance")
+"""Kinds of a guide that change its dry friction."""
+NOTHING = 1e-3
+"""χ² below which an effect does nothing at all."""
 Values = tuple[tuple[float, ...], ...]
 """Of effects, one tuple each, in the order of its parameters."""
 
@@ -44,14 +50,14 @@ class Fit:
     values: Values
     misfit: float
     widths: Values
-    plant: Plant = field(repr=False)
+    plant: Any = field(repr=False)
 
     @property
     def name(self) -> str:
         return " + ".join(effect.name for effect in self.effects) or "none"
 
 
-def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Plant:
+def with_values(plant: Any, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
     """The plant with effects of these values, one tuple an effect in the order of its parameters."""
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
@@ -59,15 +65,34 @@ def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequen
     return plant
 
 
+def clashing(effect: Effect, others: Sequence[Effect]) -> bool:
+    """Whether an effect sets a parameter that another sets too."""
+    own = set(effect.kind.parameters)
+    return any(other.group == effect.group and own & set(other.kind.parameters) for other in others)
+
+
+def possible(effects: Sequence[Effect], plant: Any) -> bool:
+    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry friction."""
+    dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
+    return all(
+        effect.of is not Guide
+        or effect.kind.name not in THROUGH_FRICTION
+        or effect.group in dry
+        or getattr(plant, effect.group).coulomb > 0.0
+        for effect in effects
+    )
+
+
 class Space:
     """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
 
-    def __init__(self, evidence: Evidence, plant: Plant, used: Array | None = None, effects: Sequence[Effect] = ()) -> None:
+    def __init__(self, evidence: Evidence, plant: Any, used: Array | None = None, effects: Sequence[Effect] = ()) -> None:
         """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
         self._columns = evidence.nuisances(plant)
-        own = [tolerance_of(effect.group, parameter) for effect in effects for parameter in effect.kind.parameters]
-        self._columns[:, [tolerance in own for tolerance in TOLERANCES]] = 0.0
-        self._used = np.zeros(len(TOLERANCES)) if used is None else used
+        machine = evidence.machine
+        own = [machine.tolerance_of(effect.group, parameter) for effect in effects for parameter in effect.kind.parameters]
+        self._columns[:, [tolerance in own for tolerance in machine.tolerances]] = 0.0
+        self._used = np.zeros(len(machine.tolerances)) if used is None else used
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
@@ -127,16 +152,32 @@ class Fitter:
     def __init__(self, evidence: Evidence) -> None:
         self.evidence, self.plant = evidence, evidence.plant
         self.space = Space(evidence, evidence.plant)
-        self.swing = swings(evidence.recordings)
+        self.swing = swings(evidence.machine, evidence.recordings)
+        self._scales: dict[str, Scales] = {}
         self._nominal = evidence.residual(evidence.plant)
         self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
         self._responses: dict[Effect, list[tuple[tuple[float, ...], Array]]] = {}
 
     def trials(self, effect: Effect) -> Trials:
-        return trials(effect, self.plant, self.swing)
+        return trials(effect, self.plant, self.swing, self._scale)
+
+    def _scale(self, component: str) -> Scales:
+        """What a component goes through on these recordings, by the nominal plant and by what is measured of the force."""
+        if component not in self._scales:
+            longest = max(range(len(self.evidence.plants)), key=lambda n: self.evidence.recordings[n].ticks)
+            measured = self.evidence.lines[longest].measured
+            forces = [measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS]
+            force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
+            motion = self.evidence.plants[longest].motion(component, self.plant)
+            self._scales[component] = scales(motion, force, self.evidence.recordings[longest].period)
+        return self._scales[component]
 
     def single(self, effect: Effect) -> Fit:
         """The best fit of one effect."""
+        if not possible((effect,), self.plant):
+            start = self.trials(effect).starts
+            self._responses[effect] = [(values, np.zeros_like(self._nominal, np.float32)) for values in start]
+            return Fit((effect,), (start[0],), self.nothing.misfit, ((0.0,) * len(start[0]),), self.plant)
         scored: list[tuple[float, tuple[float, ...]]] = []
         responses = []
         found = self.trials(effect)
@@ -175,16 +216,28 @@ class Fitter:
         """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
         return max(self.space.misfit(response.astype(np.float64)) for _, response in self._responses[effect])
 
+    def _beside(self, effect: Effect, first: Fit) -> list[tuple[tuple[float, ...], Array]]:
+        """The responses of an effect: at the nominal plant, or beside `first` if it does nothing without that, as a play does
+        nothing without friction."""
+        if self.largest(effect) > NOTHING:
+            return self._responses[effect]
+        here = self.evidence.residual(first.plant)
+        found = []
+        for start, _ in self._responses[effect]:
+            there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
+            found.append((start, (here - there).astype(np.float32)))
+        return found
+
     def seconds(self, first: Fit, effects: Sequence[Effect], least: float) -> list[Hope]:
         """Second effects beside `first` that promise to explain at least `least`, by how well their responses at the nominal
-        plant resemble what it leaves."""
+        plant, or beside it, resemble what it leaves."""
         space = Space(self.evidence, first.plant)
         left = space.less(self.evidence.residual(first.plant))
         found = []
         for effect in effects:
-            if effect in first.effects:
+            if clashing(effect, first.effects) or not possible((*first.effects, effect), self.plant):
                 continue
-            starts, responses = zip(*self._responses[effect], strict=True)
+            starts, responses = zip(*self._beside(effect, first), strict=True)
             apart = space.apart(np.stack(responses, axis=1).astype(np.float64))
             alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
             # A response may be too strong or too weak, but not the other way round.
@@ -215,7 +268,8 @@ class Fitter:
             own = self.space.apart((self.evidence.residual(plant) - here)[:, None])[:, 0]
             scored = []
             for other in effects:
-                if other in fit.effects:
+                kept = [fit.effects[place] for place in rest]
+                if other in fit.effects or clashing(other, kept) or not possible((*kept, other), self.plant):
                     continue
                 starts, responses = zip(*self._responses[other], strict=True)
                 apart = self.space.apart(np.stack(responses, axis=1).astype(np.float64))
@@ -234,19 +288,20 @@ class Fitter:
 
     def settled(self, fit: Fit) -> Fit:
         """The fit again with the tolerances taken at it, and the mechanical ones used in the plant itself."""
-        used = np.zeros(len(TOLERANCES))
+        tolerances = self.evidence.machine.tolerances
+        used = np.zeros(len(tolerances))
         space = Space(self.evidence, fit.plant, used, fit.effects)
         residual = self.evidence.residual(fit.plant)
         for _ in range(SETTLING):
             found = space.nuisances(residual)
-            used = np.array([share if t.mechanical else 0.0 for t, share in zip(TOLERANCES, found, strict=True)])
-            base = shifted(self.plant, self.plant, used.tolist())
+            used = np.array([share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)])
+            base = self.evidence.shifted(self.plant, used.tolist())
             space = Space(self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects)
             fit = self._shaken(self.refined(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
         return fit
 
-    def _shaken(self, fit: Fit, space: Space, base: Plant) -> Fit:
+    def _shaken(self, fit: Fit, space: Space, base: Any) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
         Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):
@@ -265,7 +320,7 @@ class Fitter:
         effects: tuple[Effect, ...],
         start: Sequence[Sequence[float]],
         space: Space | None = None,
-        base: Plant | None = None,
+        base: Any = None,
     ) -> Fit:
         """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
         base: the plant without the effects."""
@@ -276,6 +331,13 @@ class Fitter:
         steps = np.concatenate([self.trials(effect).steps for effect in effects])
         quantities = [quantity for effect in effects for quantity in effect.quantities().values()]
         low, high = np.array([q.low for q in quantities]), np.array([q.high for q in quantities])
+        narrower = [self.trials(effect).bounds for effect in effects]
+        cuts = np.concatenate([[0], np.cumsum(sizes)])
+        for number, bounds in enumerate(narrower):
+            if bounds is not None:
+                own = slice(cuts[number], cuts[number + 1])
+                low[own] = np.maximum(low[own], [pair[0] for pair in bounds])
+                high[own] = np.minimum(high[own], [pair[1] for pair in bounds])
 
         def split(vector: Array) -> Values:
             cuts = np.cumsum(sizes)[:-1]

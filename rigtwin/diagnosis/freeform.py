@@ -1,39 +1,29 @@
 """Where an effect acts that nobody has a name for: which component, disturbed in any way it could be, explains most.
 
 Each component gets a set of disturbances at its place, functions of what it goes through: its motion, speed, force, the time.
-Their strengths are fitted together, linearly. A sensor's disturbance shows in that sensor alone; a cylinder's moves its plate
-and all that hangs on it; the motor's force shows in load cell and wheel; what acts on the carriage shows in the wheel.
+Their strengths are fitted together, linearly. A sensor's disturbance shows in that sensor alone; an actuator's moves all that
+hangs on it; a force on what moves shows wherever that motion is seen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
-from controllers import Measurements
-from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Space
-from rigtwin.diagnosis.reduced import Disturbances
 from rigtwin.effects import Effect
-from rigtwin.parameters import Plant
 
 PRICE = 20.0
 """Of each disturbance, in χ²."""
-STRENGTH = {"m": 1e-4, "N": 4.0}
-"""rms of each disturbance as tried; its response is taken as in proportion to it."""
 ROUNDS = 4
 """Times that a disturbance is fitted anew at what was found."""
 FOLLOWED = 6
 """Components that are fitted so; those that come last at first stay there."""
-WAVES = (0.005, 0.008, 0.012, 0.018, 0.028)
-"""m; wave lengths of friction along the way."""
-RELAXATIONS = (0.02, 0.07, 0.25)
-"""s; times in which a tyre may relax."""
 
 
 @dataclass(frozen=True)
@@ -46,146 +36,28 @@ class Disturbed:
     forms: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class _Signals:
-    """What the components go through, shape (ticks,) each."""
-
-    time: Array
-    sensed: Array
-    wheel: Array
-    wheel_speed: Array
-    wheel_acceleration: Array
-    deflection: Array
-    travel: Array
-    sliding: Array
-    force: Array
-    period: float
-
-
-def _signals(true: Array, sensed: Array, period: float) -> _Signals:
-    wheel = true[1] - true[2]
-    speed = np.gradient(wheel, period)
-    deflection = np.maximum(true[0] - wheel, 0.0)
-    sliding = np.gradient(true[2], period)
-    time = np.arange(true.shape[1]) * period
-    acceleration = np.gradient(speed, period)
-    return _Signals(time, sensed, wheel, speed, acceleration, deflection, true[2], sliding, true[3], period)
-
-
-def _relaxed(signal: Array, time_constant: float, period: float) -> Array:
-    share = period / (time_constant + period)
-    out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=[(1.0 - share) * signal[0]])
-    return np.asarray(out)
-
-
-def _polynomials(signal: Array, time: Array, period: float) -> Iterator[tuple[str, Array]]:
-    centred = signal - np.mean(signal)
-    rate = np.gradient(centred, period)
-    yield "constant", np.ones_like(signal)
-    yield "time", time
-    yield "time squared", time**2
-    yield "its value", centred
-    yield "its value squared", centred**2
-    yield "its value cubed", centred**3
-    yield "its value growing with time", centred * time
-    yield "its rate", rate
-    yield "its rate of rate", np.gradient(rate, period)
-
-
-def _forms(component: str, signals: _Signals) -> Iterator[tuple[str, str, Array]]:
-    """(what the disturbance goes with, where it enters, the disturbance) of one component."""
-    time, period = signals.time, signals.period
-    if component in Measurements._fields:
-        row = Measurements._fields.index(component)
-        for name, signal in _polynomials(signals.sensed[row], time, period):
-            yield name, component, signal
-        if component == "load_cell":
-            yield "the carriage's acceleration", component, signals.wheel_acceleration
-    elif component in ("ground_cylinder", "structure_cylinder"):
-        place = component.removesuffix("_cylinder")
-        motion = signals.sensed[("ground_cylinder", "structure_cylinder").index(component)]
-        for name, signal in _polynomials(motion, time, period):
-            yield name, place, signal
-        for seconds in RELAXATIONS:
-            yield "its past", place, _relaxed(motion, seconds, period)
-        yield "its load", place, signals.force - np.mean(signals.force)
-    elif component == "motor":
-        sign = np.sign(signals.sliding)
-        for name, signal in _polynomials(signals.force, time, period):
-            yield name, "voltage", signal
-        yield "sliding speed", "voltage", signals.sliding
-        yield "sliding speed squared", "voltage", signals.sliding * np.abs(signals.sliding)
-        yield "sliding direction", "voltage", sign
-        yield "sliding direction growing with time", "voltage", sign * time
-        yield "travel", "voltage", signals.travel
-    elif component == "rail":
-        sign = np.sign(signals.wheel_speed)
-        yield "speed", "force", signals.wheel_speed
-        yield "speed squared", "force", signals.wheel_speed * np.abs(signals.wheel_speed)
-        yield "direction", "force", sign
-        yield "direction growing with time", "force", sign * time
-        yield "place", "force", signals.wheel
-        for wave in WAVES:
-            yield "direction and place", "force", sign * np.sin(2 * np.pi * signals.wheel / wave)
-            yield "direction and place", "force", sign * np.cos(2 * np.pi * signals.wheel / wave)
-    elif component == "tyre":
-        squeeze = np.gradient(signals.deflection, period)
-        yield "deflection", "force", signals.deflection
-        yield "deflection squared", "force", signals.deflection**2
-        yield "deflection cubed", "force", signals.deflection**3
-        yield "deflection growing with time", "force", signals.deflection * time
-        yield "rate of deflection", "force", squeeze
-        yield "rate and deflection", "force", squeeze * signals.deflection
-        for seconds in RELAXATIONS:
-            yield "its past", "force", _relaxed(signals.deflection, seconds, period)
-    else:
-        yield "acceleration", "force", signals.wheel_acceleration
-        yield "acceleration growing with time", "force", signals.wheel_acceleration * time
-        yield "acceleration squared", "force", signals.wheel_acceleration * np.abs(signals.wheel_acceleration)
-
-
-PLACES = (
-    "motor",
-    "rail",
-    "tyre",
-    "carriage",
-    "ground_cylinder",
-    "structure_cylinder",
-    *Measurements._fields,
-)
-"""Components that are disturbed in turn."""
-
-
 class _Disturbance:
     """All forms of one component's disturbance in every recording, and what they do."""
 
-    def __init__(self, component: str, evidence: Evidence, plant: Plant, signals: list[_Signals]) -> None:
-        forms = list(zip(*(_forms(component, each) for each in signals), strict=True))
-        self.component, self.names = component, [same[0][0] for same in forms]
+    def __init__(self, component: str, evidence: Evidence, plant: Any) -> None:
+        forms = list(zip(*(each.forms(component, plant) for each in evidence.plants), strict=True))
+        self.component, self.names = component, [same[0].name for same in forms]
         self._evidence, self._plant = evidence, plant
-        self._enter = forms[0][0][1]
-        strength = STRENGTH["N" if self._enter in ("voltage", "force", "load_cell") else "m"]
-        sizes = [float(np.sqrt(np.mean(np.concatenate([signal for _, _, signal in same]) ** 2))) for same in forms]
+        self._enter = forms[0][0].entry
+        strength = max(each.strength(self._enter) for each in evidence.plants)
+        sizes = [float(np.sqrt(np.mean(np.concatenate([form.signal for form in same]) ** 2))) for same in forms]
         # One row a form, one column a tick; each of the same strength.
         self._forms = [
-            np.stack([strength / max(size, 1e-300) * same[number][2] for same, size in zip(forms, sizes, strict=True)])
-            for number in range(len(signals))
+            np.stack([strength / max(size, 1e-300) * same[number].signal for same, size in zip(forms, sizes, strict=True)])
+            for number in range(len(evidence.plants))
         ]
 
     def predicted(self, strengths: Array) -> list[Array]:
-        """The sensors under the disturbance, shape (4, ticks) for each recording."""
-        found = []
-        for reduced, forms in zip(self._evidence.plants, self._forms, strict=True):
-            pushed = strengths @ forms
-            if self._enter in Measurements._fields:
-                sensed = reduced.sensed(self._plant)
-                sensed[Measurements._fields.index(self._enter)] += pushed
-            else:
-                amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(pushed))
-                amounts[self._enter] = pushed / MOTOR_CONSTANT if self._enter == "voltage" else pushed
-                sensed = reduced.disturbed(self._plant, Disturbances(**amounts))
-            found.append(sensed)
-        return found
+        """The signals under the disturbance, shape (rows, ticks) for each recording."""
+        return [
+            each.disturbed(self._plant, self._enter, strengths @ forms)
+            for each, forms in zip(self._evidence.plants, self._forms, strict=True)
+        ]
 
     def fitted(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
         """Gauss-Newton: misfit, strengths, and what would be missing without each form."""
@@ -216,16 +88,11 @@ class _Disturbance:
         return misfit, here, worth
 
 
-def located(evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True) -> tuple[Disturbed, ...]:
+def located(evidence: Evidence, plant: Any, effects: Sequence[Effect] = (), follow: bool = True) -> tuple[Disturbed, ...]:
     """Every component disturbed freely, the one that explains most first. plant: with the effects that are known already;
     follow: fit the foremost anew at what was found, as large disturbances need."""
     space = Space(evidence, plant, None, effects)
-    base = evidence.predicted(plant)
-    signals = [
-        _signals(reduced.true(plant), sensed, recording.period)
-        for reduced, sensed, recording in zip(evidence.plants, base, evidence.recordings, strict=True)
-    ]
-    disturbances = [_Disturbance(component, evidence, plant, signals) for component in PLACES]
+    disturbances = [_Disturbance(component, evidence, plant) for component in evidence.plants[0].places()]
     found = sorted((_found(each, space, 1) for each in disturbances), key=lambda each: each.misfit)
     if follow:
         foremost = [each.component for each in found[:FOLLOWED]]

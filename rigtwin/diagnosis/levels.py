@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
-from rigtwin.diagnosis.noise import spectrum
+from rigtwin.noise import rms, spectrum
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 from rigtwin.loop import run_compiled
 from rigtwin.parameters import Plant
@@ -47,6 +49,18 @@ def replay_levels(recording: Recording, before: Configuration, after: Configurat
         one, *others = pool.map(ratios, dict.fromkeys((before, after)))
     other = others[0] if others else one
     return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
+
+
+def signal_levels(evidence: Evidence, corrected: Any) -> dict[str, Level]:
+    """Each signal's own gap in the first recording, rms in units of its noise, before and after."""
+    each = evidence.lines[0]
+    counted = each.fade.max(axis=0) > 0.5
+    found = {}
+    before, after = (evidence.differences(plant)[0][:, counted] for plant in (evidence.plant, corrected))
+    for row, name in enumerate(evidence.names):
+        noise = float(each.noise[row])
+        found[name] = Level(rms(before[row]) / noise, rms(after[row]) / noise, 1.0)
+    return found
 
 
 def closed_loop(recording: Recording, before: Configuration, after: Configuration, own: Plant) -> Level | None:

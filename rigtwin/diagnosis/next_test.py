@@ -13,6 +13,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit, Space
 from rigtwin.loop import run_compiled
+from rigtwin.machine.machine import Machine
 from rigtwin.recording import Recording
 from rigtwin.twin import Twin
 
@@ -42,7 +43,7 @@ def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recor
     return Recording(Path(name), "suspension-rig", name, period, np.arange(len(commands)) * period, columns, controller)
 
 
-def proposed(fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
+def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
     """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
     if len(fits) < 2:
         return None
@@ -51,7 +52,7 @@ def proposed(fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
         timing = configuration.timing._replace(duration=min(configuration.timing.duration, LONGEST))
         twin = configuration._replace(plant=fits[0].plant, timing=timing)
         recording = tried(name, twin, demanded(twin, SEED))
-        evidence = Evidence([recording], [configuration._replace(plant=fits[0].plant, timing=timing)])
+        evidence = Evidence(machine, [recording], [configuration._replace(plant=fits[0].plant, timing=timing)])
         space = Space(evidence, fits[0].plant)
         own = evidence.predicted(fits[0].plant)
         apart = []

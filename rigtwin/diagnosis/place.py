@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import Measurements
 from rigtwin.arrays import Array
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Place
-from rigtwin.diagnosis.noise import band
+from rigtwin.machine.predictor import Motion
+from rigtwin.noise import band
 
 CONCENTRATED = 1.6
 """Times the average power from which a region is where a difference lies."""
@@ -27,9 +27,9 @@ LEAST = 0.1
 """Share of a difference's power that a region must hold."""
 
 
-def region(difference: Array, speed: Array, force: Array, period: float) -> str:
-    """The operating region in which a difference is concentrated, or `throughout`. All shape (ticks,)."""
-    power = difference**2
+def region(difference: Array, motion: Motion, period: float) -> str:
+    """The operating region in which a difference, shape (ticks,), is concentrated, or `throughout`."""
+    speed, force, power = motion.speed, motion.force, difference**2
     total = float(np.sum(power))
     if total <= 0.0:
         return "throughout"
@@ -63,28 +63,14 @@ def region(difference: Array, speed: Array, force: Array, period: float) -> str:
     return name
 
 
-def speed_of(component: str, true: Array, period: float) -> Array:
-    """The speed that a component's region goes by, m/s. true: ideal sensors' values, shape (4, ticks)."""
-    if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
-        position = true[2]
-    elif component.startswith("ground"):
-        position = true[0]
-    elif component.startswith("structure"):
-        position = true[1]
-    else:
-        position = true[1] - true[2]
-    return np.gradient(position, period)
-
-
 def placed(evidence: Evidence, component: str, share: float, differences: list[Array], words: str = "") -> Place:
-    """The place of differences, shape (4, ticks) for each recording, that a component causes."""
+    """The place of differences, shape (rows, ticks) for each recording, that a component causes."""
     noise = evidence.lines[0].noise
-    power = [sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2 for row in range(4)]
+    power = [sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2 for row in range(len(noise))]
     row = int(np.argmax(power))
     longest = int(np.argmax([d.shape[1] for d in differences]))
     difference, recording = differences[longest][row], evidence.recordings[longest]
-    true = evidence.plants[longest].true(evidence.plant)
-    where = region(difference, speed_of(component, true, recording.period), true[3], recording.period)
+    motion = evidence.plants[longest].motion(component, evidence.plant)
+    where = region(difference, motion, recording.period)
     low, high = band(difference, recording.period)
-    sensor = Measurements._fields[row]
-    return Place(component, share, (low, high), where, words or f"most of it seen by {sensor}")
+    return Place(component, share, (low, high), where, words or f"most of it seen by {evidence.names[row]}")

@@ -12,15 +12,12 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from controllers import Measurements
 from rigtwin import __version__
 from rigtwin.arrays import Array
-from rigtwin.channels import CHANNELS
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.finding import Diagnosis
-from rigtwin.diagnosis.noise import spectrum
-from rigtwin.diagnosis.place import speed_of
+from rigtwin.noise import spectrum
 from rigtwin.diagnosis.text import number
 from rigtwin.errors import RigtwinError
 
@@ -85,14 +82,12 @@ def plots(outcome: Outcome) -> list[str]:
     before, after = evidence.differences(evidence.plant)[0], evidence.differences(outcome.corrected.plant)[0]
     each, recording = evidence.lines[0], evidence.recordings[0]
     row = int(np.argmax(np.mean(before**2, axis=1) / each.noise**2))
-    name = Measurements._fields[row]
-    unit = next(channel.unit for channel in CHANNELS if channel.topic == "/sensor" and channel.name == name)
+    name, unit = evidence.names[row], evidence.machine.rows[row].unit
     scale, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
     corrected = bool(outcome.diagnosis.effects)
     curves = [("before", BEFORE, scale * before[row])] + ([("after", AFTER, scale * after[row])] if corrected else [])
     component = outcome.diagnosis.where[0].component if outcome.diagnosis.where else name
-    true = evidence.plants[0].true(evidence.plant)
-    speed = speed_of(component, true, recording.period)
+    speed = evidence.plants[0].motion(component, evidence.plant).speed
     noise = scale * float(each.noise[row])
     return [
         _by_velocity(curves, speed, noise, name, unit),

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from controllers import Measurements
 from rigtwin.arrays import Array
-from rigtwin.diagnosis.noise import rms, smallest_step, white_noise, without_mains
-from rigtwin.parameters import LoadCell, Lvdt, Plant
+from rigtwin.noise import rms, smallest_step, white_noise, without_mains
+from rigtwin.parameters import LoadCell, Lvdt
 from rigtwin.recording import Recording
 
 OUTSTANDING = 1.6
@@ -33,7 +33,7 @@ class Sampled:
     nominal: float
 
 
-def properties(recording: Recording, name: str, predicted: Array, plant: Plant) -> dict[str, float]:
+def properties(recording: Recording, name: str, predicted: Array, plant: Any) -> dict[str, float]:
     """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should read."""
     signal = recording.column("/sensor", name)
     difference = signal - predicted
@@ -44,17 +44,25 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Plant) 
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
 
 
-def outstanding(recordings: Sequence[Recording], predicted: Sequence[Sequence[Array]], plant: Plant) -> tuple[Sampled, ...]:
-    """What stands out of nominal, and of what the other sensors have. predicted: one list a recording, one array a sensor."""
+def outstanding(
+    sensors: Sequence[str], recordings: Sequence[Recording], predicted: Sequence[Sequence[Array]], plant: Any
+) -> tuple[Sampled, ...]:
+    """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
+    order of the rows of predicted: one list a recording, one array a sensor."""
+    declared = [name for name in sensors if hasattr(getattr(plant, name, None), "white")]
+    if not declared:
+        return ()
     names = {"white": "noise", "hum": "hum", "resolution": "quantisation"}
     found: list[Sampled] = []
     table: dict[str, dict[str, float]] = {}
-    for number, name in enumerate(Measurements._fields):
+    for number, name in enumerate(sensors):
+        if name not in declared:
+            continue
         each = [properties(r, name, p[number], plant) for r, p in zip(recordings, predicted, strict=True)]
         table[name] = {key: float(np.median([one[key] for one in each])) for key in names}
     for parameter, kind in names.items():
         ratios: dict[str, float] = {}
-        for name in Measurements._fields:
+        for name in declared:
             sensor: Lvdt | LoadCell = getattr(plant, name)
             nominal = float(getattr(sensor, parameter))
             # Hum is seen above what white noise alone would show of a line.

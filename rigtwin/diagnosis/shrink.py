@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
 from rigtwin.effects import Effect
-from rigtwin.parameters import Plant
+from rigtwin.machine.replaying import Setup
 from rigtwin.recording import Recording
 
 BLOCK = 0.5
@@ -43,7 +44,7 @@ class Blocks:
         return Blocks(np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after]))
 
 
-def power(evidence: Evidence, plant: Plant) -> list[Array]:
+def power(evidence: Evidence, plant: Any) -> list[Array]:
     """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
     found = []
     for each, predicted in zip(evidence.lines, evidence.predicted(plant), strict=True):
@@ -52,7 +53,7 @@ def power(evidence: Evidence, plant: Plant) -> list[Array]:
     return found
 
 
-def blocks(evidence: Evidence, before: Plant, after: Plant, counted: Sequence[Array]) -> Blocks:
+def blocks(evidence: Evidence, before: Any, after: Any, counted: Sequence[Array]) -> Blocks:
     """The blocks of the parts that count."""
     pairs: tuple[list[float], list[float]] = ([], [])
     for recording, part, each, one, other in zip(
@@ -112,17 +113,17 @@ def _refitted(evidence: Evidence, fit: Fit) -> Fit:
     return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
 
 
-def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration]) -> Judged:
+def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration | Setup]) -> Judged:
     """Judges a fit on held-out recordings; without any, on each half of the recordings after a fit to the other half."""
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if held_out:
-        other = Evidence(held_out, configurations)
+        other = Evidence(evidence.machine, held_out, configurations)
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
         predicted = shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0
         whole = [np.ones(recording.ticks) for recording in held_out]
         data = f"{len(held_out)} held-out recording{'s' if len(held_out) > 1 else ''}"
 
-        def outside(plant: Plant) -> Blocks:
+        def outside(plant: Any) -> Blocks:
             return blocks(other, evidence.plant, plant, whole)
 
         def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
@@ -131,7 +132,7 @@ def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configur
         kept, rejected = gated(fit.effects, kept_outside)
         return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data)
     parts = halves(evidence.recordings)
-    fits = [_refitted(Evidence(evidence.recordings, evidence.configurations, part), fit) for part in parts]
+    fits = [_refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts]
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
         inside = blocks(evidence, evidence.plant, refitted.plant, own)
@@ -148,7 +149,7 @@ def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configur
     return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, "each half, fitted to the other")
 
 
-def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
+def with_effects(plant: Any, fit: Fit, kept: Sequence[Effect]) -> Any:
     """The plant with those of a fit's effects that are kept."""
     pairs = [(effect, values) for effect, values in zip(fit.effects, fit.values, strict=True) if effect in kept]
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigtwin.diagnosis.finding import Diagnosis, Estimate, Finding, Gap, Place, Verdict
-from rigtwin.effects import find
 
 UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands, and change no replay."""
@@ -30,6 +29,12 @@ def described(diagnosis: Diagnosis) -> str:
             lines.append(f"    {name} = {number(estimate)}")
         if len(effect.alternatives) > 1:
             lines.append(f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}")
+    if diagnosis.steps:
+        lines.append("  what is left, rms, as effects are found one after another:")
+        for step in diagnosis.steps:
+            amounts = ", ".join(f"{name} {value:.4g} {diagnosis.units[name]}" for name, value in step.left.items())
+            values = ", ".join(f"{name} {each.value:.4g}" for name, each in step.values.items())
+            lines.append(f"    {step.added}{f' ({values})' if values else ''}: {amounts}")
     for place in diagnosis.where:
         low, high = place.band_hz
         lines.append(f"  where: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}")
@@ -41,6 +46,9 @@ def described(diagnosis: Diagnosis) -> str:
                 f"  closes {100 * held.value:.1f} % ({100 * held.low:.1f} to {100 * held.high:.1f}) on {gap.held_out}; "
                 f"predicted {100 * gap.shrinkage_predicted:.1f} %"
             )
+    for place in diagnosis.leftovers:
+        low, high = place.band_hz
+        lines.append(f"  left over: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}")
     if diagnosis.next_test is not None:
         between = " from ".join(diagnosis.next_test.between[:2])
         lines.append(f"  next test: {diagnosis.next_test.command}  (separates {between})")
@@ -66,7 +74,7 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         unit = "" if estimate.unit == "1" else f" {estimate.unit}"
         likely = f"{100 * effect.confidence:.0f} %"
         was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
-        title = f"setting {name}" if effect.name.kind == "setting" else find(str(effect.name)).kind.title
+        title = f"setting {name}" if effect.name.kind == "setting" else effect.title
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
         parts.append(f"the {owner} has a {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
     closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"

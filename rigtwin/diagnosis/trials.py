@@ -3,56 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
+from rigtwin.diagnosis.joint_trials import JOINT_TRIALS, Scales
+from rigtwin.diagnosis.trial import SHARES, Swing, Trials
 from rigtwin.effects import Effect
-from rigtwin.parameters import Cylinder, Lvdt, Motor, Plant
-from rigtwin.recording import Recording
+from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+
+TYPES = (Carriage, Rail, Tyre, Motor, Cylinder, Lvdt, LoadCell, Computer)
+"""Components whose nominal values are those of the suspension rig, and so are these trials."""
 
 LEAST_FRICTION = 10.0
 """N; a change of friction is tried in shares of what there is, or of this."""
 
 
-SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
-"""Of the time; a limit is looked for at the values that a command exceeds for the rest of it."""
-
 BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
 """Shares of a known limit at which a lower one is looked for."""
-
-
-@dataclass(frozen=True)
-class Swing:
-    """How far and fast a command went: the magnitude, in its unit, and the rate, unit/s, that it stays below for these
-    `SHARES` of the time."""
-
-    largest: tuple[float, ...]
-    fastest: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Trials:
-    """Values to start from, one tuple each in the order of the effect's parameters; steps: fine ones for derivatives.
-    quadrature: whether starts come in pairs a quarter of a wave apart, (amplitude, pitch, 0) and (amplitude, pitch, π/2), so
-    that any phase is a blend of both."""
-
-    starts: tuple[tuple[float, ...], ...]
-    steps: tuple[float, ...]
-    quadrature: bool = False
-
-
-def swings(recordings: tuple[Recording, ...]) -> dict[str, Swing]:
-    """The swing of each command over all recordings, by the component that it moves."""
-    commands = {"motor": "voltage", "ground_cylinder": "ground", "structure_cylinder": "structure"}
-    found: dict[str, Swing] = {}
-    for component, name in commands.items():
-        columns = [(recording.column("/command", name), recording.period) for recording in recordings]
-        size = np.concatenate([np.abs(column) for column, _ in columns])
-        rate = np.concatenate([np.abs(np.diff(column)) / period for column, period in columns])
-        found[component] = Swing(tuple(np.quantile(size, SHARES).tolist()), tuple(np.quantile(rate, SHARES).tolist()))
-    return found
 
 
 SHORTEST_WAVE, LONGEST_WAVE, WAVES = 0.008, 0.1, 20
@@ -160,7 +129,15 @@ TRIALS: dict[str, Searched] = {
 """Kind → its trials. Kinds that are read off the signals directly (noise, hum, bits, missed ticks) are not searched for."""
 
 
-def trials(effect: Effect, plant: Plant, swing: dict[str, Swing]) -> Trials:
-    """Where to start, and how finely to step."""
+def searched(effect: Effect) -> bool:
+    """Whether an effect is searched for; others are read off the signals."""
+    return (effect.kind.name, effect.of) in JOINT_TRIALS or (effect.kind.name in TRIALS and effect.of in TYPES)
+
+
+def trials(effect: Effect, plant: Any, swing: dict[str, Swing], scale: Callable[[str], Scales]) -> Trials:
+    """Where to start, and how finely to step. scale: of a component."""
     none = Swing((0.0,) * len(SHARES), (0.0,) * len(SHARES))
-    return TRIALS[effect.kind.name](effect, plant, swing.get(effect.component, none))
+    own = swing.get(effect.component, none)
+    if (effect.kind.name, effect.of) in JOINT_TRIALS:
+        return JOINT_TRIALS[effect.kind.name, effect.of](effect, plant, scale(effect.group), own)
+    return TRIALS[effect.kind.name](effect, plant, own)

@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers import Measurements
 from controllers.compiled import compilable
+from controllers.force import MOTOR_CONSTANT
 from rigtwin.actuator import Actuator, ActuatorState, actuator, conditioned, holding
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
@@ -22,6 +24,8 @@ from rigtwin.configuration import Configuration
 from rigtwin.converters import seen, sensors
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
 from rigtwin.friction import breakaway
+from rigtwin.machine.predictor import Form, Motion
+from rigtwin.machine.quarter_car_forms import PLACES, STRENGTH, quarter_car_forms, signals
 from rigtwin.parameters import Computer, Cylinder, Motor, Plant
 from rigtwin.plant import YIELDING, Contacts, contacts, stiffening
 
@@ -284,10 +288,42 @@ class Reduced:
         ahead = motion[np.arange(len(by)) * self._steps + 1]
         return Plate(of.position + motion, of.onward + ahead)
 
-    def disturbed(self, plant: Plant, besides: Disturbances) -> Array:
-        """What the plant's sensors would read under disturbances, shape (4, ticks)."""
-        true = self.true(plant, besides)
+    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
+        Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
+        if entry in Measurements._fields:
+            sensed = self.sensed(plant)
+            sensed[Measurements._fields.index(entry)] += amount
+            return sensed
+        amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
+        amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
+        true = self.true(plant, Disturbances(**amounts))
         return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
+
+    def places(self) -> tuple[str, ...]:
+        return PLACES
+
+    def forms(self, component: str, plant: Plant) -> list[Form]:
+        through = signals(self.true(plant), self.sensed(plant), self._period)
+        return [Form(*each) for each in quarter_car_forms(component, through)]
+
+    def strength(self, entry: str) -> float:
+        return STRENGTH["N" if entry in ("voltage", "force", "load_cell") else "m"]
+
+    def motion(self, component: str, plant: Plant) -> Motion:
+        true = self.true(plant)
+        if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
+            position = true[2]
+        elif component.startswith("ground"):
+            position = true[0]
+        elif component.startswith("structure"):
+            position = true[1]
+        else:
+            position = true[1] - true[2]
+        return Motion(position, np.gradient(position, self._period), true[3])
+
+    def noise(self, levels: Array) -> None:
+        """Sensors' noise reaches the plant only through recorded commands, which are known: it stays white."""
 
     def sensed(self, plant: Plant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""

@@ -126,6 +126,21 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
     return Motion(expected + correction, correction, error)
 
 
+def smoothed(signal: Array, period: float) -> tuple[Array, float]:
+    """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left."""
+    noise = white_noise(signal)
+    count = len(signal)
+    line = signal[0] + (signal[-1] - signal[0]) * np.arange(count) / max(count - 1, 1)
+    swing = signal - line
+    # Mirrored, so that it goes on as smoothly as it can at both ends.
+    extended = np.concatenate([swing, -swing[-2:0:-1]])
+    frequencies, density = spectrum(extended, period)
+    gain = wiener_gain(frequencies, density, 2 * noise**2 * period)
+    grid = np.fft.rfftfreq(len(extended), period)
+    kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[:count]
+    return line + kept, noise * math.sqrt(float(np.mean(gain)))
+
+
 def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
     """1 − noise/density up to the highest frequency below which the density, averaged over a fifth of an octave or nine
     lines, stands out of the noise density; 0 above."""

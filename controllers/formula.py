@@ -1,0 +1,218 @@
+"""Controllers written as a formula: `kp * (reference - position) - kv * derivative(position)`.
+
+A formula is compiled into a short program of blocks, which the same function runs from Python and inside compiled loops. Every
+block that remembers something starts at rest at its first sample.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.compiled import compilable
+
+LONGEST = 4096
+"""Ticks that a block remembers at most."""
+
+ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE = range(5)
+ABSOLUTE, SIGN, SINE, COSINE, ROOT, SMALLER, LARGER = range(5, 12)
+DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, LATE, CLIP = range(12, 18)
+PLAIN = {"abs": (ABSOLUTE, 1), "sign": (SIGN, 1), "sin": (SINE, 1), "cos": (COSINE, 1), "sqrt": (ROOT, 1)}
+PLAIN |= {"min": (SMALLER, 2), "max": (LARGER, 2), "limit": (CLIP, 3)}
+BLOCKS = {
+    "derivative": (DERIVATIVE, 1, "derivative(x): of its last two samples"),
+    "integral": (INTEGRAL, 1, "integral(x): sum of its samples times the period"),
+    "low_pass": (LOW_PASS, 2, "low_pass(x, time_constant): first-order lag"),
+    "mean": (MEAN, 2, "mean(x, n): of its last n samples"),
+    "late": (LATE, 2, "late(x, n): n samples ago"),
+}
+OPERATORS = {ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE}
+FUNCTIONS = (*PLAIN, *BLOCKS)
+
+
+class Program(NamedTuple):
+    """A compiled formula. Registers hold inputs, then settings, then numbers, then each operation's result; operations: code,
+    three registers, and where its memory begins, shape (operations, 5); registers: as they start, shape (registers,)."""
+
+    operations: NDArray[np.int64]
+    registers: NDArray[np.float64]
+    inputs: int
+    memory: int
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A controller. inputs: names in the order in which `run` takes their values; settings: name → value."""
+
+    text: str
+    inputs: tuple[str, ...]
+    settings: Mapping[str, float]
+    program: Program
+
+    def with_settings(self, settings: Mapping[str, float]) -> Program:
+        """The program with other values of its settings."""
+        registers = self.program.registers.copy()
+        for place, name in enumerate(self.settings, start=len(self.inputs)):
+            registers[place] = settings.get(name, self.settings[name])
+        return self.program._replace(registers=registers)
+
+    def memory(self) -> NDArray[np.float64]:
+        """What its blocks remember, before the first sample."""
+        return np.full(max(self.program.memory, 1), math.nan)
+
+
+def formula(text: str, settings: Mapping[str, float]) -> Formula:
+    """Compiles a formula. Every name that is no setting is an input. Raises ValueError saying what is wrong and where."""
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"{text!r} is no formula") from None
+    inputs = tuple(dict.fromkeys(_names(tree, settings)))
+    builder = _Builder(inputs, settings)
+    builder.result(tree)
+    if not builder.operations:
+        # The formula is one name or number: pass it on.
+        builder.operation(ADD, builder.result(tree), builder.number(0.0))
+    registers = np.array([*([0.0] * len(inputs)), *settings.values(), *builder.numbers], float)
+    first = len(registers)
+    table = np.array(
+        [[code, *(r if r >= 0 else first - r - 1 for r in used), at] for code, *used, at in builder.operations], np.int64
+    )
+    program = Program(table, np.concatenate([registers, np.zeros(len(table))]), len(inputs), builder.remembered)
+    return Formula(text, inputs, dict(settings), program)
+
+
+def _names(tree: ast.expr, settings: Mapping[str, float]) -> list[str]:
+    calls = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in calls]
+    found.sort(key=lambda node: (node.lineno, node.col_offset))
+    return [node.id for node in found if node.id not in settings]
+
+
+class _Builder:
+    """Registers of results are counted −1, −2, …, since how many numbers there are is known only at the end."""
+
+    def __init__(self, inputs: Sequence[str], settings: Mapping[str, float]) -> None:
+        self._place = {name: number for number, name in enumerate([*inputs, *settings])}
+        self.numbers: list[float] = []
+        self.operations: list[tuple[int, int, int, int, int]] = []
+        self.remembered = 0
+
+    def number(self, value: float) -> int:
+        self.numbers.append(value)
+        return len(self._place) + len(self.numbers) - 1
+
+    def operation(self, code: int, one: int, two: int = 0, three: int = 0, memory: int = 0) -> int:
+        self.operations.append((code, one, two, three, self.remembered))
+        self.remembered += memory
+        return -len(self.operations)
+
+    def result(self, node: ast.expr) -> int:
+        """The register that a part of the formula ends in."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+            return self.number(float(node.value))
+        if isinstance(node, ast.Name):
+            return self._place[node.id]
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            return self.operation(OPERATORS[type(node.op)], self.result(node.left), self.result(node.right))
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            return self.operation(NEGATE, self.result(node.operand))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
+            return self._call(node.func.id, node.args)
+        raise ValueError(f"{ast.unparse(node)!r} is not allowed; there are + - * /, numbers, names, {', '.join(FUNCTIONS)}")
+
+    def _call(self, name: str, given: list[ast.expr]) -> int:
+        if name not in FUNCTIONS:
+            raise ValueError(f"unknown function {name!r}; there are {', '.join(FUNCTIONS)}")
+        code, count = PLAIN[name] if name in PLAIN else BLOCKS[name][:2]
+        if len(given) != count:
+            raise ValueError(f"{name} takes {count} value{'s' if count > 1 else ''}, not {len(given)}")
+        memory = 2 if name in BLOCKS else 0
+        if name in ("mean", "late"):
+            last = given[1]
+            whole = last.value if isinstance(last, ast.Constant) else None
+            if not isinstance(whole, int) or not 1 <= whole <= LONGEST:
+                raise ValueError(f"{name}: expected a whole number of samples from 1 to {LONGEST}, not {ast.unparse(last)}")
+            memory = whole + 2
+        used = [self.result(each) for each in given]
+        return self.operation(code, *used, *([0] * (3 - len(used))), memory=memory)
+
+
+@compilable
+def run(program: Program, registers: np.ndarray, memory: np.ndarray, period: float) -> float:
+    """The formula's value at this tick. registers: the program's, with the inputs' values written into its first places;
+    memory: what its blocks remember. Both are changed."""
+    count = len(program.operations)
+    first = len(registers) - count
+    value = 0.0
+    for number in range(count):
+        code = program.operations[number, 0]
+        one = registers[program.operations[number, 1]]
+        two = registers[program.operations[number, 2]]
+        three = registers[program.operations[number, 3]]
+        at = program.operations[number, 4]
+        if code == ADD:
+            value = one + two
+        elif code == SUBTRACT:
+            value = one - two
+        elif code == MULTIPLY:
+            value = one * two
+        elif code == DIVIDE:
+            value = one / two if two != 0.0 else 0.0
+        elif code == NEGATE:
+            value = -one
+        elif code == ABSOLUTE:
+            value = abs(one)
+        elif code == SIGN:
+            value = 0.0 if one == 0.0 else math.copysign(1.0, one)
+        elif code == SINE:
+            value = math.sin(one)
+        elif code == COSINE:
+            value = math.cos(one)
+        elif code == ROOT:
+            value = math.sqrt(max(one, 0.0))
+        elif code == SMALLER:
+            value = min(one, two)
+        elif code == LARGER:
+            value = max(one, two)
+        elif code == CLIP:
+            value = min(max(one, two), three)
+        elif code == DERIVATIVE:
+            value = 0.0 if math.isnan(memory[at]) else (one - memory[at]) / period
+            memory[at] = one
+        elif code == INTEGRAL:
+            before = 0.0 if math.isnan(memory[at]) else memory[at]
+            value = before + one * period
+            memory[at] = value
+        elif code == LOW_PASS:
+            before = one if math.isnan(memory[at]) else memory[at]
+            value = before + period / (two + period) * (one - before)
+            memory[at] = value
+        else:
+            value = _remembered(code, one, int(two), memory, at)
+        registers[first + number] = value
+    return value
+
+
+@compilable
+def _remembered(code: int, sample: float, length: int, memory: np.ndarray, at: int) -> float:
+    """The mean of the last `length` samples, or the one that many ago. memory: where the ring stands, then the ring."""
+    size = length + 1
+    if math.isnan(memory[at]):
+        memory[at] = 0.0
+        memory[at + 1 : at + 1 + size] = sample
+    place = int(memory[at])
+    memory[at + 1 + place] = sample
+    memory[at] = (place + 1) % size
+    if code == LATE:
+        return memory[at + 1 + (place - length) % size]
+    total = 0.0
+    for back in range(length):
+        total += memory[at + 1 + (place - back) % size]
+    return total / length

@@ -1,0 +1,77 @@
+"""What each effect changed as they were found one after another, and what is left in the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigtwin.configuration import Configuration
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import Estimate, Place, Step
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.freeform import Disturbed
+from rigtwin.diagnosis.place import placed
+from rigtwin.machine.replaying import Setup
+from rigtwin.noise import rms
+from rigtwin.recording import Recording
+
+OUTSTANDING = 1.3
+"""Times its noise from which a signal has something left."""
+
+
+def steps(
+    evidence: Evidence, chain: Sequence[Fit], held_out: Sequence[Recording], setups: Sequence[Configuration | Setup]
+) -> tuple[Step, ...]:
+    """The signals' rms left by each fit of a chain, the nominal plant first: on held-out data if there are any."""
+    judged = Evidence(evidence.machine, held_out, setups) if held_out else evidence
+    found = [Step("nominal", {}, _left(judged, evidence.plant))]
+    before: set[str] = set()
+    for fit in chain:
+        names = {effect.name for effect in fit.effects}
+        added = " + ".join(effect.name for effect in fit.effects if effect.name not in before)
+        gone = " without ".join(["", *sorted(before - names)])
+        values: dict[str, Estimate] = {}
+        for effect, numbers in zip(fit.effects, fit.values, strict=True):
+            if effect.name in before:
+                continue
+            nominal = effect.nominal(evidence.plant)
+            for (name, quantity), value in zip(effect.quantities().items(), numbers, strict=True):
+                unit = evidence.machine.unit(effect.group, quantity)
+                values[name] = Estimate(value, value, value, nominal[name], unit)
+        found.append(Step(f"with {added}{gone}", values, _left(judged, fit.plant)))
+        before = names
+    return tuple(found)
+
+
+def _left(evidence: Evidence, plant: Any) -> dict[str, float]:
+    """rms of what each signal has left, over all recordings."""
+    rows: dict[str, float] = {}
+    predicted = evidence.predicted(plant)
+    for number, name in enumerate(evidence.names):
+        parts = [
+            (each.measured[number] - model[number])[each.fade[number] > 0.5]
+            for each, model in zip(evidence.lines, predicted, strict=True)
+        ]
+        rows[name] = rms(np.concatenate(parts))
+    return rows
+
+
+def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) -> list[Place]:
+    """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
+    differences = evidence.differences(plant)
+    levels = _left(evidence, plant)
+    found = []
+    total = sum((levels[name] / float(evidence.lines[0].noise[n])) ** 2 for n, name in enumerate(evidence.names))
+    foremost = disturbed[0]
+    goes_with = f"it goes with {', '.join(foremost.forms)} at {foremost.component}" if foremost.forms else "it has no plain form"
+    for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
+        noise = float(evidence.lines[0].noise[number])
+        if levels[name] < OUTSTANDING * noise:
+            continue
+        own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
+        share = (levels[name] / noise) ** 2 / total
+        words = f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} times its noise; {goes_with}"
+        found.append(placed(evidence, name, share, own, words))
+    return sorted(found, key=lambda place: -place.share)

@@ -1,0 +1,35 @@
+"""The machines that descriptions are shipped for, and those of a user."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.description import load
+from rigtwin.machine.machine import Machine
+
+SHIPPED = Path(str(files("machines")))
+SUSPENSION_RIG = "suspension-rig"
+"""The machine that commands are about unless they are told another."""
+
+
+def shipped() -> dict[str, Path]:
+    """Name → description."""
+    return {path.stem.replace("_", "-"): path for path in sorted(SHIPPED.glob("*.toml"))}
+
+
+@cache
+def _loaded(path: Path) -> Machine:
+    return load(path)
+
+
+def find(name: str) -> Machine:
+    """A machine by its name, or by the path of its description. Raises RigtwinError with what there is."""
+    if name in shipped():
+        return _loaded(shipped()[name])
+    path = Path(name)
+    if path.suffix == ".toml" or path.exists():
+        return load(path)
+    raise RigtwinError(f"unknown machine {name!r}; there are {', '.join(shipped())}, or give the path of a description, F.toml")

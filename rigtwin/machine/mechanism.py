@@ -1,0 +1,146 @@
+"""What a description needs of an MJCF: its named elements, and what moves with a joint."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.machine import Joint
+
+OBJECTS = {
+    "body": mujoco.mjtObj.mjOBJ_BODY,
+    "joint": mujoco.mjtObj.mjOBJ_JOINT,
+    "actuator": mujoco.mjtObj.mjOBJ_ACTUATOR,
+    "sensor": mujoco.mjtObj.mjOBJ_SENSOR,
+    "tendon": mujoco.mjtObj.mjOBJ_TENDON,
+    "contact": mujoco.mjtObj.mjOBJ_PAIR,
+}
+"""Element of an MJCF that can be a component → MuJoCo's name for it."""
+GRID = 181
+"""Positions at which a joint's gravity load is worked out."""
+TURN = float(np.pi)
+"""rad; how far to either side a joint without a range turns."""
+SENSORS = {
+    mujoco.mjtSensor.mjSENS_JOINTPOS: "position",
+    mujoco.mjtSensor.mjSENS_ACTUATORPOS: "position",
+    mujoco.mjtSensor.mjSENS_TENDONPOS: "position",
+    mujoco.mjtSensor.mjSENS_JOINTVEL: "velocity",
+    mujoco.mjtSensor.mjSENS_ACTUATORVEL: "velocity",
+    mujoco.mjtSensor.mjSENS_JOINTACTFRC: "force",
+    mujoco.mjtSensor.mjSENS_ACTUATORFRC: "force",
+    mujoco.mjtSensor.mjSENS_FORCE: "force",
+}
+"""Sensor of an MJCF → what it measures."""
+
+
+class Mechanism:
+    """An MJCF, compiled."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises RigtwinError if it is none."""
+        if not path.is_file():
+            raise RigtwinError(f"model {path} does not exist")
+        try:
+            self.model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            raise RigtwinError(f"model {path}: {str(error).splitlines()[0]}") from None
+
+    def names(self, element: str) -> list[str]:
+        """Names of all elements of a sort."""
+        kind = OBJECTS[element]
+        count = {
+            "body": self.model.nbody,
+            "joint": self.model.njnt,
+            "actuator": self.model.nu,
+            "sensor": self.model.nsensor,
+            "tendon": self.model.ntendon,
+            "contact": self.model.npair,
+        }[element]
+        found = [mujoco.mj_id2name(self.model, kind, number) for number in range(count)]
+        return [name for name in found if name]
+
+    def number(self, element: str, name: str) -> int:
+        return int(mujoco.mj_name2id(self.model, OBJECTS[element], name))
+
+    def joint_name(self, number: int) -> str:
+        return mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_JOINT, number) or ""
+
+    def joint_of(self, element: str, name: str) -> str:
+        """The joint that an element belongs to; empty if it belongs to none alone."""
+        model, number = self.model, self.number(element, name)
+        if element == "joint":
+            return name
+        if element == "body":
+            while number > 0 and model.body_jntnum[number] == 0:
+                number = int(model.body_parentid[number])
+            return self.joint_name(int(model.body_jntadr[number])) if model.body_jntnum[number] == 1 else ""
+        if element == "actuator":
+            through = int(model.actuator_trntype[number])
+            if through in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
+                return self.joint_name(int(model.actuator_trnid[number, 0]))
+            return ""
+        if element == "sensor":
+            kind, what = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
+            if kind == mujoco.mjtObj.mjOBJ_JOINT:
+                return self.joint_name(what)
+            if kind == mujoco.mjtObj.mjOBJ_ACTUATOR:
+                return self.joint_of("actuator", mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or "")
+        return ""
+
+    def measures(self, name: str) -> str:
+        """What a sensor measures: position, velocity or force; empty for anything else."""
+        return SENSORS.get(mujoco.mjtSensor(int(self.model.sensor_type[self.number("sensor", name)])), "")
+
+    def positions(self, name: str) -> bool:
+        """Whether an actuator takes a position as its command."""
+        return float(self.model.actuator_biasprm[self.number("actuator", name), 1]) != 0.0
+
+    def force_per_command(self, name: str) -> tuple[float, float]:
+        """A force actuator's constant and limit, N or Nm (infinite if there is none)."""
+        number = self.number("actuator", name)
+        gear, gain = float(self.model.actuator_gear[number, 0]), float(self.model.actuator_gainprm[number, 0])
+        limit = np.inf
+        if self.model.actuator_ctrllimited[number]:
+            limit = abs(gear * gain) * float(self.model.actuator_ctrlrange[number, 1])
+        if self.model.actuator_forcelimited[number]:
+            limit = min(limit, abs(gear) * float(self.model.actuator_forcerange[number, 1]))
+        return gear * gain, limit
+
+    def friction(self, joint: str) -> dict[str, float]:
+        """What the MJCF gives a joint of friction and stiffness, by the parameters of a Guide."""
+        number = self.number("joint", joint)
+        at = int(self.model.jnt_dofadr[number])
+        return {
+            "coulomb": float(self.model.dof_frictionloss[at]),
+            "viscous": float(np.ravel(self.model.dof_damping[at])[0]),
+            "stiffness": float(np.ravel(self.model.jnt_stiffness[number])[0]),
+        }
+
+    def joint(self, name: str) -> Joint:
+        """What moves with a joint, all others at rest. Raises RigtwinError if it neither slides nor turns about one axis."""
+        model, number = self.model, self.number("joint", name)
+        kind = int(model.jnt_type[number])
+        if kind not in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE):
+            raise RigtwinError(f"joint {name}: expected one that slides or turns about one axis")
+        turns = kind == mujoco.mjtJoint.mjJNT_HINGE
+        at, place = int(model.jnt_dofadr[number]), int(model.jnt_qposadr[number])
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        full = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, full)
+        low, high = (float(v) for v in model.jnt_range[number])
+        if not model.jnt_limited[number]:
+            low, high = (-TURN, TURN) if turns else (-1.0, 1.0)
+        positions = np.linspace(low, high, GRID)
+        load = np.empty(GRID)
+        for step, position in enumerate(positions):
+            data.qpos[place] = position
+            mujoco.mj_forward(model, data)
+            load[step] = data.qfrc_bias[at]
+        rest = float(model.qpos_spring[place])
+        gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)
+        where = tuple(positions.tolist()) if len(gravity) == GRID else (low, high)
+        return Joint(name, turns, float(full[at, at]), where, gravity, rest)

@@ -1,0 +1,37 @@
+"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a diagnosis, never a finding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
+"""Parameters that change the motion itself, and not only when or how it is sensed."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's unit, or as a share of its
+    value if relative, or in ticks."""
+
+    group: str
+    parameter: str
+    half_width: float
+    relative: bool = False
+    ticks: bool = False
+
+    def width(self, plant: Any, period: float = 1.0) -> float:
+        """Its half width in the parameter's unit, at that plant. period: s, of a tick."""
+        if self.ticks:
+            return self.half_width * period
+        return self.half_width * (abs(float(getattr(getattr(plant, self.group), self.parameter))) if self.relative else 1.0)
+
+    def shifted(self, plant: Any, amount: float) -> Any:
+        """The plant with this parameter higher by that much, in its unit."""
+        group = getattr(plant, self.group)
+        value = float(getattr(group, self.parameter)) + amount
+        return plant._replace(**{self.group: group._replace(**{self.parameter: value})})
+
+    @property
+    def mechanical(self) -> bool:
+        return self.parameter in MECHANICAL
