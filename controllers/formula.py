@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,6 +62,14 @@ class Formula:
         for place, name in enumerate(self.settings, start=len(self.inputs)):
             registers[place] = settings.get(name, self.settings[name])
         return self.program._replace(registers=registers)
+
+    def replayed(self, settings: Mapping[str, float], inputs: Sequence[NDArray[np.float64]], period: float) -> NDArray[np.float64]:
+        """Its value at every tick. inputs: in their order, shape (ticks,) each."""
+        program, ticks = self.with_settings(settings), len(inputs[0])
+        out = np.empty(ticks)
+        table = np.ascontiguousarray(np.stack(inputs, axis=1), np.float64)
+        _replayed(program, program.registers.copy(), self.memory(), table, period, out)
+        return out
 
     def memory(self) -> NDArray[np.float64]:
         """What its blocks remember, before the first sample."""
@@ -216,3 +225,13 @@ def _remembered(code: int, sample: float, length: int, memory: np.ndarray, at: i
     for back in range(length):
         total += memory[at + 1 + (place - back) % size]
     return total / length
+
+
+@numba.njit(nogil=True)
+def _replayed(
+    program: Program, registers: np.ndarray, memory: np.ndarray, inputs: np.ndarray, period: float, out: np.ndarray
+) -> None:
+    for tick in range(len(out)):
+        for number in range(inputs.shape[1]):
+            registers[number] = inputs[tick, number]
+        out[tick] = run(program, registers, memory, period)

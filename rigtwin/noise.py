@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import welch
 
@@ -19,6 +20,8 @@ STANDS_OUT = 1.5
 """A residual's spectrum this many times the noise's is motion, not noise."""
 PADDING = 1000
 """Samples by which a signal is continued at both ends before it is filtered."""
+REST, STILL = 0.1, 6.0
+"""s without motion, and the errors of a motion within which it is none."""
 HIGHEST_MOTION = 200.0
 """Hz; no plate or carriage of such a rig moves measurably above."""
 
@@ -127,7 +130,8 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
 
 
 def smoothed(signal: Array, period: float) -> tuple[Array, float]:
-    """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left."""
+    """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left.
+    Where it stays within that error it is taken to rest."""
     noise = white_noise(signal)
     count = len(signal)
     line = signal[0] + (signal[-1] - signal[0]) * np.arange(count) / max(count - 1, 1)
@@ -137,8 +141,19 @@ def smoothed(signal: Array, period: float) -> tuple[Array, float]:
     frequencies, density = spectrum(extended, period)
     gain = wiener_gain(frequencies, density, 2 * noise**2 * period)
     grid = np.fft.rfftfreq(len(extended), period)
-    kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[:count]
-    return line + kept, noise * math.sqrt(float(np.mean(gain)))
+    kept = line + np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[:count]
+    error = noise * math.sqrt(float(np.mean(gain)))
+    return _rested(kept, error, max(3, round(REST / period))), error
+
+
+def _rested(motion: Array, error: float, window: int) -> Array:
+    """The motion with stretches in which it stays within its error straightened."""
+    span = maximum_filter1d(motion, window) - minimum_filter1d(motion, window)
+    still = np.diff(np.concatenate([[0], (span < STILL * error).astype(np.int8), [0]]))
+    found = motion.copy()
+    for start, end in zip(np.nonzero(still == 1)[0], np.nonzero(still == -1)[0], strict=True):
+        found[start:end] = np.linspace(motion[start], motion[end - 1], end - start)
+    return found
 
 
 def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:

@@ -173,17 +173,19 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
             least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
-        chain = sorted(tried, key=_priced)[:1]
+        chain = sorted(_plain(tried, least), key=_priced)[:1]
         if chain and len(chain[0].effects) > 1:
             chain.insert(0, first)
         while chain and 1 < len(chain[-1].effects) < rules.most:
             more = _extended(chain[-1], search, fitter, effects, least, mapped)
-            least_more = max(SECOND * least, rules.more * _left(chain[-1].misfit, evidence))
+            # What the noise of a measured motion makes of friction at its reversals is no further effect.
+            left = max(chain[-1].misfit - evidence.expected_at(chain[-1].plant), 0.0)
+            least_more = max(SECOND * least, rules.more * left)
             more = [m for m in more if chain[-1].misfit - m.misfit > least_more and not within_tolerance(m, evidence)]
             if not more:
                 break
             tried += more
-            chain.append(more[0])
+            chain.append(min(_plain(more, least), key=_priced, default=more[0]))
         if chain and rules.most > KNOWN.most:
             # What may stand in each effect's place, now that the others are known.
             known = {frozenset(fit.effects) for fit in tried}
@@ -191,6 +193,7 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             others = sorted(mapped(lambda pair: search.refined(*pair), alike), key=_priced)
             near = [fit for fit in others[:REFITTED] if fit.misfit < chain[-1].misfit + NEAR * _left(nothing.misfit, evidence)]
             tried += mapped(fitter.settled, near)
+    tried = _plain(tried, least)
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
     return _judged(nothing, tried, evidence, silent, rules, chain)
 
@@ -231,21 +234,39 @@ def detectable(evidence: Evidence) -> float:
     return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
+CONTAINED = {"two_lags": "lag"}
+"""Kind → the simpler one that it becomes at the end of its range."""
+
+
+def _plain(tried: Sequence[Fit], least: float) -> list[Fit]:
+    """The fits less those in which a simpler effect would do as well."""
+    misfits = {frozenset((e.kind.name, e.group) for e in fit.effects): fit.misfit for fit in tried}
+    found = []
+    for fit in tried:
+        names = {(e.kind.name, e.group) for e in fit.effects}
+        simpler = [
+            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)}) for kind, group in names if kind in CONTAINED
+        ]
+        if not any(other in misfits and misfits[other] - fit.misfit < least for other in simpler):
+            found.append(fit)
+    return found
+
+
 def _judged(
     nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...], rules: Rules, chain: Sequence[Fit]
 ) -> Attribution:
-    expected = evidence.expected
-    gap = max(nothing.misfit - expected, 0.0)
+    gap = max(nothing.misfit - evidence.expected, 0.0)
     pool = sorted([*tried, nothing], key=_priced)
     best = pool[0]
-    temper = TEMPER + FORM_TEMPER * _left(best.misfit, evidence)
+    expected = evidence.expected_at(best.plant)
+    temper = TEMPER + FORM_TEMPER * max(best.misfit - expected, 0.0)
     weights = np.array([math.exp(-min((_priced(fit) - _priced(best)) / (2.0 * temper), 700.0)) for fit in pool])
     weights /= weights.sum()
     ranking = tuple(Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
     found = nothing.misfit - _priced(best) > detectable(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
-    left = _left(best.misfit, evidence) / expected
+    left = max(best.misfit - expected, 0.0) / expected
     explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
     more = left > UNEXPLAINED
     named = ranking[0] if found and not (more and (explained < rules.enough or left > rules.too_much)) else None

@@ -48,6 +48,8 @@ COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
 SMOOTHED = 8
 """Lines to either side over which a signal's spectrum is averaged."""
+WIDELY = 32
+"""The same for noise, of which one draw is taken."""
 
 
 @dataclass(frozen=True)
@@ -67,29 +69,29 @@ class Lines:
     length: int
 
 
-def lines(machine: Machine, recording: Recording, model: Predictor, mains: float, counted: Array) -> Lines:
-    """The lines of a recording's signals, and their weights. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
+def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, counted: Array) -> Lines:
+    """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
     frequency = rfftfreq(length, recording.period)
     kept = frequency <= min(HIGHEST, 0.4 / recording.period)
     width = max(MAINS_WIDTH, 2.0 / (ticks * recording.period))
-    off_mains = np.abs(frequency[kept] - mains) > width
+    off_mains = np.abs(frequency[kept] - plant.mains.frequency) > width
     noise = np.array([white_noise(row) for row in measured])
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     fade = np.stack([_fade(ticks, recording.period) * counted * ~cut_off(row) for row in measured])
-    around = model.noise(floor)
-    if around is not None:
-        floor = np.maximum(np.std(around, axis=1), 1e-300)
+    if (carried := model.carried_noise(plant)) is not None:
+        # A controller's command has no noise but its sensors'.
+        floor[[row.kind == "command" for row in machine.rows]] = 0.0
     weight, spread = np.empty((rows, int(kept.sum()))), np.empty((rows, int(kept.sum())))
     for row in range(rows):
         swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
-        if around is not None:
-            spread[row] = 0.5 * _smoothed(np.abs(rfft(fade[row] * around[row], length)[kept]) ** 2)
+        if carried is not None:
+            spread[row] += 0.5 * _smoothed(np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY)
         if machine.rough:
             # A rough model does not know how what it lacks is spread over the lines.
             variance = spread[row] + 0.5 * machine.form**2 * float(np.mean(power)) + 1e-300
@@ -98,6 +100,9 @@ def lines(machine: Machine, recording: Recording, model: Predictor, mains: float
             # What a signal's swing is held to says nothing of its mean.
             variance[0] = spread[row, 0] + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
+    if carried is not None:
+        floor = np.sqrt(floor**2 + np.var(carried, axis=1))
+    floor = np.maximum(floor, 1e-300)
     return Lines(frequency[kept], weight, spread, fade, measured, floor, resolution, length)
 
 
@@ -114,9 +119,9 @@ def cut_off(row: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _smoothed(power: Array) -> Array:
-    """Averaged over neighbouring lines."""
-    return np.convolve(power, np.ones(2 * SMOOTHED + 1) / (2 * SMOOTHED + 1), mode="same")
+def _smoothed(power: Array, lines: int = SMOOTHED) -> Array:
+    """Averaged over neighbouring lines to either side."""
+    return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
 
 
 def _fade(ticks: int, period: float) -> Array:
@@ -171,7 +176,7 @@ class Evidence:
         self.plant: Any = self.configurations[0].plant
         self.plants = [predictor(machine, r, c, steps) for r, c in zip(recordings, configurations, strict=True)]
         self.lines = [
-            lines(machine, recording, model, c.plant.mains.frequency, part)
+            lines(machine, recording, model, c.plant, part)
             for recording, model, c, part in zip(recordings, self.plants, configurations, counted, strict=True)
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
@@ -181,6 +186,20 @@ class Evidence:
         self._loosen()
         self._round()
         self.expected = sum(float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines)
+        if machine.rough:
+            # What such a model is not held to is no gap either.
+            self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
+        self._counted = counted
+
+    def expected_at(self, plant: Any) -> float:
+        """The same about another plant, where the noise of what drives the model may do more."""
+        if not self.machine.rough:
+            return self.expected
+        more = 0.0
+        for recording, model, each, part in zip(self.recordings, self.plants, self.lines, self._counted, strict=True):
+            there = lines(self.machine, recording, model, plant, part)
+            more += float(np.sum(2.0 * np.maximum(there.spread - each.spread, 0.0) * each.weight**2))
+        return self.expected + more
 
     def coarser(self) -> Evidence:
         """The same with half as many integration steps: for a search, not for its result."""

@@ -123,7 +123,7 @@ class Step:
 class Diagnosis:
     """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know;
     steps: what each effect changed as they were found one after another, the nominal machine first; units: of their signals;
-    leftovers: where what is still left lies."""
+    leftovers: where what is still left lies; traces: effects that close a little more of the gap, too small to be claimed."""
 
     verdict: Verdict
     sentence: str
@@ -141,6 +141,7 @@ class Diagnosis:
     steps: tuple[Step, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
     leftovers: tuple[Place, ...] = ()
+    traces: tuple[Finding, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -151,17 +152,8 @@ class Diagnosis:
             "verdict": self.verdict,
             "machine": self.machine,
             "sentence": self.sentence,
-            "effects": [
-                {
-                    "component": effect.name.component,
-                    "kind": effect.name.kind,
-                    "parameters": {name: asdict(value) for name, value in effect.parameters.items()},
-                    "confidence": effect.confidence,
-                    "class": [asdict(name) for name in effect.alternatives],
-                    "share": effect.share,
-                }
-                for effect in self.effects
-            ],
+            "effects": [_finding(effect) for effect in self.effects],
+            "traces": [_finding(effect) for effect in self.traces],
             "where": [asdict(place) for place in self.where],
             "gap": gap,
             "ranking": [{"explanation": name, "probability": probability} for name, probability in self.ranking],
@@ -175,3 +167,14 @@ class Diagnosis:
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }
+
+
+def _finding(effect: Finding) -> dict[str, Any]:
+    return {
+        "component": effect.name.component,
+        "kind": effect.name.kind,
+        "parameters": {name: asdict(value) for name, value in effect.parameters.items()},
+        "confidence": effect.confidence,
+        "class": [asdict(name) for name in effect.alternatives],
+        "share": effect.share,
+    }

@@ -33,7 +33,7 @@ LOOKALIKES, RESEMBLES = 3, 0.6
 """Effects that are tried in another's place at most, if they can explain this share of what it does."""
 LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
-THROUGH_FRICTION = ("stribeck", "backlash", "compliance")
+THROUGH_FRICTION = ("stribeck", "asymmetry", "backlash", "compliance")
 """Kinds of a guide that change its dry friction."""
 NOTHING = 1e-3
 """χ² below which an effect does nothing at all."""

@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from controllers.formula import Program, run
-from rigtwin.arrays import Array
-from rigtwin.compiling import kernel
 from rigtwin.diagnosis.controller import EXACT, LATE, Deviation
 from rigtwin.diagnosis.residual import rounding
 from rigtwin.machine.machine import Machine
@@ -21,15 +18,6 @@ CLOSER = 0.3
 """Share of the description's misfit that another value must leave at most to be the explanation."""
 
 
-@kernel
-def _replayed(program: Program, memory: Array, inputs: Array, period: float, out: Array) -> None:
-    registers = program.registers.copy()
-    for tick in range(len(out)):
-        for number in range(inputs.shape[1]):
-            registers[number] = inputs[tick, number]
-        out[tick] = run(program, registers, memory, period)
-
-
 class FormulaReplay:
     """The commands that a formula gives for what was measured, beside those recorded."""
 
@@ -38,7 +26,7 @@ class FormulaReplay:
         self._control, self._settings, self._period = machine.control, dict(setup.settings), recording.period
         self._recorded = recording.column("/command", machine.control.output)
         columns = [recording.column(*machine.control.inputs[name]) for name in machine.control.formula.inputs]
-        self._inputs = np.ascontiguousarray(np.column_stack([np.zeros(recording.ticks), *columns])[:, 1:])
+        self._inputs = columns
         exact = machine.control.exact
         self._exact = EXACT * rounding(self._recorded) if exact is None else exact
 
@@ -46,9 +34,8 @@ class FormulaReplay:
         """rms of what the commands differ by, in units of what counts as exact."""
         inputs = self._inputs
         if late:
-            inputs = np.concatenate([np.repeat(inputs[:1], late, axis=0), inputs[:-late]])
-        formula, out = self._control.formula, np.empty(len(self._recorded))
-        _replayed(formula.with_settings(settings), formula.memory(), inputs, self._period, out)
+            inputs = [np.concatenate([np.full(late, column[0]), column[:-late]]) for column in inputs]
+        out = self._control.formula.replayed(settings, inputs, self._period)
         return rms((out - self._recorded)[SETTLED:]) / self._exact
 
     def deviation(self) -> Deviation | None:

@@ -45,8 +45,8 @@ def scales(motion: Motion, force: float, period: float) -> Scales:
     return Scales(stroke, speed, fastest, acceleration, max(force, own, tiny), period)
 
 
-SLOW = 0.35
-"""Share of the highest speed below which Stribeck friction must fade."""
+SLOWEST, SLOW = 0.01, 0.35
+"""Shares of the highest speed between which Stribeck friction must fade."""
 WAVES = 1.5
 """Waves along the stroke that cogging has at least."""
 Searched = Callable[[Effect, Any, Scales, Swing], Trials]
@@ -81,7 +81,7 @@ def _stribeck(_effect: Effect, _plant: Any, scale: Scales, _swing: Swing) -> Tri
     amplitudes = [share * scale.force for share in (-0.3, 0.1, 0.4)]
     speeds = [share * scale.fastest for share in (0.02, 0.06, 0.2)]
     # What does not fade well below the highest speed cannot be told from Coulomb and viscous friction.
-    bounds = ((-1e7, 1e7), (1e-3 * scale.fastest, SLOW * scale.fastest))
+    bounds = ((-1e7, 1e7), (SLOWEST * scale.fastest, SLOW * scale.fastest))
     return Trials(tuple(product(amplitudes, speeds)), (0.005 * scale.force, 0.005 * scale.fastest), bounds=bounds)
 
 

@@ -25,6 +25,29 @@ GROWS = 5.0
 """Times the power of the first third that the last third has if a difference grows."""
 LEAST = 0.1
 """Share of a difference's power that a region must hold."""
+MOST = 0.8
+"""Share of a difference's power that lies within a distance after reversals."""
+CLEARER = 1.1
+"""How much clearer such a distance must be than a low speed."""
+TURNED = 0.01
+"""Share of the whole motion by which it must go back to have reversed."""
+
+
+def travelled(position: Array) -> Array:
+    """Distance since the last reversal, m, shape (ticks,)."""
+    least = TURNED * float(np.ptp(position))
+    found = np.empty(len(position))
+    base = extreme = float(position[0])
+    turn, rising = 0, True
+    for tick, here in enumerate(position.tolist()):
+        if (here >= extreme) if rising else (here <= extreme):
+            extreme, turn = here, tick
+        elif abs(here - extreme) > least:
+            base, rising = extreme, not rising
+            found[turn:tick] = np.abs(position[turn:tick] - base)
+            extreme, turn = here, tick
+        found[tick] = abs(here - base)
+    return found
 
 
 def region(difference: Array, motion: Motion, period: float) -> str:
@@ -52,12 +75,15 @@ def region(difference: Array, motion: Motion, period: float) -> str:
         stretch = np.zeros(len(power), bool)
         stretch[start:end] = True
         regions[f"{start * period:.1f} to {end * period:.1f} s"] = stretch
+    after = travelled(motion.position)
+    near = np.sort(after)[np.searchsorted(np.cumsum(power[np.argsort(after)]), MOST * total).clip(0, len(power) - 1)]
+    regions[f"within {1e3 * near:.2g} mm after a reversal"] = after <= near
     best, name = 0.0, "throughout"
     for label, inside in regions.items():
         share = float(np.sum(power[inside])) / total
         concentration = share / max(float(np.mean(inside)), 1e-9)
         # A stretch of time is no explanation where a signal's own swing is.
-        threshold = CONCENTRATED * (1.6 if label.endswith(" s") else 1.0)
+        threshold = CONCENTRATED * (1.6 if label.endswith(" s") else CLEARER if label.startswith("within") else 1.0)
         if share > LEAST and concentration > threshold and concentration / threshold > best:
             best, name = concentration / threshold, label
     return name

@@ -25,6 +25,8 @@ SEED = 20
 """Of the bootstrap's draws."""
 WORSE = 1.05
 """Times the gap without it from which a correction is rejected."""
+BETTER = 0.995
+"""The same for a rough model."""
 TAPER = 0.1
 """s, over which a part of a recording begins and ends to count."""
 
@@ -115,6 +117,8 @@ def _refitted(evidence: Evidence, fit: Fit) -> Fit:
 
 def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration | Setup]) -> Judged:
     """Judges a fit on held-out recordings; without any, on each half of the recordings after a fit to the other half."""
+    # Where much is left, an effect must help to stay.
+    worse = BETTER if evidence.machine.rough else WORSE
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if held_out:
         other = Evidence(evidence.machine, held_out, configurations)
@@ -129,7 +133,7 @@ def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configur
         def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
             return outside(with_effects(evidence.plant, fit, kept))
 
-        kept, rejected = gated(fit.effects, kept_outside)
+        kept, rejected = gated(fit.effects, kept_outside, worse)
         return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data)
     parts = halves(evidence.recordings)
     fits = [_refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts]
@@ -145,7 +149,7 @@ def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configur
         ]
         return found[0].joined(found[1])
 
-    kept, rejected = gated(fit.effects, across)
+    kept, rejected = gated(fit.effects, across, worse)
     return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, "each half, fitted to the other")
 
 
@@ -155,13 +159,14 @@ def with_effects(plant: Any, fit: Fit, kept: Sequence[Effect]) -> Any:
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
-def gated(effects: Effects, across: Callable[[Effects], Blocks]) -> tuple[Effects, Effects]:
-    """(kept, rejected) effects: none stays that makes held-out data worse. across: what is left with some of the effects."""
+def gated(effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE) -> tuple[Effects, Effects]:
+    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
+    of the effects."""
     kept = effects
     for effect in effects:
         without = tuple(other for other in kept if other != effect)
         if not len((left := across(kept)).after):
             break
-        if float(left.after.mean()) > WORSE * float(across(without).after.mean()):
+        if float(left.after.mean()) > worse * float(across(without).after.mean()):
             kept = without
     return kept, tuple(effect for effect in effects if effect not in kept)

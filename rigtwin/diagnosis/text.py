@@ -29,6 +29,9 @@ def described(diagnosis: Diagnosis) -> str:
             lines.append(f"    {name} = {number(estimate)}")
         if len(effect.alternatives) > 1:
             lines.append(f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}")
+    for effect in diagnosis.traces:
+        values = ", ".join(f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items())
+        lines.append(f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} % of the gap: too little to be claimed")
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
         for step in diagnosis.steps:
@@ -76,7 +79,8 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
         title = f"setting {name}" if effect.name.kind == "setting" else effect.title
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
-        parts.append(f"the {owner} has a {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
+        article = "an" if title[0] in "aeiou" else "a"
+        parts.append(f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
     closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
     moves = any(effect.name.kind not in UNMOVING for effect in effects)
     shown = closes if gap.before > 1.05 and moves else ""

@@ -85,7 +85,8 @@ def slid(apart: float, half: float, spring: float, forward: float, backward: flo
 @compilable
 def damping(guide: Guide, velocity: float) -> float:
     """Viscous friction's coefficient in the direction of a velocity, Ns/m."""
-    return guide.viscous + math.copysign(0.5 * guide.viscous_asymmetry, velocity)
+    more = 0.5 * guide.viscous_asymmetry
+    return guide.viscous + (more if velocity > 0.0 else -more)
 
 
 @compilable

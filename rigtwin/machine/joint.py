@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from controllers.formula import formula, run
+from controllers.formula import formula
 from rigtwin.actuator import actuator, holding
 from rigtwin.arrays import Array
 from rigtwin.converters import fresh, seen, transducer
@@ -22,8 +22,8 @@ from rigtwin.recording import Recording
 
 KEPT = 24
 """Motions that are kept."""
-ELASTIC = 4.0
-"""Times a measured motion's error over which friction that reverses builds up: what is less cannot be told from noise."""
+ELASTIC = 0.3
+"""Times a measured motion's error over which friction that reverses builds up at least."""
 SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
 SEED = 7
@@ -256,49 +256,28 @@ class JointReplay:
         moved = self.moved(plant)
         return Motion(moved[0], moved[1], moved[2])
 
-    def noise(self, levels: Array) -> Array | None:
-        """White noise of each signal, and what the noise of what drives the replay adds to it."""
+    def carried_noise(self, plant: Any) -> Array | None:
+        """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
-        white = levels[:, None] * random.standard_normal((len(levels), ticks))
-        plant = self._machine.plant
         if self._motion is not None and self._error > 0.0:
-            slow, _ = smoothed(self._motion + white_noise(self._raw) * random.standard_normal(ticks), self._period)
-            shift = slow - self._motion
-            return white + self._rows(self.moved(plant, shift=shift)) - self._rows(self.moved(plant))
-        return self._commanded_noise(white) if self._replay.closed else None
-
-    @property
-    def _raw(self) -> Array:
-        assert self._mover.channel is not None
-        return self._recording.column(*self._mover.channel)
-
-    def _commanded_noise(self, white: Array) -> Array:
-        """The noise of a controller's command is what it makes of its sensors' noise."""
+            assert self._mover.channel is not None
+            level = white_noise(self._recording.column(*self._mover.channel))
+            again, _ = smoothed(self._motion + level * random.standard_normal(ticks), self._period)
+            return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(self.moved(plant))
+        if not self._replay.closed or not self._sensors:
+            return None
         control = self._machine.control
         assert control is not None
-        random = np.random.default_rng(SEED + 1)
         sensed = [self._machine.components[name].channel for name in self._sensors]
-        own = {channel: white_noise(self._recording.column(*channel)) for channel in sensed if channel is not None}
-        noises = {channel: level * random.standard_normal(white.shape[1]) for channel, level in own.items()}
-        program = control.formula.with_settings(self._settings)
-        found = white.copy()
-        for number, row in enumerate(self.rows):
-            if row.kind != "command":
-                continue
-            runs = []
-            for share in (0.0, 1.0):
-                registers, memory, out = program.registers.copy(), control.formula.memory(), np.empty(white.shape[1])
-                columns = []
-                for name in control.formula.inputs:
-                    channel = control.inputs[name]
-                    column = self._recording.column(*channel)
-                    columns.append(column + share * noises[channel] if channel in noises else column)
-                for tick in range(white.shape[1]):
-                    registers[: len(columns)] = [column[tick] for column in columns]
-                    out[tick] = run(program, registers, memory, self._period)
-                runs.append(out)
-            found[number] = runs[1] - runs[0]
+        noisy, quiet = [], []
+        for name in control.formula.inputs:
+            channel = control.inputs[name]
+            column = self._recording.column(*channel)
+            quiet.append(column)
+            noisy.append(column + white_noise(column) * random.standard_normal(ticks) if channel in sensed else column)
+        settings = self._settings
+        difference = control.formula.replayed(settings, noisy, self._period) - control.formula.replayed(settings, quiet, self._period)
+        found = np.zeros((len(self.rows), ticks))
+        found[[row.kind == "command" for row in self.rows]] = difference
         return found
-
-

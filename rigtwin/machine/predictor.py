@@ -58,9 +58,9 @@ class Predictor(Protocol):
         """What a component goes through."""
         ...
 
-    def noise(self, levels: Array) -> Array | None:
-        """What white noise of these levels, shape (rows,), makes of every signal once it has gone round, shape (rows, ticks);
-        None if it stays white."""
+    def carried_noise(self, plant: Any) -> Array | None:
+        """What the noise of the signals that drive the model makes of the observed ones, shape (rows, ticks); None if they
+        are known exactly."""
         ...
 
     def coarser(self) -> Predictor:

@@ -322,8 +322,8 @@ class Reduced:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
-    def noise(self, levels: Array) -> None:
-        """Sensors' noise reaches the plant only through recorded commands, which are known: it stays white."""
+    def carried_noise(self, plant: Plant) -> None:  # noqa: ARG002
+        """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
 
     def sensed(self, plant: Plant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""

@@ -89,19 +89,13 @@ class Several:
     def motion(self, component: str, plant: Any) -> Motion:
         return self._replays[self._of(component)].motion(component, plant)
 
-    def noise(self, levels: Array) -> Array | None:
-        parts, start = [], 0
-        for each in self._replays:
-            own = levels[start : start + len(each.rows)]
-            start += len(each.rows)
-            parts.append((own, each.noise(own)))
-        if all(noise is None for _, noise in parts):
+    def carried_noise(self, plant: Any) -> Array | None:
+        parts = [each.carried_noise(plant) for each in self._replays]
+        if all(part is None for part in parts):
             return None
-        ticks = next(noise.shape[1] for _, noise in parts if noise is not None)
-        random = np.random.default_rng(0)
-        return np.concatenate(
-            [own[:, None] * random.standard_normal((len(own), ticks)) if noise is None else noise for own, noise in parts]
-        )
+        ticks = next(part.shape[1] for part in parts if part is not None)
+        rows = [len(each.rows) for each in self._replays]
+        return np.concatenate([np.zeros((n, ticks)) if part is None else part for n, part in zip(rows, parts, strict=True)])
 
     def coarser(self) -> Several:
         return Several([each.coarser() for each in self._replays])
