@@ -22,6 +22,7 @@ from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.effects import applied
 from rigtwin.loop import BLOCK, run_compiled
+from rigtwin.machine.library import find
 from rigtwin.plant import Simulation
 from rigtwin.runner import record
 from rigtwin.twin import Twin
@@ -97,7 +98,7 @@ def _diagnosed(seconds: float) -> Callable[[], object]:
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
     recording = tried("imposed", applied(configuration, ["coulomb@motor=20"]), imposed.demands(configuration, 0))
-    return lambda: diagnose([recording], Configuration())
+    return lambda: diagnose(find("suspension-rig"), [recording], Configuration())
 
 
 def _twenty_runs() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from controllers import Commands, Measurements
@@ -17,6 +18,8 @@ class Channel:
     meaning: str
 
 
+MACHINE = "suspension-rig"
+"""The machine of the channel table."""
 CHANNELS = (
     Channel("/command", "ground", "m", "ground cylinder position demanded"),
     Channel("/command", "structure", "m", "structure cylinder position demanded"),
@@ -31,6 +34,15 @@ CHANNELS = (
     Channel("/truth", "suspension", "m", "suspension travel in the twin"),
     Channel("/truth", "load_cell", "N", "force in the load cell, without noise"),
 )
+
+
+def channels_of(machine: str, columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
+    """The channels that a recording of a machine holds: those of the table, with unit and meaning, if it is of the machine that
+    the table is about; else whatever there is."""
+    there = [(topic, name) for topic, names in columns.items() for name in names]
+    if machine == MACHINE:
+        return [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
+    return [Channel(topic, name, "", "") for topic, name in there]
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:

@@ -21,6 +21,8 @@ a first session:
   rigtwin video drop.mcap -o drop.mp4           watch it
   rigtwin compare rig.mcap                      where a recording of the rig and the twin disagree
   rigtwin diagnose rig.mcap --html why.html     why
+
+your own machine: docs/tutorial.md
 """
 
 
@@ -102,6 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("recording", type=Path)
     compare.add_argument("other", type=Path, nargs="?", help="a second recording of the same test")
     compare.add_argument("--json", type=Path, metavar="J.json", help="also write the figures to a file")
+    compare.add_argument("--machine", metavar="F.toml", help="the machine's description (default: the one that the recording names)")
     _effect(compare, "compare with a twin that has an effect, e.g. coulomb@rail=80")
     settings(compare)
 
@@ -124,7 +127,29 @@ def _parser() -> argparse.ArgumentParser:
         "--held-out", nargs="+", type=Path, default=[], metavar="recording", help="of the same rig, to judge on"
     )
     diagnose.add_argument("--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config")
+    diagnose.add_argument(
+        "--machine", metavar="F.toml", help="the machine's description (default: the one that the recording names)"
+    )
     settings(diagnose)
+
+    command("machines", "list the machines that can be diagnosed")
+    machine = command(
+        "machine",
+        "check a machine's description",
+        "rigtwin machine check F.toml explains every mistake in one line each; without any, what will be looked for.",
+    )
+    machine.add_argument("action", choices=["check"])
+    machine.add_argument("description", type=Path, metavar="F.toml")
+
+    importing = command(
+        "import",
+        "make a recording of other programs' data",
+        "A map says which column is which channel, in what unit, and what the time base is; docs/tutorial.md explains it.\n\n"
+        "example:\n  rigtwin import bench.csv --map bench-map.toml -o bench.mcap",
+    )
+    importing.add_argument("data", type=Path, metavar="DATA.{csv,mat,parquet}")
+    importing.add_argument("--map", type=Path, required=True, metavar="MAP.toml")
+    importing.add_argument("--out", "-o", type=Path, required=True, metavar="F.mcap")
 
     blindcheck = command(
         "blindcheck",

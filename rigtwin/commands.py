@@ -8,9 +8,10 @@ from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
-from rigtwin.console import apart, configured, table
+from rigtwin.console import apart, configured, table, writable
 from rigtwin.diagnosis.commands import blindcheck, compare, diagnose
 from rigtwin.errors import RigtwinError
+from rigtwin.machine.commands import machine, machines
 
 
 def list_experiments(parsed: Namespace) -> int:
@@ -88,7 +89,7 @@ def _fresh(stem: str) -> Path:
 def info(parsed: Namespace) -> int:
     import numpy as np
 
-    from rigtwin.channels import CHANNELS
+    from rigtwin.channels import channels_of
     from rigtwin.recording import load
 
     recording = load(parsed.recording)
@@ -100,12 +101,11 @@ def info(parsed: Namespace) -> int:
     for note in recording.notes:
         print(f"note: {note}")
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
-    for channel in CHANNELS:
-        if recording.has(channel.topic, channel.name):
-            values = recording.column(channel.topic, channel.name)
-            with np.errstate(over="ignore"):
-                figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
-            rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
+    for channel in channels_of(recording.machine, recording.columns):
+        values = recording.column(channel.topic, channel.name)
+        with np.errstate(over="ignore"):
+            figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
+        rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
     print(table(rows))
     if recording.controller:
         settings = ", ".join(f"{key} {value}" for key, value in recording.controller.items())
@@ -166,6 +166,16 @@ def reproduce(parsed: Namespace) -> int:
     return 0
 
 
+def import_(parsed: Namespace) -> int:
+    from rigtwin.importing.convert import convert
+
+    apart(parsed.out, parsed.data, parsed.map)
+    writable(parsed.out)
+    for line in convert(parsed.data, parsed.map, parsed.out):
+        print(line)
+    return 0
+
+
 COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "list": list_experiments,
     "run": run,
@@ -174,6 +184,9 @@ COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "plot": plot,
     "video": video,
     "export": export,
+    "import": import_,
+    "machines": machines,
+    "machine": machine,
     "compare": compare,
     "diagnose": diagnose,
     "blindcheck": blindcheck,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +28,16 @@ def apart(out: Path, *inputs: Path) -> Path:
     if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
         raise RigtwinError(f"{out} is the input; name another output")
     return out
+
+
+def writable(out: Path) -> None:
+    """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is done."""
+    if out.is_dir():
+        raise RigtwinError(f"cannot write {out}: it is a folder")
+    if not out.parent.is_dir():
+        raise RigtwinError(f"cannot write {out}: its folder does not exist")
+    if not os.access(out if out.exists() else out.parent, os.W_OK):
+        raise RigtwinError(f"cannot write {out}: permission denied")
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

@@ -13,8 +13,8 @@ from scipy.linalg import expm
 from controllers import Skyhook, Travel
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
-from rigtwin.noise import rms
 from rigtwin.errors import RigtwinError
+from rigtwin.noise import rms
 from rigtwin.recording import Recording
 
 

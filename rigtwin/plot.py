@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rigtwin.arrays import Array
+from rigtwin.channels import MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
@@ -82,6 +83,16 @@ PANELS = (
 """What is drawn, from top to bottom; a panel without data is left out."""
 
 
+def _plainly(recording: Recording) -> tuple[Panel, ...]:
+    """A panel for every channel name of another machine: what was commanded and what was sensed under one name together."""
+    names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
+    labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
+    return tuple(
+        Panel(name, tuple(Trace(label, colour, ((topic, name),), _plain) for topic, (label, colour) in labels.items()))
+        for name in names
+    )
+
+
 def stretch(recording: Recording, start: float, until: float | None) -> slice:
     """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
     end = float(recording.time[-1]) if until is None else until
@@ -99,9 +110,10 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     checked_ending(out)
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
+    panels = PANELS if recording.machine == MACHINE else _plainly(recording)
     there = [
         (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
-        for panel in PANELS
+        for panel in panels
     ]
     there = [(title, traces) for title, traces in there if traces]
     figure = Figure(figsize=(11, 1.9 * len(there) + 0.8), layout="constrained")

@@ -20,6 +20,7 @@ from rigtwin.blindcheck.score import misses, rows, table, wilson
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.effects import candidates
+from rigtwin.machine.library import find as machine_of
 from rigtwin.parameters import Plant
 from rigtwin.recording import load
 
@@ -40,7 +41,7 @@ def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
         path = tmp_path / f"{test}.mcap"
         write(path, law, *run(Truth(), law, demands[:8000], np.random.default_rng(4)))
         recording = load(path)
-        evidence = Evidence([recording], [configuration_of(recording)])
+        evidence = Evidence(machine_of("suspension-rig"), [recording], [configuration_of(recording)])
         residual = evidence.residual(evidence.plant)
         assert 0.85 < float(residual @ residual) / evidence.expected < 1.1
 

@@ -22,14 +22,18 @@ from rigtwin.diagnosis.sampling import outstanding
 from rigtwin.diagnosis.shrink import Blocks, gated, halves, interval, shrinkage
 from rigtwin.effects import find, without
 from rigtwin.errors import RigtwinError
+from rigtwin.machine.library import find as machine_of
+from rigtwin.machine.predictor import Motion
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 from tests.conftest import rig_recording
 from tests.test_fit import evidence_of, recorded
 
+RIG = machine_of("suspension-rig")
+
 
 def answered(*recordings: Recording, base: Configuration | None = None, held_out: tuple[Recording, ...] = ()) -> Outcome:
-    return diagnose(recordings, base or Configuration(), held_out)
+    return diagnose(RIG, recordings, base or Configuration(), held_out)
 
 
 def names(outcome: Outcome) -> set[str]:
@@ -212,7 +216,7 @@ def test_a_controller_as_told_has_no_deviation():
 )
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
-    (found,) = outstanding(evidence.recordings, [list(rows) for rows in evidence.predicted(Plant())], Plant())
+    (found,) = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(Plant())], Plant())
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)
 
@@ -267,11 +271,11 @@ def test_regions_are_told_apart():
     speed = np.sin(2 * np.pi * time)
     force = np.cos(2 * np.pi * 0.7 * time)
     quiet = 1e-3 * np.ones_like(time)
-    assert region(quiet + (np.abs(speed) < 0.1), speed, force, 1e-3) == "velocity reversal"
-    assert region(quiet + speed**9, speed, force, 1e-3) == "high speed"
-    assert region(quiet, speed, force, 1e-3) == "throughout"
-    assert region(time**2, speed, force, 1e-3) == "growing with time"
-    assert region(quiet + ((time > 3.0) & (time < 4.0)), speed, force, 1e-3) == "3.0 to 4.0 s"
+    assert region(quiet + (np.abs(speed) < 0.1), Motion(speed, speed, force), 1e-3) == "velocity reversal"
+    assert region(quiet + speed**9, Motion(speed, speed, force), 1e-3) == "high speed"
+    assert region(quiet, Motion(speed, speed, force), 1e-3) == "throughout"
+    assert region(time**2, Motion(speed, speed, force), 1e-3) == "growing with time"
+    assert region(quiet + ((time > 3.0) & (time < 4.0)), Motion(speed, speed, force), 1e-3) == "3.0 to 4.0 s"
 
 
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
@@ -279,7 +283,7 @@ def test_the_fast_multisine_tells_a_delay_from_a_lag():
     fitter = Fitter(evidence)
     fits = [fitter.single(find("delay@motor")), fitter.single(find("lag@motor"))]
     tests = [(e.name, e.configuration, e.demands) for e in EXPERIMENTS.values() if e.name in ("imposed-fast", "drop")]
-    found = proposed(fits, tests)
+    found = proposed(RIG, fits, tests)
     assert found is not None
     assert found.experiment == "imposed-fast"
     assert found.command.startswith("rigtwin run imposed-fast")

@@ -12,13 +12,15 @@ from rigtwin.diagnosis.attribute import attribute, detectable, library, within_t
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
 from rigtwin.diagnosis.next_test import tried
-from rigtwin.diagnosis.tolerances import TOLERANCES, shifted, tolerance_of
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.effects import KINDS, applied, find
+from rigtwin.machine.library import find as machine_of
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 
+RIG = machine_of("suspension-rig")
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
 """Kinds that are read off the signals."""
 
@@ -33,7 +35,7 @@ def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, see
 
 
 def evidence_of(*recordings: Recording) -> Evidence:
-    return Evidence(recordings, [configuration_of(recording) for recording in recordings])
+    return Evidence(RIG, recordings, [configuration_of(recording) for recording in recordings])
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,7 @@ def nominal() -> Evidence:
 
 
 def test_every_kind_is_searched_for_or_read_off_the_signals():
-    assert set(TRIALS) | DIRECT == {kind.name for kind in KINDS}
+    assert set(TRIALS) | DIRECT | {kind for kind, _ in JOINT_TRIALS} == {kind.name for kind in KINDS}
     assert not set(TRIALS) & DIRECT
 
 
@@ -96,8 +98,8 @@ def test_an_effect_is_found_at_its_size(text):
 def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
     plant = nominal.plant
     space = Space(nominal, plant)
-    small = shifted(plant, plant, [0.8 if t.parameter in ("mass", "constant") else 0.0 for t in TOLERANCES])
-    large = shifted(plant, plant, [8.0 if t.parameter == "mass" else 0.0 for t in TOLERANCES])
+    small = nominal.shifted(plant, [0.8 if t.parameter in ("mass", "constant") else 0.0 for t in RIG.tolerances])
+    large = nominal.shifted(plant, [8.0 if t.parameter == "mass" else 0.0 for t in RIG.tolerances])
     clean = nominal.residual(plant)
 
     def cost(other: Plant) -> float:
@@ -112,7 +114,7 @@ def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
 
 def test_a_deviation_within_tolerance_is_no_finding(nominal):
     effect = find("mass@carriage")
-    tolerance = tolerance_of("carriage", "mass")
+    tolerance = RIG.tolerance_of("carriage", "mass")
     assert tolerance is not None
 
     def fit(value: float) -> Fit:

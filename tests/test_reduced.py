@@ -9,10 +9,12 @@ from experiments import EXPERIMENTS
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.machine.quarter_car import Disturbances, Reduced, motor_friction, sliding
-from rigtwin.diagnosis.trials import TRIALS, swings, trials
+from rigtwin.diagnosis.trial import swings
+from rigtwin.diagnosis.trials import TRIALS, trials
 from rigtwin.effects import Effect, candidates
 from rigtwin.loop import run_compiled
+from rigtwin.machine.library import find as machine_of
+from rigtwin.machine.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 from rigtwin.twin import Twin
@@ -64,7 +66,7 @@ def test_the_nominal_plants_agree_far_below_the_sensors_noise(name):
 
 @pytest.fixture(scope="module")
 def swing():
-    return swings((recorded("imposed", seconds=SECONDS),))
+    return swings(machine_of("suspension-rig"), (recorded("imposed", seconds=SECONDS),))
 
 
 def size_of(effect: Effect, swing) -> tuple[float, ...]:

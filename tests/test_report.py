@@ -14,7 +14,7 @@ import pytest
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.report import bars, html, plots
-from tests.test_diagnose import drifting, spoilt
+from tests.test_diagnose import RIG, drifting, spoilt
 from tests.test_fit import recorded
 
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -38,10 +38,10 @@ page.onload = () => {{
 def outcomes() -> dict[str, Outcome]:
     base = Configuration()
     return {
-        "explained": diagnose([recorded("imposed", ("coulomb@rail=75",))], base),
-        "unknown": diagnose([drifting()], base),
-        "no gap": diagnose([recorded("imposed")], base),
-        "unusable": diagnose([spoilt("unit")], base),
+        "explained": diagnose(RIG, [recorded("imposed", ("coulomb@rail=75",))], base),
+        "unknown": diagnose(RIG, [drifting()], base),
+        "no gap": diagnose(RIG, [recorded("imposed")], base),
+        "unusable": diagnose(RIG, [spoilt("unit")], base),
     }
 
 

@@ -88,6 +88,7 @@ def answer(recordings: Path, answers: Path, number: int) -> dict[str, Any]:
     """One case's answer, worked out or read again if its recording is the same. Runs in a process that knows files alone."""
     from rigtwin.configuration import Configuration
     from rigtwin.diagnosis import diagnose as module
+    from rigtwin.machine.library import SUSPENSION_RIG, find
     from rigtwin.recording import load
 
     path, held_out = recordings / f"{number:03d}.mcap", recordings / f"{number:03d}-held-out.mcap"
@@ -97,7 +98,7 @@ def answer(recordings: Path, answers: Path, number: int) -> dict[str, Any]:
         kept = json.loads(place.read_text())
         if kept.get("digest") == digest:
             return kept
-    outcome = module.diagnose([load(path)], Configuration(), [load(held_out)])
+    outcome = module.diagnose(find(SUSPENSION_RIG), [load(path)], Configuration(), [load(held_out)])
     document = {**outcome.diagnosis.document(), "digest": digest}
     place.write_text(json.dumps(document))
     return document

@@ -11,10 +11,12 @@ from controllers import Measurements
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.noise import white_noise
-from rigtwin.diagnosis.trials import TRIALS, swings, trials
+from rigtwin.diagnosis.trial import swings
+from rigtwin.diagnosis.trials import TRIALS, trials
 from rigtwin.effects import candidates
 from rigtwin.loop import run_compiled
+from rigtwin.machine.library import SUSPENSION_RIG, find
+from rigtwin.noise import white_noise
 from rigtwin.parameters import Plant
 from rigtwin.recording import load
 from rigtwin.twin import Twin
@@ -45,7 +47,7 @@ def black_box(path: Path) -> str:
         return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
 
     best, name = BETTER * misfit(configuration.plant), "none"
-    swing = swings((recording,))
+    swing = swings(find(SUSPENSION_RIG), (recording,))
     for effect in candidates(configuration.plant):
         if effect.kind.name in TRIALS:
             for start in trials(effect, configuration.plant, swing).starts[:8]:

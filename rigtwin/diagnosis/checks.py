@@ -13,8 +13,8 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.noise import rms, smallest_step, white_noise
 from rigtwin.diagnosis.runs import FLAT, longest_run
+from rigtwin.noise import rms, smallest_step, white_noise
 from rigtwin.recording import Recording
 
 MACHINE = "suspension-rig"

@@ -13,8 +13,8 @@ from controllers import Commands, Demand, Measurements, Settings, State, initial
 from controllers.quantity import Quantity, fields
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
-from rigtwin.noise import rms
 from rigtwin.diagnosis.residual import rounding
+from rigtwin.noise import rms
 from rigtwin.recording import Recording
 
 EXACT = 20.0

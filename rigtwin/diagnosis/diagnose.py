@@ -16,7 +16,6 @@ from threadpoolctl import threadpool_limits
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
-from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.evidence import Evidence
@@ -32,8 +31,9 @@ from rigtwin.diagnosis.finding import (
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.freeform import Disturbed, located
+from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.formula_replay import formula_deviation
+from rigtwin.diagnosis.freeform import Disturbed, located
 from rigtwin.diagnosis.leftover import leftovers, steps
 from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
 from rigtwin.diagnosis.next_test import Test, proposed
@@ -79,13 +79,17 @@ def unusable(
     """The answer if some data are not fit to be diagnosed, else None."""
     faults: list[str] = []
     for recording, configuration in zip(recordings, configurations, strict=True):
-        faults += [f"{recording.path}: {fault.message}" for fault in faults_of(machine, recording, configuration) if fault.fatal]
+        faults += [
+            f"{recording.path}: {fault.message}" for fault in faults_of(machine, recording, configuration) if fault.fatal
+        ]
     if not faults:
         return None
     sentence = f"The data cannot be diagnosed: {faults[0]}."
     names = tuple(str(recording.path) for recording in recordings)
     seconds = time.perf_counter() - started
-    return Diagnosis("unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds, machine.name)
+    return Diagnosis(
+        "unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds, machine.name
+    )
 
 
 def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
@@ -148,7 +152,9 @@ def _diagnosed(
     left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
     something = found.unknown or bool(verdict_of_data.rejected) or (left - disturbed[0].misfit) > SOMETHING * found.expected
     deviations = _deviations(evidence)
-    sampled = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant)
+    sampled = outstanding(
+        evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant
+    )
     attributed = _findings(found, verdict_of_data.kept, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
     traces = tuple(each for each in attributed if evidence.machine.rough and each.share < TRACE)
@@ -342,7 +348,9 @@ def _corrected(nominal: Setting, plant: Any, sampled: Sequence[Sampled]) -> Sett
     return nominal._replace(plant=plant)
 
 
-def _next(machine: Machine, found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]) -> NextTest | None:
+def _next(
+    machine: Machine, found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]
+) -> NextTest | None:
     if not tests or found.best is None or not kept:
         return None
     likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]

@@ -148,7 +148,14 @@ def despike(signal: Array, height: float) -> None:
             low, high = min(low, value), max(high, value)
         before[0], before[1], before[2] = before[1], before[2], here
         if high - low > height:
-            middle = np.sort(window)[3]
+            for place in range(1, 7):
+                value = window[place]
+                before_it = place - 1
+                while before_it >= 0 and window[before_it] > value:
+                    window[before_it + 1] = window[before_it]
+                    before_it -= 1
+                window[before_it + 1] = value
+            middle = window[3]
             if abs(here - middle) > height:
                 signal[tick] = middle
 

@@ -98,7 +98,9 @@ def _scale(machine: Machine, recording: Recording, setup: Setup) -> Iterator[Fau
         slope = float(a @ b / (b @ b))
         for factor, unit in UNITS.get(row.unit, ()):
             if alike > ALIKE and abs(slope / factor - 1.0) < CLOSE:
-                yield Fault("unit", where, f"{where} is {slope:.4g} times what is predicted, as if in {unit}; expected {row.unit}")
+                yield Fault(
+                    "unit", where, f"{where} is {slope:.4g} times what is predicted, as if in {unit}; expected {row.unit}"
+                )
 
 
 __all__ = ["channels", "faults_of"]

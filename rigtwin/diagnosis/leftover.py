@@ -65,7 +65,9 @@ def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) ->
     found = []
     total = sum((levels[name] / float(evidence.lines[0].noise[n])) ** 2 for n, name in enumerate(evidence.names))
     foremost = disturbed[0]
-    goes_with = f"it goes with {', '.join(foremost.forms)} at {foremost.component}" if foremost.forms else "it has no plain form"
+    goes_with = (
+        f"it goes with {', '.join(foremost.forms)} at {foremost.component}" if foremost.forms else "it has no plain form"
+    )
     for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
         noise = float(evidence.lines[0].noise[number])
         if levels[name] < OUTSTANDING * noise:

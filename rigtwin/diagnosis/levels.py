@@ -14,9 +14,9 @@ from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
-from rigtwin.noise import rms, spectrum
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 from rigtwin.loop import run_compiled
+from rigtwin.noise import rms, spectrum
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 from rigtwin.twin import Twin

@@ -14,10 +14,10 @@ from rigtwin.configuration import Configuration, Safety
 from rigtwin.converters import seen, unseen
 from rigtwin.diagnosis.checks import check
 from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
-from rigtwin.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
 from rigtwin.errors import RigtwinError
 from rigtwin.loop import run, run_compiled
+from rigtwin.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.recording import Recording
 from rigtwin.replay import Replay
 from rigtwin.twin import Twin

@@ -17,9 +17,9 @@ from rigtwin.arrays import Array
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.finding import Diagnosis
-from rigtwin.noise import spectrum
 from rigtwin.diagnosis.text import number
 from rigtwin.errors import RigtwinError
+from rigtwin.noise import spectrum
 
 BEFORE, AFTER, FLOOR = "#c2410c", "#0f766e", "#94a3b8"
 BINS = 24

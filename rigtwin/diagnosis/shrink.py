@@ -115,7 +115,9 @@ def _refitted(evidence: Evidence, fit: Fit) -> Fit:
     return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
 
 
-def judged(evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration | Setup]) -> Judged:
+def judged(
+    evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration | Setup]
+) -> Judged:
     """Judges a fit on held-out recordings; without any, on each half of the recordings after a fit to the other half."""
     # Where much is left, an effect must help to stay.
     worse = BETTER if evidence.machine.rough else WORSE

@@ -31,7 +31,9 @@ def described(diagnosis: Diagnosis) -> str:
             lines.append(f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}")
     for effect in diagnosis.traces:
         values = ", ".join(f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items())
-        lines.append(f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} % of the gap: too little to be claimed")
+        lines.append(
+            f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} % of the gap: too little to be claimed"
+        )
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
         for step in diagnosis.steps:

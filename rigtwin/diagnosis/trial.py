@@ -13,6 +13,7 @@ from rigtwin.recording import Recording
 SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
 """Of the time; a limit is looked for at the values that a command exceeds for the rest of it."""
 
+
 @dataclass(frozen=True)
 class Swing:
     """How far and fast a command went: the magnitude, in its unit, and the rate, unit/s, that it stays below for these

@@ -134,10 +134,10 @@ def searched(effect: Effect) -> bool:
     return (effect.kind.name, effect.of) in JOINT_TRIALS or (effect.kind.name in TRIALS and effect.of in TYPES)
 
 
-def trials(effect: Effect, plant: Any, swing: dict[str, Swing], scale: Callable[[str], Scales]) -> Trials:
-    """Where to start, and how finely to step. scale: of a component."""
+def trials(effect: Effect, plant: Any, swing: dict[str, Swing], scale: Callable[[str], Scales] | None = None) -> Trials:
+    """Where to start, and how finely to step. scale: of a component, where it is of a described machine."""
     none = Swing((0.0,) * len(SHARES), (0.0,) * len(SHARES))
     own = swing.get(effect.component, none)
-    if (effect.kind.name, effect.of) in JOINT_TRIALS:
+    if scale is not None and (effect.kind.name, effect.of) in JOINT_TRIALS:
         return JOINT_TRIALS[effect.kind.name, effect.of](effect, plant, scale(effect.group), own)
     return TRIALS[effect.kind.name](effect, plant, own)

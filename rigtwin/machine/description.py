@@ -138,13 +138,24 @@ class _Reader:
         self._default_timing(replays)
         names = [*self._components, "computer", "mains"]
         values = [*self._values.values(), parameters.Computer(), parameters.Mains(mains)]
-        made = parameters.Plant if self.quarter_car else namedtuple("Plant", names)  # type: ignore[misc]  # noqa: PYI024
+        made = parameters.Plant if self.quarter_car else namedtuple("Plant", names)  # type: ignore[misc]
         plant: Any = made(*values)
         title = str(about.get("title", name))
         model = self._model_path(about)
         tolerances = tuple(self._tolerances)
         return Machine(
-            name, title, self._path, model, plant, self._components, tolerances, replays, control, nominal == "rough", form, self._sources
+            name,
+            title,
+            self._path,
+            model,
+            plant,
+            self._components,
+            tolerances,
+            replays,
+            control,
+            nominal == "rough",
+            form,
+            self._sources,
         )
 
     # Tables and numbers.
@@ -201,7 +212,9 @@ class _Reader:
             return
         elements = [key for key in ELEMENTS if key in table]
         if len(elements) != 1:
-            self._mistakes.note(where, f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}")
+            self._mistakes.note(
+                where, f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}"
+            )
             return
         element, mjcf = elements[0], str(table[elements[0]])
         if mjcf not in mechanism.names(element):
@@ -220,7 +233,9 @@ class _Reader:
             unit = UNITS[SENSED[kind]][turns]
             channel = ("/sensor", str(table.get("channel", name)))
             if table.get("unit", unit) != unit:
-                self._mistakes.note(where, f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts")
+                self._mistakes.note(
+                    where, f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts"
+                )
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
             if kind in ("position actuator", "cylinder"):
@@ -253,7 +268,7 @@ class _Reader:
         possible = sorted({each.name for each in KINDS if TYPES[kind] in each.at})
         wanted = table["effects"]
         if not isinstance(wanted, list) or not all(isinstance(each, str) for each in wanted):
-            self._mistakes.note(where, "effects: expected a list of kinds, such as [\"gain\", \"offset\"], or [] for none")
+            self._mistakes.note(where, 'effects: expected a list of kinds, such as ["gain", "offset"], or [] for none')
             return None
         for each in wanted:
             if each not in possible:
@@ -313,7 +328,9 @@ class _Reader:
             elif isinstance(width, int | float) and not isinstance(width, bool) and 0.0 < width < math.inf:
                 self._tolerances.append(Tolerance(name, key, float(width)))
             else:
-                self._mistakes.note(here, f"tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as \"1 %\"")
+                self._mistakes.note(
+                    here, f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"'
+                )
         return component
 
     # Controller and replays.
@@ -321,9 +338,7 @@ class _Reader:
     def _control(self) -> Control | None:
         if "controller" not in self._document:
             return None
-        table = self._table(
-            "controller", ("output", "formula", "inputs", "settings", "exact"), required=("output", "formula")
-        )
+        table = self._table("controller", ("output", "formula", "inputs", "settings", "exact"), required=("output", "formula"))
         settings, inputs = table.get("settings", {}), table.get("inputs", {})
         if not isinstance(settings, Mapping) or not all(isinstance(v, int | float) for v in settings.values()):
             self._mistakes.note("[controller] settings", "expected a table of numbers")
@@ -384,7 +399,10 @@ class _Reader:
         movers = [movers] if isinstance(movers, str) else movers
         known = [name for name, kind in self._types.items() if kind in (*MOVING, "position sensor")]
         if not isinstance(movers, list) or not movers:
-            self._mistakes.note(where, f"moved_by is missing; expected an actuator or a position sensor: {', '.join(known) or 'none is described'}")
+            self._mistakes.note(
+                where,
+                f"moved_by is missing; expected an actuator or a position sensor: {', '.join(known) or 'none is described'}",
+            )
             movers = []
         for mover in movers:
             if mover not in known:
@@ -395,7 +413,9 @@ class _Reader:
         quarter_car = self.quarter_car
         joint_name = "" if quarter_car else self._components[movers[0]].joint
         if len(movers) > 1 and not quarter_car:
-            self._mistakes.note(where, f"moved by {len(movers)} components; expected one, and another replay for each other joint")
+            self._mistakes.note(
+                where, f"moved by {len(movers)} components; expected one, and another replay for each other joint"
+            )
             return None
         if not joint_name and not quarter_car:
             self._mistakes.note(where, f"{movers[0]} acts on no joint of its own; expected one that does")
@@ -405,7 +425,10 @@ class _Reader:
         except RigtwinError as error:
             self._mistakes.note(where, str(error))
             return None
-        at = {kind: [n for n, t in self._types.items() if t == kind and self._components[n].joint == joint_name] for kind in ("mass", "guide")}
+        at = {
+            kind: [n for n, t in self._types.items() if t == kind and self._components[n].joint == joint_name]
+            for kind in ("mass", "guide")
+        }
         for kind, names in at.items():
             if len(names) > 1:
                 self._mistakes.note(where, f"joint {joint_name} has {len(names)} components of type {kind}; expected one")
@@ -413,10 +436,14 @@ class _Reader:
             for row in rows:
                 other = self._components.get(row.name)
                 if other is not None and other.joint != joint_name:
-                    self._mistakes.note(where, f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}")
+                    self._mistakes.note(
+                        where, f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}"
+                    )
         closed = control is not None and self._components[movers[0]].channel == ("/command", control.output)
         if self._types[movers[0]] == "force actuator" and not at["mass"]:
-            self._mistakes.note(where, f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass")
+            self._mistakes.note(
+                where, f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass"
+            )
         return ReplayOf(
             str(table.get("name", f"replay {number}")),
             joint,

@@ -68,7 +68,5 @@ def followed(actuator: PositionActuator, command: Array, late: float, period: fl
         second = np.ascontiguousarray(expm(both * h)[:2])
     out = np.empty(count)
     rate = actuator.rate_limit * h if actuator.rate_limit < UNLIMITED else UNLIMITED
-    _followed(
-        wanted, actuator.deadband, actuator.gain, actuator.offset, actuator.saturation, rate, shares, second, out
-    )
+    _followed(wanted, actuator.deadband, actuator.gain, actuator.offset, actuator.saturation, rate, shares, second, out)
     return np.ascontiguousarray(out[::steps])

@@ -60,8 +60,10 @@ def gravity(inertia: Inertia, position: float) -> float:
 @compilable
 def limits(guide: Guide, velocity: float) -> tuple[float, float]:
     """What dry friction can bear against positive and against negative motion, N."""
-    ratio = velocity / guide.stribeck_velocity
-    size = guide.coulomb + guide.stribeck * math.exp(-ratio * ratio)
+    size = guide.coulomb
+    if guide.stribeck != 0.0:
+        ratio = velocity / guide.stribeck_velocity
+        size += guide.stribeck * math.exp(-ratio * ratio)
     return max(size + 0.5 * guide.asymmetry, 0.0), max(size - 0.5 * guide.asymmetry, 0.0)
 
 
@@ -92,8 +94,10 @@ def damping(guide: Guide, velocity: float) -> float:
 @compilable
 def resting(guide: Guide, position: float, rest: float) -> float:
     """The forces that depend on the position alone."""
-    wave = guide.cogging * math.sin(2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase)
-    return guide.stiffness * (position - rest) + guide.offset + wave
+    force = guide.stiffness * (position - rest) + guide.offset
+    if guide.cogging != 0.0:
+        force += guide.cogging * math.sin(2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase)
+    return force
 
 
 @kernel
@@ -107,7 +111,9 @@ def carried(guide: Guide, inertia: Inertia, spring: float, period: float, motion
         dry, by = slid(x - slider, 0.5 * guide.backlash, spring, forward, backward)
         slider += by
         viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest) + dry + viscous + guide.drag * v * abs(v)
+        out[tick] = (
+            inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest) + dry + viscous + guide.drag * v * abs(v)
+        )
 
 
 @kernel

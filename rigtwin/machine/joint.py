@@ -34,7 +34,9 @@ NO_COMMAND = formula("0", {})
 class JointReplay:
     """One replay of one recording."""
 
-    def __init__(self, machine: Machine, replay: ReplayOf, recording: Recording, settings: dict[str, float], steps: int) -> None:
+    def __init__(
+        self, machine: Machine, replay: ReplayOf, recording: Recording, settings: dict[str, float], steps: int
+    ) -> None:
         """settings: of the controller. Raises RigtwinError if a channel is missing."""
         self._machine, self._replay, self._recording, self._steps = machine, replay, recording, steps
         self._settings = settings
@@ -195,7 +197,9 @@ class JointReplay:
         names = [self._machine.components[name].channel for name in self._sensors]
         channels = [control.inputs[name] for name in control.formula.inputs]
         which = np.array([names.index(channel) if channel in names else -1 for channel in channels], np.int64)
-        recorded = np.column_stack([np.zeros(self._recording.ticks), *(self._recording.column(*channel) for channel in channels)])
+        recorded = np.column_stack(
+            [np.zeros(self._recording.ticks), *(self._recording.column(*channel) for channel in channels)]
+        )
         recorded = np.ascontiguousarray(recorded[:, 1:])
         return Loop(True, program, program.registers.copy(), control.formula.memory(), recorded, which)
 
@@ -277,7 +281,9 @@ class JointReplay:
             quiet.append(column)
             noisy.append(column + white_noise(column) * random.standard_normal(ticks) if channel in sensed else column)
         settings = self._settings
-        difference = control.formula.replayed(settings, noisy, self._period) - control.formula.replayed(settings, quiet, self._period)
+        difference = control.formula.replayed(settings, noisy, self._period) - control.formula.replayed(
+            settings, quiet, self._period
+        )
         found = np.zeros((len(self.rows), ticks))
         found[[row.kind == "command" for row in self.rows]] = difference
         return found

@@ -322,7 +322,7 @@ class Reduced:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
-    def carried_noise(self, plant: Plant) -> None:  # noqa: ARG002
+    def carried_noise(self, plant: Plant) -> None:
         """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
 
     def sensed(self, plant: Plant) -> Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from rigtwin.channels import CHANNELS
+from rigtwin.channels import channels_of
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.reader import Recording
 
@@ -24,7 +24,7 @@ def export(recording: Recording, path: Path) -> None:
 
 
 def _csv(recording: Recording, path: Path) -> None:
-    there = [channel for channel in CHANNELS if recording.has(channel.topic, channel.name)]
+    there = channels_of(recording.machine, recording.columns)
     names = ["time", *(f"{channel.topic[1:]}.{channel.name}" for channel in there)]
     units = ["s", *(channel.unit for channel in there)]
     table = np.column_stack([recording.time, *(recording.column(c.topic, c.name) for c in there)])
@@ -36,6 +36,6 @@ def _mat(recording: Recording, path: Path) -> None:
     content: dict[str, object] = {"time": recording.time, "period": recording.period, "experiment": recording.experiment}
     for topic, values in recording.columns.items():
         content[topic[1:]] = dict(values)
-    units = {f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in CHANNELS}
+    units = {f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.machine, recording.columns)}
     content["units"] = {name: unit for name, unit in units.items()}
     savemat(path, content, oned_as="column")

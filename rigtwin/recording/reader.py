@@ -20,7 +20,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
 from rigtwin.arrays import Array
-from rigtwin.channels import topic_fields
+from rigtwin.channels import MACHINE, topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
 
@@ -108,7 +108,7 @@ def load(path: Path) -> Recording:
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period = _period(path, about)
+    period, machine = _period(path, about), about.get("machine", MACHINE)
     controller = _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
@@ -119,7 +119,7 @@ def load(path: Path) -> Recording:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
         if max(times) >= 2**63:
             raise RigtwinError(f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start")
-        values = _decoded(path, channel, schemas.get(channel.schema_id), data)
+        values = _decoded(path, channel, schemas.get(channel.schema_id), data, machine == MACHINE)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
         raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}")
@@ -166,7 +166,8 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
     return controller
 
 
-def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes]) -> dict[str, Array]:
+def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes], rig: bool) -> dict[str, Array]:
+    """The columns of a topic. rig: whether it is of the machine of the channel table; of any other, every number is kept."""
     names = topic_fields(channel.topic)
     if channel.message_encoding == "json":
         decode: Callable[[bytes], Mapping[str, Any]] = json.loads
@@ -175,7 +176,7 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
         present, numbers, decode = _protobuf(path, schema)
         block = b"".join(data)
-        ours = [name for name in names if name in present]
+        ours = [name for name in names if name in present] if rig else present
         if numbers == list(range(1, len(present) + 1)) and len(block) == len(data) * len(present) * FIELD.itemsize:
             fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
             if (fields["tag"] == tags(len(present))).all():
@@ -191,10 +192,15 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
         if not isinstance(row, Mapping):
             raise RigtwinError(f"{path}: message {number} on {channel.topic} cannot be read; expected an object of numbers")
         rows.append(row)
-    ours = [name for name in names if any(name in row for row in rows)]
+    ours = [name for name in names if any(name in row for row in rows)] if rig else _numbers(rows)
     if not ours:
         raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
     return {name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows]) for name in ours}
+
+
+def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
+    """Fields that hold numbers throughout."""
+    return [name for name in rows[0] if all(isinstance(row.get(name), int | float) for row in rows)] if rows else []
 
 
 def _column(path: Path, channel: str, values: list[Any]) -> Array:

@@ -3,11 +3,13 @@ has the same length and whole blocks are encoded and decoded at once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from google.protobuf import descriptor_pb2
 from numpy.typing import NDArray
 
-from rigtwin.channels import CHANNELS, topic_fields
+from rigtwin.channels import CHANNELS
 
 WRITTEN_FORMAT = "1"
 """Format number in the metadata of the recordings that this version reads and writes."""
@@ -26,11 +28,11 @@ def type_name(topic: str) -> str:
     return "rigtwin." + topic.strip("/").capitalize()
 
 
-def descriptor(topic: str) -> bytes:
-    """Serialized FileDescriptorSet of a topic's message type, as an MCAP schema holds it."""
+def descriptor(topic: str, names: Sequence[str]) -> bytes:
+    """Serialized FileDescriptorSet of a topic's message type with fields of those names, as an MCAP schema holds it."""
     file = descriptor_pb2.FileDescriptorProto(name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3")
     message = file.message_type.add(name=type_name(topic).partition(".")[2])
-    for number, name in enumerate(topic_fields(topic), start=1):
+    for number, name in enumerate(names, start=1):
         message.field.add(
             name=name,
             number=number,

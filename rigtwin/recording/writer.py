@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
@@ -64,9 +64,17 @@ class Writer:
     """
 
     def __init__(
-        self, path: Path, experiment: str, period: float, controller: Mapping[str, object], machine: str = "suspension-rig"
+        self,
+        path: Path,
+        experiment: str,
+        period: float,
+        controller: Mapping[str, object],
+        machine: str = "suspension-rig",
+        fields: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
-        """period in s; controller: the operator's settings as `config.controller` holds them. Raises RigtwinError."""
+        """period in s; controller: the operator's settings as `config.controller` holds them; fields: of each topic, by default
+        those of the channel table. Raises RigtwinError."""
+        self._fields = dict(fields or {})
         try:
             self._file: BinaryIO = path.open("wb", buffering=0)
         except OSError as error:
@@ -158,9 +166,10 @@ class Writer:
     def _register(self, topic: str) -> None:
         number = len(self._topics) + 1
         self._topics[topic] = number
-        schema = Schema(id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic))
+        names = self._fields.get(topic) or topic_fields(topic)
+        assert names, f"no channels defined for {topic}"
+        schema = Schema(id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic, names))
         channel = Channel(id=number, schema_id=number, topic=topic, message_encoding="protobuf", metadata={})
-        assert topic_fields(topic), f"no channels defined for {topic}"
         self._schemas.append(schema)
         self._channels.append(channel)
         self._put(_encoded(schema) + _encoded(channel))

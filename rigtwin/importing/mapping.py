@@ -1,0 +1,138 @@
+"""A map from a file's columns to a recording's channels, one TOML."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.units import unit_of
+
+TOPICS = ("/command", "/sensor")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a channel's values come from: sign·scale·column + offset, after conversion to SI; or a constant."""
+
+    column: str
+    unit: str | None
+    scale: float
+    offset: float
+    sign: float
+    constant: float | None
+
+
+@dataclass(frozen=True)
+class Map:
+    """period: s, None if the time column says it; resample: s, None if the data stay as they are; start, until: s of the data
+    that are taken; zoh: nothing is interpolated but what is asked for."""
+
+    machine: str
+    experiment: str
+    time: str | None
+    time_unit: str | None
+    period: float | None
+    resample: float | None
+    start: float
+    until: float
+    channels: Mapping[tuple[str, str], Source]
+    controller: Mapping[str, float | str]
+
+
+def load(path: Path) -> Map:
+    """Reads a map. Raises RigtwinError naming the file, the key and what was expected."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise RigtwinError(f"{path} is not valid TOML: {error}") from None
+    try:
+        return _map(document)
+    except RigtwinError as error:
+        raise RigtwinError(f"{path}: {error}") from None
+
+
+def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"{where}: expected a table")
+    for key in table:
+        if key not in known:
+            raise RigtwinError(f"{where}: unknown key {key!r}; there are {', '.join(known)}")
+    return table
+
+
+def _number(where: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
+    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    if not (low <= number <= high and math.isfinite(number)):
+        limits = f" from {low:g} to {high:g}" if math.isfinite(low) else ""
+        raise RigtwinError(f"{where} = {str(value)[:40]}: expected a number{limits}")
+    return number
+
+
+def _map(document: Mapping[str, Any]) -> Map:
+    _known("the map", document, ("machine", "experiment", "time", "channels", "controller"))
+    machine = document.get("machine")
+    if not isinstance(machine, str) or not machine:
+        raise RigtwinError("machine is missing; expected the name that its description has, such as machine = \"emps\"")
+    time = _known("[time]", document.get("time", {}), ("column", "unit", "period", "resample", "start", "until"))
+    if ("column" in time) == ("period" in time):
+        raise RigtwinError("[time]: expected either column = \"NAME\" or period = SECONDS")
+    period = _number("[time] period", time["period"], 1e-6, 10.0) if "period" in time else None
+    resample = _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
+    if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
+        raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
+    channels = document.get("channels")
+    if not isinstance(channels, Mapping) or not channels:
+        raise RigtwinError("[channels] is missing; expected lines such as \"/sensor.position\" = { column = \"pos\", unit = \"mm\" }")
+    found = {_channel(name): _source(name, table) for name, table in channels.items()}
+    controller = document.get("controller", {})
+    if not isinstance(controller, Mapping) or not all(isinstance(v, int | float | str) for v in controller.values()):
+        raise RigtwinError("[controller]: expected a table of settings")
+    return Map(
+        machine,
+        str(document.get("experiment", "")),
+        str(time["column"]) if "column" in time else None,
+        str(time["unit"]) if "unit" in time else None,
+        period,
+        resample,
+        _number("[time] start", time.get("start", 0.0)),
+        _number("[time] until", time.get("until", 1e12)),
+        found,
+        dict(controller),
+    )
+
+
+def _channel(name: str) -> tuple[str, str]:
+    topic, dot, field = name.partition(".")
+    if topic not in TOPICS or not dot or not field.isidentifier():
+        raise RigtwinError(f"[channels] {name!r}: expected \"/command.NAME\" or \"/sensor.NAME\"")
+    return topic, field
+
+
+def _source(name: str, given: object) -> Source:
+    where = f"[channels] {name!r}"
+    table = _known(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
+    if ("column" in table) == ("constant" in table):
+        raise RigtwinError(f"{where}: expected either column = \"NAME\" or constant = NUMBER")
+    if "unit" in table:
+        unit_of(str(table["unit"]))
+    sign = table.get("sign", 1)
+    if sign not in (1, -1):
+        raise RigtwinError(f"{where} sign = {sign}: expected 1 or -1")
+    scale = _number(f"{where} scale", table.get("scale", 1.0))
+    if scale == 0.0:
+        raise RigtwinError(f"{where} scale = 0: expected anything else")
+    return Source(
+        str(table.get("column", "")),
+        str(table["unit"]) if "unit" in table else None,
+        scale,
+        _number(f"{where} offset", table.get("offset", 0.0)),
+        float(sign),
+        _number(f"{where} constant", table["constant"]) if "constant" in table else None,
+    )

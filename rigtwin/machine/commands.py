@@ -1,0 +1,56 @@
+"""What the commands about machines do: list them, check a description."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from rigtwin.console import table
+
+
+def machines(_parsed: Namespace) -> int:
+    from rigtwin.machine.library import find, shipped
+
+    rows = [("machine", "title", "components", "observed")]
+    for name in shipped():
+        machine = find(name)
+        rows.append((name, machine.title, ", ".join(machine.components), ", ".join(row.name for row in machine.rows)))
+    print(table([(name, title) for name, title, *_ in rows]))
+    for name, _, components, observed in rows[1:]:
+        print(f"\n{name}\n  components  {components}\n  observed    {observed}")
+    return 0
+
+
+def machine(parsed: Namespace) -> int:
+    from rigtwin.diagnosis.trials import searched
+    from rigtwin.machine.description import examined
+    from rigtwin.machine.library import shipped
+
+    path = shipped().get(str(parsed.description), parsed.description)
+    found, mistakes = examined(path)
+    for mistake in mistakes:
+        print(f"{path}: {mistake}")
+    if found is None:
+        print(f"{len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}")
+        return 1
+    print(f"{found.name}: {found.title}")
+    for replay in found.replays:
+        closed = ", commanded by the controller" if replay.closed else ""
+        print(f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; observed {', '.join(r.name for r in replay.rows)}")
+    rows = [("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")]
+    effects = [effect for effect in found.effects() if searched(effect)]
+    for name, component in found.components.items():
+        held = [t for t in found.tolerances if t.group == name and not t.ticks]
+        part = getattr(found.plant, name)
+        values = ", ".join(
+            f"{t.parameter} {getattr(part, t.parameter):g} ± "
+            + (f"{100 * t.half_width:g} %" if t.relative else f"{t.half_width:g}")
+            for t in held
+        )
+        own = ", ".join(effect.kind.name for effect in effects if effect.group == name)
+        channel = ".".join(component.channel) if component.channel else ""
+        rows.append((name, f"{component.element} {component.mjcf}", channel, values, own))
+    print(table(rows))
+    if found.control is not None:
+        print(f"controller: {found.control.output} = {found.control.formula.text}")
+    print("no mistakes")
+    return 0
