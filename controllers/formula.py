@@ -10,7 +10,7 @@ import ast
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -156,7 +156,7 @@ class _Builder:
 
 
 @compilable
-def run(program: Program, registers: np.ndarray, memory: np.ndarray, period: float) -> float:
+def run(program: Program, registers: Any, memory: Any, period: float) -> float:
     """The formula's value at this tick. registers: the program's, with the inputs' values written into its first places;
     memory: what its blocks remember. Both are changed."""
     count = len(program.operations)
@@ -212,7 +212,7 @@ def run(program: Program, registers: np.ndarray, memory: np.ndarray, period: flo
 
 
 @compilable
-def _remembered(code: int, sample: float, length: int, memory: np.ndarray, at: int) -> float:
+def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> float:
     """The mean of the last `length` samples, or the one that many ago. memory: where the ring stands, then the ring."""
     size = length + 1
     if math.isnan(memory[at]):

@@ -104,7 +104,9 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("recording", type=Path)
     compare.add_argument("other", type=Path, nargs="?", help="a second recording of the same test")
     compare.add_argument("--json", type=Path, metavar="J.json", help="also write the figures to a file")
-    compare.add_argument("--machine", metavar="F.toml", help="the machine's description (default: the one that the recording names)")
+    compare.add_argument(
+        "--machine", metavar="F.toml", help="the machine's description (default: the one that the recording names)"
+    )
     _effect(compare, "compare with a twin that has an effect, e.g. coulomb@rail=80")
     settings(compare)
 

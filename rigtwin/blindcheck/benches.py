@@ -1,6 +1,7 @@
 """Two benches of the referee's: a positioning actuator and a damper. Written from their physics and from nothing of the twin.
 
-The actuator is integrated in steps of 50 us: each lag by the trapezoidal rule, a delay by shifting the command. The damper's dry
+The actuator is integrated in steps of 50 us: each lag by the trapezoidal rule, a delay by shifting the command. The
+damper's dry
 friction is a stop operator in the stretch of what stands between piston and rod: the play, then the spring, then the slider.
 """
 
@@ -20,7 +21,8 @@ FINE = 20
 
 @dataclass(frozen=True)
 class ActuatorTruth:
-    """lags: s, one after another; late: s; own: (natural frequency Hz, damping ratio) or none; fastest: m/s; lost: m of play."""
+    """lags: s, one after another; late: s; own: (natural frequency Hz, damping ratio) or none; fastest: m/s; lost: m of
+    play."""
 
     lags: tuple[float, ...] = ()
     late: float = 0.0
@@ -32,8 +34,8 @@ class ActuatorTruth:
 
 @dataclass(frozen=True)
 class DamperTruth:
-    """slip: N; spring: N/m in series with it, infinite if rigid; lost: m of play in series; viscous: Ns/m when extending and when
-    compressing; rate: N/m beside them; charge: N."""
+    """slip: N; spring: N/m in series with it, infinite if rigid; lost: m of play in series; viscous: Ns/m when extending
+    and when compressing; rate: N/m beside them; charge: N."""
 
     slip: float = 0.0
     spring: float = math.inf

@@ -9,8 +9,10 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.fft import rfft
 
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
@@ -57,8 +59,8 @@ MEMBER = 0.05
 
 @dataclass(frozen=True)
 class Rules:
-    """When effects are named. most: at once; more: share of what is left that each further one must explain; enough: share of the
-    gap that they must explain to be named at all if something is left; too_much: χ² per degree of freedom above 1 from
+    """When effects are named. most: at once; more: share of what is left that each further one must explain; enough: share
+    of the gap that they must explain to be named at all if something is left; too_much: χ² per degree of freedom above 1 from
     which what is left forbids to name anything."""
 
     most: int
@@ -260,7 +262,12 @@ def _judged(
     best = pool[0]
     expected = evidence.expected_at(best.plant)
     temper = TEMPER + FORM_TEMPER * max(best.misfit - expected, 0.0)
-    weights = np.array([math.exp(-min((_priced(fit) - _priced(best)) / (2.0 * temper), 700.0)) for fit in pool])
+    apart = np.array([(_priced(fit) - _priced(best)) / (2.0 * temper) for fit in pool])
+    if evidence.machine.rough:
+        # What is left is no noise but the model's error: as many pieces of it as are independent speak for one against another.
+        relative = np.array([(_priced(fit) + expected) / (_priced(best) + expected) for fit in pool])
+        apart = 0.5 * _independent(evidence, best.plant) * np.log(relative)
+    weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
     ranking = tuple(Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
     found = nothing.misfit - _priced(best) > detectable(evidence) and bool(best.effects)
@@ -272,6 +279,18 @@ def _judged(
     named = ranking[0] if found and not (more and (explained < rules.enough or left > rules.too_much)) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
     return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, shares, silent, tuple(chain))
+
+
+def _independent(evidence: Evidence, plant: Any) -> float:
+    """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
+    imaginary parts."""
+    total = square = 0.0
+    for each, difference in zip(evidence.lines, evidence.differences(plant), strict=True):
+        transform = rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
+        power = np.abs(transform) ** 2
+        total, square = total + float(power.sum()), square + float((power**2).sum())
+    # The powers of white noise are spread as an exponential, of which this would count half.
+    return 4.0 * total**2 / max(square, 1e-300)
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:

@@ -1,24 +1,51 @@
-"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from the nominal rig."""
+"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from the nominal machine."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from rigtwin.configuration import Configuration, flattened
 from rigtwin.diagnosis.diagnose import Outcome
+from rigtwin.diagnosis.finding import Finding
 from rigtwin.errors import RigtwinError
 
 
 def toml(outcome: Outcome) -> str:
     """The file's text. Values in full precision, so that the twin is the same to the bit."""
-    nominal, corrected = flattened(Configuration()), flattened(outcome.corrected)
+    assert outcome.evidence is not None
     lines = [f"# {outcome.diagnosis.verdict}: {outcome.diagnosis.sentence}"]
     lines += [f"# from {recording}" for recording in outcome.diagnosis.recordings]
-    for group in outcome.corrected.plant._fields:
+    lines += [f"# the controller's {each}" for each in map(_told, outcome.diagnosis.effects) if each]
+    nominal, corrected = _values(outcome, outcome.evidence.machine.plant), _values(outcome, outcome.corrected.plant)
+    for effect in outcome.diagnosis.effects:
+        if effect.name.component == "controller" and effect.name.kind in corrected.get("computer", {}):
+            # What the computer does late or not at all belongs to the twin as the plant's defects do.
+            corrected["computer"] = {
+                **corrected["computer"],
+                **{name: each.value for name, each in effect.parameters.items()},
+            }
+    for group in corrected:
         changed = {key: value for key, value in corrected[group].items() if value != nominal[group][key]}
         if changed:
             lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in changed.items())]
     return "\n".join(lines) + "\n"
+
+
+def _told(effect: Finding) -> str:
+    """A setting that is not what the recording says, which is the operator's to change."""
+    if effect.name.kind != "setting":
+        return ""
+    return ", ".join(f"{name} was {each.value:g}, told {each.nominal:g}" for name, each in effect.parameters.items())
+
+
+def _values(outcome: Outcome, plant: object) -> dict[str, dict[str, float | str]]:
+    """Component → parameter → value of a plant."""
+    if isinstance(outcome.corrected, Configuration):
+        every = flattened(outcome.corrected._replace(plant=plant))  # type: ignore[arg-type]
+        return {group: every[group] for group in outcome.corrected.plant._fields}
+    groups: Mapping[str, object] = plant._asdict()  # type: ignore[attr-defined]
+    return {name: {key: float(v) for key, v in part._asdict().items()} for name, part in groups.items()}  # type: ignore[attr-defined]
 
 
 def save(path: Path, outcome: Outcome) -> None:

@@ -72,7 +72,9 @@ def _compare_described(recording: Recording, parsed: Namespace) -> int:
     from rigtwin.machine.replaying import setup_of
 
     if parsed.effect:
-        raise RigtwinError("--effect is for the suspension rig; give another machine's values with --set component.parameter=value")
+        raise RigtwinError(
+            "--effect is for the suspension rig; give another machine's values with --set component.parameter=value"
+        )
     machine = machine_of(recording, parsed.machine)
     setup = setup_of(machine, recording, base_of(machine, parsed))
     for fault in faults_of(machine, recording, setup):
@@ -86,7 +88,11 @@ def _compare_described(recording: Recording, parsed: Namespace) -> int:
     for number, row in enumerate(machine.rows):
         counted = each.fade[number] > 0.5
         results[row.name] = single(difference[number][counted], float(each.noise[number]), row.unit, recording.period)
-    print(table([("signal", "residual rms", "noise floor", "ratio", "most of it, Hz"), *(_row(*item) for item in results.items())]))
+    print(
+        table(
+            [("signal", "residual rms", "noise floor", "ratio", "most of it, Hz"), *(_row(*item) for item in results.items())]
+        )
+    )
     if parsed.json is not None:
         apart(parsed.json, parsed.recording)
         document = {"recording": str(recording.path), "signals": {name: asdict(each) for name, each in results.items()}}
@@ -134,19 +140,23 @@ def diagnose(parsed: Namespace) -> int:
             bar.update(steps)
 
         outcome = answer(machine, recordings, base, held_out, tests, progress)
-    print(described(outcome.diagnosis))
+    # Files first: whoever reads the terminal may stop reading.
+    said = [described(outcome.diagnosis)]
     if parsed.json is not None:
         write_json(parsed.json, outcome.diagnosis.document())
     if parsed.html is not None:
         from rigtwin.diagnosis.report import write
 
         write(parsed.html, outcome)
-        print(f"report in {parsed.html}")
-    if parsed.save_twin is not None:
+        said.append(f"report in {parsed.html}")
+    if parsed.save_twin is not None and outcome.evidence is not None:
         from rigtwin.diagnosis.calibrated import save
 
         save(parsed.save_twin, outcome)
-        print(f"corrected twin in {parsed.save_twin}; use it with --config")
+        said.append(f"corrected twin in {parsed.save_twin}; use it with --config")
+    elif parsed.save_twin is not None:
+        said.append(f"{parsed.save_twin} not written: the data cannot be diagnosed")
+    print("\n".join(said))
     return 1 if outcome.diagnosis.verdict == "unusable" else 0
 
 
@@ -166,7 +176,8 @@ def machine_of(recording: Recording, described: str | None) -> Machine:
 
 
 def base_of(machine: Machine, parsed: Namespace) -> Any:
-    """The twin that recordings are compared with, as the command line has it: a Configuration, or a Setup of a described machine."""
+    """The twin that recordings are compared with, as the command line has it: a Configuration, or a Setup of a described
+    machine."""
     from rigtwin.configuration import Configuration, Timing
     from rigtwin.effects import without
     from rigtwin.machine import setting

@@ -104,8 +104,8 @@ def diagnose(
     tests: Sequence[Test] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Outcome:
-    """Diagnoses recordings of one machine against the twin of `base`. tests: the menu that a next one is chosen from; progress is
-    called with a stage's name and the steps done in it.
+    """Diagnoses recordings of one machine against the twin of `base`. tests: the menu that a next one is chosen from;
+    progress is called with a stage's name and the steps done in it.
 
     Raises RigtwinError if the recordings' settings are unknown here, or held-out data are not fit to be compared.
     """
@@ -155,7 +155,7 @@ def _diagnosed(
     sampled = outstanding(
         evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant
     )
-    attributed = _findings(found, verdict_of_data.kept, evidence)
+    attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
     traces = tuple(each for each in attributed if evidence.machine.rough and each.share < TRACE)
     effects = [
@@ -169,7 +169,9 @@ def _diagnosed(
         verdict = "partly explained" if something or odd_controller else "explained"
     else:
         verdict = "unknown" if something or odd_controller else "no gap"
-    where = _where(evidence, found, plant, verdict_of_data.kept, disturbed if something else (), best)
+    small = {str(each.name) for each in traces}
+    claimed = tuple(effect for effect in verdict_of_data.kept if effect.name not in small)
+    where = _where(evidence, found, plant, claimed, disturbed if something else (), best)
     if odd_controller:
         where.append(Place("controller", 1.0, (0.0, 0.0), "throughout", "its commands are not those of its settings"))
     progress("replaying components", 1)
@@ -223,22 +225,32 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     return list(found.values())
 
 
-def _findings(found: Attribution, kept: tuple[Effect, ...], evidence: Evidence) -> list[Finding]:
+def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[Finding]:
     if found.best is None:
         return []
     fit = found.best.fit
+    widths = [
+        tuple(
+            # A rough model's error is no noise: how far it leads astray shows between one half of the data and the other.
+            max(width, abs(one - other) / WIDER) if evidence.machine.rough else width
+            for width, one, other in zip(own, *(half.values[number] for half in outcome.halves), strict=True)
+        )
+        if len(outcome.halves) == 2
+        else own
+        for number, own in enumerate(fit.widths)
+    ]
     surest = SURE if len(fit.effects) == 1 and not found.unknown else LESS_SURE
     return [
         Finding(
             Name(effect.component, effect.kind.name),
-            estimates(effect, values, widths, evidence),
+            estimates(effect, values, spread, evidence),
             min(surest, _probability(found.ranking, effect)),
             _class(found.ranking, found.best, effect),
             min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
             effect.kind.title,
         )
-        for effect, values, widths in zip(fit.effects, fit.values, fit.widths, strict=True)
-        if effect in kept
+        for effect, values, spread in zip(fit.effects, fit.values, widths, strict=True)
+        if effect in outcome.kept
     ]
 
 

@@ -70,7 +70,8 @@ class Lines:
 
 
 def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, counted: Array) -> Lines:
-    """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1, shape (ticks,)."""
+    """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1,
+    shape (ticks,)."""
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
@@ -175,8 +176,8 @@ class Evidence:
         counted: Sequence[Array] | None = None,
         steps: int = 4,
     ) -> None:
-        """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0 to 1;
-        steps: of integration a tick."""
+        """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0
+        to 1; steps: of integration a tick."""
         counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.machine, self.recordings, self.configurations = machine, tuple(recordings), tuple(configurations)
         self.names = [row.name for row in machine.rows]
@@ -239,8 +240,8 @@ class Evidence:
         return [reduced.sensed(plant) for reduced in self.plants]
 
     def differences(self, plant: Any) -> list[Array]:
-        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early or late
-        leaves says nothing of its size, and jumps when anything changes."""
+        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early
+        or late leaves says nothing of its size, and jumps when anything changes."""
         return self._despiked(self.predicted(plant))
 
     def _despiked(self, predictions: Sequence[Array]) -> list[Array]:

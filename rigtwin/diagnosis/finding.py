@@ -111,8 +111,8 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Step:
-    """One effect more. added: its name, or of all that changed; values: of its parameters then; left: rms of what each signal has left
-    over the model, in its unit, on `data`."""
+    """One effect more. added: its name, or of all that changed; values: of its parameters then; left: rms of what each
+    signal has left over the model, in its unit, on `data`."""
 
     added: str
     values: dict[str, Estimate]

@@ -72,7 +72,8 @@ def clashing(effect: Effect, others: Sequence[Effect]) -> bool:
 
 
 def possible(effects: Sequence[Effect], plant: Any) -> bool:
-    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry friction."""
+    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry
+    friction."""
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from rigtwin.arrays import Array
 from rigtwin.diagnosis.controller import EXACT, LATE, Deviation
 from rigtwin.diagnosis.residual import rounding
 from rigtwin.machine.machine import Machine
@@ -25,14 +26,14 @@ class FormulaReplay:
         assert machine.control is not None
         self._control, self._settings, self._period = machine.control, dict(setup.settings), recording.period
         self._recorded = recording.column("/command", machine.control.output)
-        columns = [recording.column(*machine.control.inputs[name]) for name in machine.control.formula.inputs]
+        columns: list[Array] = [recording.column(*machine.control.inputs[name]) for name in machine.control.formula.inputs]
         self._inputs = columns
         exact = machine.control.exact
         self._exact = EXACT * rounding(self._recorded) if exact is None else exact
 
     def misfit(self, settings: dict[str, float], late: int = 0) -> float:
         """rms of what the commands differ by, in units of what counts as exact."""
-        inputs = self._inputs
+        inputs: list[Array] = self._inputs
         if late:
             inputs = [np.concatenate([np.full(late, column[0]), column[:-late]]) for column in inputs]
         out = self._control.formula.replayed(settings, inputs, self._period)

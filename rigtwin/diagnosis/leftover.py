@@ -26,7 +26,7 @@ def steps(
 ) -> tuple[Step, ...]:
     """The signals' rms left by each fit of a chain, the nominal plant first: on held-out data if there are any."""
     judged = Evidence(evidence.machine, held_out, setups) if held_out else evidence
-    found = [Step("nominal", {}, _left(judged, evidence.plant))]
+    found = [Step("nominal", {}, remaining(judged, evidence.plant))]
     before: set[str] = set()
     for fit in chain:
         names = {effect.name for effect in fit.effects}
@@ -40,12 +40,12 @@ def steps(
             for (name, quantity), value in zip(effect.quantities().items(), numbers, strict=True):
                 unit = evidence.machine.unit(effect.group, quantity)
                 values[name] = Estimate(value, value, value, nominal[name], unit)
-        found.append(Step(f"with {added}{gone}", values, _left(judged, fit.plant)))
+        found.append(Step(f"with {added}{gone}", values, remaining(judged, fit.plant)))
         before = names
     return tuple(found)
 
 
-def _left(evidence: Evidence, plant: Any) -> dict[str, float]:
+def remaining(evidence: Evidence, plant: Any) -> dict[str, float]:
     """rms of what each signal has left, over all recordings."""
     rows: dict[str, float] = {}
     predicted = evidence.predicted(plant)
@@ -61,7 +61,7 @@ def _left(evidence: Evidence, plant: Any) -> dict[str, float]:
 def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) -> list[Place]:
     """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
     differences = evidence.differences(plant)
-    levels = _left(evidence, plant)
+    levels = remaining(evidence, plant)
     found = []
     total = sum((levels[name] / float(evidence.lines[0].noise[n])) ** 2 for n, name in enumerate(evidence.names))
     foremost = disturbed[0]

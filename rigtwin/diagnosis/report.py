@@ -152,6 +152,8 @@ def html(outcome: Outcome) -> str:
         bars=bars(diagnosis),
         plots=plots(outcome),
         number=number,
+        title=outcome.evidence.machine.title if outcome.evidence is not None else diagnosis.machine,
+        components=list(outcome.evidence.machine.components) if outcome.evidence is not None else [],
         tried=len(library(outcome.evidence)) if outcome.evidence is not None else 0,
         version=__version__,
     )

@@ -90,13 +90,15 @@ def interval(of: Blocks) -> Interval:
 
 @dataclass(frozen=True)
 class Judged:
-    """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do."""
+    """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
+    halves: the fits to each half of the recordings, where they were made."""
 
     predicted: float
     held_out: Interval
     kept: tuple[Effect, ...]
     rejected: tuple[Effect, ...]
     data: str
+    halves: tuple[Fit, ...] = ()
 
 
 def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
@@ -113,6 +115,14 @@ def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
 
 def _refitted(evidence: Evidence, fit: Fit) -> Fit:
     return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
+
+
+def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
+    """The halves of the recordings, and the fit made again to each."""
+    parts = halves(evidence.recordings)
+    return parts, [
+        _refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts
+    ]
 
 
 def judged(
@@ -136,9 +146,9 @@ def judged(
             return outside(with_effects(evidence.plant, fit, kept))
 
         kept, rejected = gated(fit.effects, kept_outside, worse)
-        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data)
-    parts = halves(evidence.recordings)
-    fits = [_refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts]
+        apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
+        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart))
+    parts, fits = _halved(evidence, fit)
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
         inside = blocks(evidence, evidence.plant, refitted.plant, own)
@@ -152,7 +162,8 @@ def judged(
         return found[0].joined(found[1])
 
     kept, rejected = gated(fit.effects, across, worse)
-    return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, "each half, fitted to the other")
+    data = "each half, fitted to the other"
+    return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits))
 
 
 def with_effects(plant: Any, fit: Fit, kept: Sequence[Effect]) -> Any:

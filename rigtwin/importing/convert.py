@@ -29,7 +29,7 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     """Writes the recording; what was found, a line each. Raises RigtwinError before anything is written."""
     wanted, columns = load(map_path), read(data)
     report = [f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, columns {', '.join(columns.values)}"]
-    signals = {channel: _signal(data, columns, channel, source) for channel, source in wanted.channels.items()}
+    signals = {channel: _signal(data, columns, source) for channel, source in wanted.channels.items()}
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if len(lengths) > 1:
         raise RigtwinError(f"{data}: the columns have different lengths: {', '.join(map(str, sorted(lengths)))}")
@@ -44,7 +44,7 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
         raise RigtwinError(f"{data}: nothing lies between start = {wanted.start:g} s and until = {wanted.until:g} s")
     time, signals = time[taken], {channel: values[taken] for channel, values in signals.items()}
     period = wanted.period or _period(time)
-    _whole(data, time, signals, report)
+    _whole(data, time, signals)
     if wanted.resample is not None:
         time, signals = _resampled(time, signals, period, wanted.resample)
         report.append(f"resampled from {period:g} s to {wanted.resample:g} s: {len(time)} ticks")
@@ -66,7 +66,7 @@ def _column(data: Path, columns: Columns, name: str) -> Array:
     return columns.values[name]
 
 
-def _signal(data: Path, columns: Columns, channel: tuple[str, str], source: Source) -> Array:
+def _signal(data: Path, columns: Columns, source: Source) -> Array:
     """The channel in SI, shape (rows,), or (1,) for a constant."""
     if source.constant is not None:
         return np.array([source.constant])
@@ -89,7 +89,9 @@ def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
     said = wanted.time_unit or columns.units.get(wanted.time, "s")
     base, factor = unit_of(said)
     if base != "s":
-        raise RigtwinError(f"{data}: time column {wanted.time!r} is in {said!r}; expected a unit of time, say it in [time] unit")
+        raise RigtwinError(
+            f"{data}: time column {wanted.time!r} is in {said!r}; expected a unit of time, say it in [time] unit"
+        )
     if not np.isfinite(values).all():
         raise RigtwinError(f"{data}: time is not a number in row {int(np.argmax(~np.isfinite(values))) + 1}")
     return factor * values
@@ -119,7 +121,8 @@ def _distinct(
     return time[~again], {channel: values[~again] for channel, values in signals.items()}
 
 
-def _whole(data: Path, time: Array, signals: dict[tuple[str, str], Array], _report: list[str]) -> None:
+def _whole(data: Path, time: Array, signals: dict[tuple[str, str], Array]) -> None:
+    """Raises RigtwinError where a cell held no number."""
     for channel, values in signals.items():
         wrong = ~np.isfinite(values)
         if wrong.any():
@@ -151,11 +154,14 @@ def _even(data: Path, time: Array, period: float, report: list[str]) -> None:
         at = int(np.argmax(off))
         raise RigtwinError(
             f"{data}: {int(off.sum())} gaps in time, the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
-            f"{period:g} s is the rule; take a stretch without them by [time] start and until, or say [time] resample = {period:g}"
+            f"{period:g} s is the rule; take a stretch without them by [time] start and until, "
+            f"or say [time] resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
     if drift * len(time) > JITTER * period:
-        report.append(f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, mostly {period:g} s")
+        report.append(
+            f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, mostly {period:g} s"
+        )
     worst = float(np.max(np.abs(steps - period)))
     if worst > 0.01 * period:
         report.append(f"time stamps are off by up to {worst:.2g} s; taken as ticks of {period:g} s")
@@ -169,7 +175,7 @@ def _resampled(
     found = {}
     for channel, values in signals.items():
         if wanted > 1.5 * period and len(values) > 60:
-            values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)  # noqa: PLW2901
+            values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
         found[channel] = np.interp(ticks, time, values)
     return ticks, found
 
@@ -200,7 +206,8 @@ def _written(out: Path, wanted: Map, period: float, signals: dict[tuple[str, str
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {
-                topic.strip("/"): np.column_stack([signals[topic, name][part] for name in each]) for topic, each in names.items()
+                topic.strip("/"): np.column_stack([signals[topic, name][part] for name in each])
+                for topic, each in names.items()
             }
             writer.append(**blocks)
     return ticks

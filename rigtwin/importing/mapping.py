@@ -79,17 +79,17 @@ def _map(document: Mapping[str, Any]) -> Map:
     _known("the map", document, ("machine", "experiment", "time", "channels", "controller"))
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
-        raise RigtwinError("machine is missing; expected the name that its description has, such as machine = \"emps\"")
+        raise RigtwinError('machine is missing; expected the name that its description has, such as machine = "emps"')
     time = _known("[time]", document.get("time", {}), ("column", "unit", "period", "resample", "start", "until"))
     if ("column" in time) == ("period" in time):
-        raise RigtwinError("[time]: expected either column = \"NAME\" or period = SECONDS")
+        raise RigtwinError('[time]: expected either column = "NAME" or period = SECONDS')
     period = _number("[time] period", time["period"], 1e-6, 10.0) if "period" in time else None
     resample = _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
     if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
         raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:
-        raise RigtwinError("[channels] is missing; expected lines such as \"/sensor.position\" = { column = \"pos\", unit = \"mm\" }")
+        raise RigtwinError('[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", unit = "mm" }')
     found = {_channel(name): _source(name, table) for name, table in channels.items()}
     controller = document.get("controller", {})
     if not isinstance(controller, Mapping) or not all(isinstance(v, int | float | str) for v in controller.values()):
@@ -111,7 +111,7 @@ def _map(document: Mapping[str, Any]) -> Map:
 def _channel(name: str) -> tuple[str, str]:
     topic, dot, field = name.partition(".")
     if topic not in TOPICS or not dot or not field.isidentifier():
-        raise RigtwinError(f"[channels] {name!r}: expected \"/command.NAME\" or \"/sensor.NAME\"")
+        raise RigtwinError(f'[channels] {name!r}: expected "/command.NAME" or "/sensor.NAME"')
     return topic, field
 
 
@@ -119,7 +119,7 @@ def _source(name: str, given: object) -> Source:
     where = f"[channels] {name!r}"
     table = _known(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
     if ("column" in table) == ("constant" in table):
-        raise RigtwinError(f"{where}: expected either column = \"NAME\" or constant = NUMBER")
+        raise RigtwinError(f'{where}: expected either column = "NAME" or constant = NUMBER')
     if "unit" in table:
         unit_of(str(table["unit"]))
     sign = table.get("sign", 1)

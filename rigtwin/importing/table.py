@@ -153,7 +153,11 @@ def layout(lines: list[str]) -> Layout | None:
 
 def _begins(counts: list[int], at: int) -> bool:
     block = [count for count in counts[at : at + SURE]]
-    return counts[at] > 0 and all(count == counts[at] for count in block) and (len(block) == SURE or at + len(block) == len(counts))
+    return (
+        counts[at] > 0
+        and all(count == counts[at] for count in block)
+        and (len(block) == SURE or at + len(block) == len(counts))
+    )
 
 
 def _headed(lines: list[str], found: Layout, columns: int) -> Layout:

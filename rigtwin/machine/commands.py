@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from pathlib import Path
 
 from rigtwin.console import table
 
@@ -25,7 +26,7 @@ def machine(parsed: Namespace) -> int:
     from rigtwin.machine.description import examined
     from rigtwin.machine.library import shipped
 
-    path = shipped().get(str(parsed.description), parsed.description)
+    path: Path = shipped().get(str(parsed.description)) or parsed.description
     found, mistakes = examined(path)
     for mistake in mistakes:
         print(f"{path}: {mistake}")
@@ -35,7 +36,9 @@ def machine(parsed: Namespace) -> int:
     print(f"{found.name}: {found.title}")
     for replay in found.replays:
         closed = ", commanded by the controller" if replay.closed else ""
-        print(f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; observed {', '.join(r.name for r in replay.rows)}")
+        print(
+            f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; observed {', '.join(r.name for r in replay.rows)}"
+        )
     rows = [("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")]
     effects = [effect for effect in found.effects() if searched(effect)]
     for name, component in found.components.items():

@@ -482,7 +482,8 @@ class _Reader:
         return None
 
     def _default_timing(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since the period is the recording's."""
+        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since the period is the
+        recording's."""
         declared = {(each.group, each.parameter) for each in self._tolerances}
         for replay in replays:
             names = [*replay.moved_by[:1], *(row.name for row in replay.rows if row.kind != "command")]

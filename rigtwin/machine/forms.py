@@ -39,8 +39,8 @@ def polynomials(signal: Array, time: Array, period: float) -> Iterator[tuple[str
 
 
 def joint_forms(kind: str, entry: str, signal: Array, moved: Array, period: float) -> list[Form]:
-    """Forms of one component. kind: sensor, motion, drive, mass or guide; signal: what it handles; moved: position, velocity and
-    force of the joint, shape (≥ 3, ticks)."""
+    """Forms of one component. kind: sensor, motion, drive, mass or guide; signal: what it handles; moved: position,
+    velocity and force of the joint, shape (≥ 3, ticks)."""
     return [Form(name, entry, each) for name, each in _forms(kind, signal, moved, period)]
 
 

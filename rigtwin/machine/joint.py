@@ -109,8 +109,8 @@ class JointReplay:
         return tuple(getattr(plant, name) for name in names if name is not None)
 
     def moved(self, plant: Any, force: Array | None = None, shift: Array | None = None) -> Array:
-        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its prescribed
-        motion, m; shape (ticks,)."""
+        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its
+        prescribed motion, m; shape (ticks,)."""
         key = self._key(plant)
         if force is None and shift is None and key in self._last:
             return self._last[key]
@@ -256,7 +256,7 @@ class JointReplay:
         number = [row.name for row in self.rows].index(entry)
         return SMALL * max(float(np.std(self._rows(moved)[number])), 1e-9)
 
-    def motion(self, component: str, plant: Any) -> Motion:
+    def motion(self, component: str, plant: Any) -> Motion:  # noqa: ARG002
         moved = self.moved(plant)
         return Motion(moved[0], moved[1], moved[2])
 

@@ -112,7 +112,8 @@ class Machine:
         return tuple(row for replay in self.replays for row in replay.rows)
 
     def effects(self) -> Iterator[Effect]:
-        """All effects that this machine can have. A computer's delay is only told from an actuator's where there are several."""
+        """All effects that this machine can have. A computer's delay is only told from an actuator's where there are
+        several."""
         movers = {mover for replay in self.replays for mover in replay.moved_by}
         for effect in candidates(self.plant):
             if effect.group == "computer" and len(movers) < 2:

@@ -27,8 +27,8 @@ class Setup(NamedTuple):
 def predictor(machine: Machine, recording: Recording, setup: Configuration | Setup, steps: int) -> Predictor:
     """The machine's model under a recording's inputs. Raises RigtwinError if a channel is missing."""
     if isinstance(setup, Configuration):
-        commands = (recording.column("/command", name) for name in ("ground", "structure", "voltage"))
-        return Reduced(*commands, setup, steps)
+        ground, structure, voltage = (recording.column("/command", name) for name in ("ground", "structure", "voltage"))
+        return Reduced(ground, structure, voltage, setup, steps)
     replays = [JointReplay(machine, replay, recording, dict(setup.settings), steps) for replay in machine.replays]
     return replays[0] if len(replays) == 1 else Several(replays)
 

@@ -36,6 +36,8 @@ def _mat(recording: Recording, path: Path) -> None:
     content: dict[str, object] = {"time": recording.time, "period": recording.period, "experiment": recording.experiment}
     for topic, values in recording.columns.items():
         content[topic[1:]] = dict(values)
-    units = {f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.machine, recording.columns)}
+    units = {
+        f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.machine, recording.columns)
+    }
     content["units"] = {name: unit for name, unit in units.items()}
     savemat(path, content, oned_as="column")
