@@ -63,9 +63,7 @@ class Formula:
             registers[place] = settings.get(name, self.settings[name])
         return self.program._replace(registers=registers)
 
-    def replayed(
-        self, settings: Mapping[str, float], inputs: Sequence[NDArray[np.float64]], period: float
-    ) -> NDArray[np.float64]:
+    def replayed(self, settings: Mapping[str, float], inputs: Sequence[NDArray[Any]], period: float) -> NDArray[np.float64]:
         """Its value at every tick. inputs: in their order, shape (ticks,) each."""
         program, ticks = self.with_settings(settings), len(inputs[0])
         out = np.empty(ticks)

@@ -16,13 +16,12 @@ from numpy.fft import rfft
 
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
+from rigtwin.diagnosis.growth import Growth, grown, plain, priced, within_tolerance
 from rigtwin.diagnosis.trials import searched
 from rigtwin.effects import Effect
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""
-PRICE = 8.0
-"""Of each parameter, in χ²: a simpler explanation is preferred."""
 DETECTED = 60.0
 """χ² that an effect must explain to be a finding,"""
 NOTICEABLE = 0.015
@@ -37,8 +36,6 @@ TEMPER = 4.0
 """χ² by which explanations must differ for the better one to be e^½ times as likely."""
 FORM_TEMPER = 0.05
 """How much of what is left widens that."""
-WITHIN_TOLERANCE = 1.5
-"""Tolerances below which a deviation is no finding."""
 REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them, if they"""
 NEAR = 0.2
@@ -112,22 +109,6 @@ def library(evidence: Evidence) -> list[Effect]:
     return [effect for effect in evidence.machine.effects() if searched(effect)]
 
 
-def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
-    """Whether one of the effects is no more than its declared tolerance."""
-    return any(_tolerated(effect, values[0], evidence) for effect, values in zip(fit.effects, fit.values, strict=True))
-
-
-def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
-    parameter = effect.kind.parameters[0]
-    tolerance = evidence.machine.tolerance_of(effect.group, parameter)
-    if tolerance is None:
-        return False
-    width = evidence.width(tolerance)
-    if tolerance.relative:
-        width = tolerance.half_width * abs(effect.nominal(evidence.plant)[parameter])
-    return abs(value - effect.nominal(evidence.plant)[parameter]) <= WITHIN_TOLERANCE * width
-
-
 def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: None) -> Attribution:
     """Searches the whole library. progress is called with the number of fits done since its last call."""
     least, rules = detectable(evidence), ROUGH if evidence.machine.rough else KNOWN
@@ -148,15 +129,15 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             return results
 
         singles = mapped(search.single, effects)
-        singles.sort(key=_priced)
+        singles.sort(key=priced)
         # Those far behind stay there, however the tolerances are taken.
         near = singles[0].misfit + NEAR * max(search.nothing.misfit - singles[0].misfit, 0.0) + 2.0 * least
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
         tried = mapped(fitter.settled, close) + singles[len(close) :]
-        tried.sort(key=_priced)
+        tried.sort(key=priced)
         first = tried[0]
         nothing = fitter.settled(fitter.nothing)
-        if nothing.misfit - _priced(first) > least:
+        if nothing.misfit - priced(first) > least:
             much = _left(first.misfit, evidence) > MUCH * evidence.expected
             hopes: list[Hope] = []
             for leader in tried[: BEAM if much else 1]:
@@ -166,53 +147,22 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             hopes.sort(key=lambda hope: hope.promised)
             hopeful = _once(hopes)[: MANY if much else FEW]
             pairs = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful)
-            pairs.sort(key=_priced)
+            pairs.sort(key=priced)
             for _ in range(LOOKED_AGAIN if pairs else 0):
                 known = {frozenset(pair.effects) for pair in pairs}
                 fresh = [pair for pair in search.alike(pairs[0], effects) if frozenset(pair[0]) not in known]
                 pairs += mapped(lambda pair: search.refined(*pair), fresh)
-                pairs.sort(key=_priced)
+                pairs.sort(key=priced)
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
             least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
             tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
-        chain = sorted(_plain(tried, least), key=_priced)[:1]
-        if chain and len(chain[0].effects) > 1:
-            chain.insert(0, first)
-        while chain and 1 < len(chain[-1].effects) < rules.most:
-            more = _extended(chain[-1], search, fitter, effects, least, mapped)
-            # What the noise of a measured motion makes of friction at its reversals is no further effect.
-            left = max(chain[-1].misfit - evidence.expected_at(chain[-1].plant), 0.0)
-            least_more = max(SECOND * least, rules.more * left)
-            more = [m for m in more if chain[-1].misfit - m.misfit > least_more and not within_tolerance(m, evidence)]
-            if not more:
-                break
+        chain = [fit for fit in plain(tried, least) if fit.effects][:1]
+        if rules.most > KNOWN.most:
+            more, chain = grown(tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), mapped)
             tried += more
-            chain.append(min(_plain(more, least), key=_priced, default=more[0]))
-        if chain and rules.most > KNOWN.most:
-            # What may stand in each effect's place, now that the others are known.
-            known = {frozenset(fit.effects) for fit in tried}
-            alike = [pair for pair in search.alike(chain[-1], effects) if frozenset(pair[0]) not in known]
-            others = sorted(mapped(lambda pair: search.refined(*pair), alike), key=_priced)
-            near = [fit for fit in others[:REFITTED] if fit.misfit < chain[-1].misfit + NEAR * _left(nothing.misfit, evidence)]
-            tried += mapped(fitter.settled, near)
-    tried = _plain(tried, least)
+    tried = plain(tried, least)
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
     return _judged(nothing, tried, evidence, silent, rules, chain)
-
-
-def _extended(
-    leader: Fit,
-    search: Fitter,
-    fitter: Fitter,
-    effects: Sequence[Effect],
-    least: float,
-    mapped: Callable[[Callable[..., Fit], Iterable[object]], list[Fit]],
-) -> list[Fit]:
-    """Fits of one effect more than a leader's, the best first."""
-    hopes = sorted(search.seconds(leader, effects, least), key=lambda hope: hope.promised)[:MANY]
-    found = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopes)
-    found.sort(key=_priced)
-    return sorted(mapped(fitter.settled, found[:SETTLED_PAIRS]), key=_priced)
 
 
 def _once(hopes: Sequence[Hope]) -> list[Hope]:
@@ -221,10 +171,6 @@ def _once(hopes: Sequence[Hope]) -> list[Hope]:
     for hope in hopes:
         found.setdefault(frozenset(effect.name for effect in hope.effects), hope)
     return list(found.values())
-
-
-def _priced(fit: Fit) -> float:
-    return fit.misfit + PRICE * sum(len(effect.kind.parameters) for effect in fit.effects)
 
 
 def _left(misfit: float, evidence: Evidence) -> float:
@@ -236,41 +182,23 @@ def detectable(evidence: Evidence) -> float:
     return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
-CONTAINED = {"two_lags": "lag"}
-"""Kind → the simpler one that it becomes at the end of its range."""
-
-
-def _plain(tried: Sequence[Fit], least: float) -> list[Fit]:
-    """The fits less those in which a simpler effect would do as well."""
-    misfits = {frozenset((e.kind.name, e.group) for e in fit.effects): fit.misfit for fit in tried}
-    found = []
-    for fit in tried:
-        names = {(e.kind.name, e.group) for e in fit.effects}
-        simpler = [
-            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)}) for kind, group in names if kind in CONTAINED
-        ]
-        if not any(other in misfits and misfits[other] - fit.misfit < least for other in simpler):
-            found.append(fit)
-    return found
-
-
 def _judged(
     nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...], rules: Rules, chain: Sequence[Fit]
 ) -> Attribution:
     gap = max(nothing.misfit - evidence.expected, 0.0)
-    pool = sorted([*tried, nothing], key=_priced)
+    pool = sorted([*tried, nothing], key=priced)
     best = pool[0]
     expected = evidence.expected_at(best.plant)
     temper = TEMPER + FORM_TEMPER * max(best.misfit - expected, 0.0)
-    apart = np.array([(_priced(fit) - _priced(best)) / (2.0 * temper) for fit in pool])
+    apart = np.array([(priced(fit) - priced(best)) / (2.0 * temper) for fit in pool])
     if evidence.machine.rough:
         # What is left is no noise but the model's error: as many pieces of it as are independent speak for one against another.
-        relative = np.array([(_priced(fit) + expected) / (_priced(best) + expected) for fit in pool])
+        relative = np.array([(priced(fit) + expected) / (priced(best) + expected) for fit in pool])
         apart = 0.5 * _independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
-    ranking = tuple(Explanation(fit, _priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
-    found = nothing.misfit - _priced(best) > detectable(evidence) and bool(best.effects)
+    ranking = tuple(Explanation(fit, priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
+    found = nothing.misfit - priced(best) > detectable(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
     left = max(best.misfit - expected, 0.0) / expected

@@ -34,7 +34,7 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.formula_replay import formula_deviation
 from rigtwin.diagnosis.freeform import Disturbed, located
-from rigtwin.diagnosis.leftover import leftovers, steps
+from rigtwin.diagnosis.leftover import leftovers, steps, without_each
 from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
 from rigtwin.diagnosis.next_test import Test, proposed
 from rigtwin.diagnosis.place import placed
@@ -57,6 +57,8 @@ WIDER = 2.5
 """Times the statistical interval that is reported: a model's form is never exact."""
 TRACE = 0.01
 """Share of a rough model's gap below which an effect is not claimed."""
+NOTICED = 4.0
+"""Times the power that is left without an effect that is claimed all the same, all others fitted again: twice the gap."""
 SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
@@ -157,7 +159,8 @@ def _diagnosed(
     )
     attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
-    traces = tuple(each for each in attributed if evidence.machine.rough and each.share < TRACE)
+    lost = without_each(evidence, best) if evidence.machine.rough else {}
+    traces = tuple(each for each in attributed if lost and each.share < TRACE and lost[str(each.name)] < NOTICED)
     effects = [
         *(each for each in attributed if each not in traces),
         *(_sampled(each) for each in sampled),
@@ -194,7 +197,7 @@ def _diagnosed(
         tuple(str(recording.path) for recording in evidence.recordings),
         seconds,
         evidence.machine.name,
-        steps(evidence, found.chain, held_out, others) if evidence.machine.rough else (),
+        steps(evidence, found.chain if verdict != "no gap" else (), held_out, others) if evidence.machine.rough else (),
         {row.name: row.unit for row in evidence.machine.rows},
         tuple(leftovers(evidence, plant, disturbed)) if verdict != "no gap" and evidence.machine.rough else (),
         traces,

@@ -88,6 +88,7 @@ def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, 
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
     weight, spread = np.empty((rows, int(kept.sum()))), np.empty((rows, int(kept.sum())))
     for row in range(rows):
+        form = machine.form_of(machine.rows[row])
         swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
@@ -95,9 +96,9 @@ def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, 
             spread[row] += 0.5 * _smoothed(np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY)
         if machine.rough:
             # A rough model does not know how what it lacks is spread over the lines.
-            variance = spread[row] + 0.5 * machine.form**2 * float(np.mean(power)) + 1e-300
+            variance = spread[row] + 0.5 * form**2 * float(np.mean(power)) + 1e-300
         else:
-            variance = spread[row] + 0.5 * machine.form**2 * _smoothed(power) + 1e-300
+            variance = spread[row] + 0.5 * form**2 * _smoothed(power) + 1e-300
             # What a signal's swing is held to says nothing of its mean.
             variance[0] = spread[row, 0] + 1e-300
         weight[row] = off_mains / np.sqrt(variance)

@@ -132,7 +132,14 @@ def _damping(scale: Scales) -> float:
     return scale.force / scale.speed
 
 
-LATE = _around(lambda scale: scale.time, (0.003, 0.012, 0.05, 0.15), 0.001)
+def _late(_effect: Effect, _plant: Any, scale: Scales, _swing: Swing) -> Trials:
+    """Times of a few ticks, and of a share of the motion's own."""
+    times = sorted(
+        {*(ticks * scale.period for ticks in (0.5, 2.0, 6.0)), *(share * scale.time for share in (0.012, 0.05, 0.15))}
+    )
+    return Trials(tuple((time,) for time in times), (min(0.001 * scale.time, 0.25 * scale.period),))
+
+
 GAIN: Searched = lambda _effect, _plant, _scale, _swing: Trials(((0.8,), (0.93,), (1.07,), (1.2,)), (0.004,))  # noqa: E731
 ANY = (ForceActuator, PositionActuator, PositionSensor, VelocitySensor, ForceSensor)
 JOINT_TRIALS: dict[tuple[str, type], Searched] = {
@@ -147,13 +154,13 @@ JOINT_TRIALS: dict[tuple[str, type], Searched] = {
     ("drag", Guide): _around(lambda s: s.force / s.speed**2, (-0.3, -0.05, 0.05, 0.3), 0.005),
     ("backlash", Guide): _around(lambda s: s.stroke, (0.003, 0.01, 0.04, 0.12, 0.4), 0.002),
     ("compliance", Guide): _around(lambda s: s.stroke / s.force, (0.002, 0.01, 0.05, 0.2, 0.8), 0.002),
-    ("relaxation", Guide): LATE,
+    ("relaxation", Guide): _late,
     ("cogging", Guide): _cogging,
     ("two_lags", PositionActuator): _two_lags,
     ("resonance", PositionActuator): _resonance,
     **{("gain", of): GAIN for of in ANY},
-    **{("lag", of): LATE for of in ANY},
-    **{("delay", of): LATE for of in ANY},
+    **{("lag", of): _late for of in ANY},
+    **{("delay", of): _late for of in ANY},
     **{("offset", of): _offset for of in (PositionActuator, PositionSensor, VelocitySensor, ForceSensor)},
     **{("saturation", of): _limit("largest") for of in (ForceActuator, PositionActuator)},
     **{("rate_limit", of): _limit("fastest") for of in (ForceActuator, PositionActuator)},

@@ -10,7 +10,7 @@ import numpy as np
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
-from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.fit import Fit, Fitter, possible
 from rigtwin.diagnosis.freeform import Disturbed
 from rigtwin.diagnosis.place import placed
 from rigtwin.machine.replaying import Setup
@@ -31,7 +31,7 @@ def steps(
     for fit in chain:
         names = {effect.name for effect in fit.effects}
         added = " + ".join(effect.name for effect in fit.effects if effect.name not in before)
-        gone = " without ".join(["", *sorted(before - names)])
+        gone = " and ".join(sorted(before - names))
         values: dict[str, Estimate] = {}
         for effect, numbers in zip(fit.effects, fit.values, strict=True):
             if effect.name in before:
@@ -40,7 +40,8 @@ def steps(
             for (name, quantity), value in zip(effect.quantities().items(), numbers, strict=True):
                 unit = evidence.machine.unit(effect.group, quantity)
                 values[name] = Estimate(value, value, value, nominal[name], unit)
-        found.append(Step(f"with {added}{gone}", values, remaining(judged, fit.plant)))
+        said = " ".join(part for part in (f"with {added}" if added else "", f"without {gone}" if gone else "") if part)
+        found.append(Step(said, values, remaining(judged, fit.plant)))
         before = names
     return tuple(found)
 
@@ -56,6 +57,21 @@ def remaining(evidence: Evidence, plant: Any) -> dict[str, float]:
         ]
         rows[name] = rms(np.concatenate(parts))
     return rows
+
+
+def without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
+    """Effect → power of what is left without it, the others fitted again, as a multiple of what is left with it."""
+    fitter = Fitter(evidence)
+    found = {}
+    for number, effect in enumerate(fit.effects):
+        kept = [place for place in range(len(fit.effects)) if place != number]
+        others = tuple(fit.effects[place] for place in kept)
+        if not possible(others, evidence.plant):
+            found[effect.name] = np.inf
+            continue
+        again = fitter.refined(others, [fit.values[place] for place in kept])
+        found[effect.name] = again.misfit / max(fit.misfit, 1e-9)
+    return found
 
 
 def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) -> list[Place]:

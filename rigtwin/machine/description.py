@@ -52,8 +52,8 @@ UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", 
 """What is measured → its unit where the joint slides, and where it turns."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-NOMINAL = {"known": 0.004, "rough": 0.01}
-"""How well the nominal values are known → share of a signal that no model is held to, where a description does not say."""
+NOMINAL = ("known", "rough")
+"""How well the nominal values are known."""
 
 
 class _Mistakes(list[str]):
@@ -120,7 +120,7 @@ class _Reader:
         nominal = about.get("nominal", "rough")
         if nominal not in NOMINAL:
             note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(NOMINAL)}")
-        form = self._number("[machine] form", about.get("form", NOMINAL.get(str(nominal), 0.01)), 1e-6, 0.5)
+        form = self._number("[machine] form", about["form"], 1e-6, 0.5) if "form" in about else None
         mechanism = self._mechanism(about)
         given = self._document.get("components")
         if not isinstance(given, Mapping) or not given:

@@ -12,6 +12,8 @@ from controllers.quantity import Quantity
 from rigtwin.effects import Effect, candidates
 from rigtwin.machine.tolerance import Tolerance
 
+FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
+"""Kind of signal → share of it that no model is held to, where a description does not say: of forces less is known."""
 TURNING = {
     "m": "rad",
     "N": "Nm",
@@ -91,7 +93,8 @@ class Control:
 @dataclass(frozen=True)
 class Machine:
     """The whole description. plant: a NamedTuple of components, as rigtwin.parts and rigtwin.parameters define them; rough:
-    whether its nominal values are only a start; form: share of a signal that no model is held to."""
+    whether its nominal values are only a start; form: share of a signal that no model is held to, None for
+    the usual one."""
 
     name: str
     title: str
@@ -103,13 +106,17 @@ class Machine:
     replays: tuple[ReplayOf, ...]
     control: Control | None
     rough: bool
-    form: float
+    form: float | None
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
     def rows(self) -> tuple[Row, ...]:
         """All observed signals, replay by replay."""
         return tuple(row for replay in self.replays for row in replay.rows)
+
+    def form_of(self, row: Row) -> float:
+        """Share of a signal that no model is held to."""
+        return self.form if self.form is not None else FORM[row.kind]
 
     def effects(self) -> Iterator[Effect]:
         """All effects that this machine can have. A computer's delay is only told from an actuator's where there are
