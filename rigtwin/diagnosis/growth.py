@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, possible
+from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values
 from rigtwin.effects import Effect
+from rigtwin.parts import Guide
 
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
@@ -73,6 +74,8 @@ SECOND = 2.0
 """Times what a first effect must explain that each further one must."""
 NEAR = 0.2
 """Share of what is explained that an explanation with one effect replaced may lack."""
+BEHIND = ("compliance", "backlash")
+"""Kinds that hide their gateway."""
 Mapped = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
 
 
@@ -130,11 +133,35 @@ def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
     evidence = growth.fitter.evidence
     hopes = sorted(growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised)[:TRIED]
     found = mapped(lambda hope: growth.search.refined(hope.effects, hope.values, hope.space), hopes)
+    found += mapped(lambda start: growth.search.refined(*start), _through(leader, growth))
     found = mapped(growth.fitter.settled, sorted(found, key=priced)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
     left = max(leader.misfit - evidence.expected_at(leader.plant), 0.0)
     enough = max(SECOND * growth.least, growth.more * left)
-    return [fit for fit in found if leader.misfit - fit.misfit > enough and not within_tolerance(fit, evidence)]
+    accepted = []
+    for fit in found:
+        further = len(fit.effects) - len(leader.effects)
+        if leader.misfit - fit.misfit > further * enough and not within_tolerance(fit, evidence):
+            accepted.append(fit)
+    return accepted
+
+
+def _through(leader: Fit, growth: Growth) -> list[tuple[tuple[Effect, ...], Values]]:
+    """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly resembles friction alone."""
+    search = growth.search
+    found = []
+    for gate in growth.effects:
+        if gate.kind.name != GATEWAY or gate.of is not Guide or clashing(gate, leader.effects):
+            continue
+        for other in growth.effects:
+            if other.group != gate.group or other.kind.name not in BEHIND or len(leader.effects) + 2 > growth.most:
+                continue
+            effects = (*leader.effects, gate, other)
+            starts = [(*leader.values, one, two) for one in search.trials(gate).starts for two in search.trials(other).starts]
+            residuals = (search.evidence.residual(with_values(search.plant, effects, start)) for start in starts)
+            scored = [(search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True)]
+            found.append((effects, min(scored)[1]))
+    return found
 
 
 def _pruned(best: Fit, growth: Growth) -> list[Fit]:

@@ -397,16 +397,16 @@ class _Reader:
                 self._mistakes.note(where, f"unknown key {key!r}; {_near(key, ('name', 'moved_by', 'observe'))}")
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
-        known = [name for name, kind in self._types.items() if kind in (*MOVING, "position sensor")]
+        known = [name for name, kind in self._types.items() if kind in (*MOVING, "position sensor", "velocity sensor")]
         if not isinstance(movers, list) or not movers:
             self._mistakes.note(
                 where,
-                f"moved_by is missing; expected an actuator or a position sensor: {', '.join(known) or 'none is described'}",
+                f"moved_by is missing; expected an actuator or a sensor of the motion: {', '.join(known) or 'none is described'}",
             )
             movers = []
         for mover in movers:
             if mover not in known:
-                self._mistakes.note(where, f"moved_by {mover!r} is no actuator or position sensor; {_near(mover, known)}")
+                self._mistakes.note(where, f"moved_by {mover!r} is no actuator or sensor of the motion; {_near(mover, known)}")
         rows = [row for name in self._observed(where, table) if (row := self._row(where, name, movers, control)) is not None]
         if len(self._mistakes) > before:
             return None

@@ -50,7 +50,8 @@ class JointReplay:
         self._motion: Array | None = None
         self._error = 0.0
         kind = getattr(machine.plant, self._mover.name)
-        if isinstance(kind, PositionSensor):
+        self._integrated = isinstance(kind, VelocitySensor)
+        if isinstance(kind, PositionSensor | VelocitySensor):
             self._motion, self._error = smoothed(recording.column(topic, name), self._period)
         elif not replay.closed:
             self._command = recording.column(topic, name)
@@ -122,7 +123,8 @@ class JointReplay:
                 position = followed(mover, self._command, plant.computer.delay, self._period, self._steps)
                 error = 0.0
             else:
-                position, error = self._unsensed(mover), self._error / max(mover.gain, 1e-9)
+                position = self._unsensed(mover)
+                error = 0.0 if self._integrated else self._error / max(mover.gain, 1e-9)
             out = self._carried(plant, position if shift is None else position + shift, error)
             if force is not None:
                 out[2] -= force
@@ -130,8 +132,9 @@ class JointReplay:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
-    def _unsensed(self, sensor: PositionSensor) -> Array:
-        """The motion behind a measured one: the sensor's offset, gain, lag and delay undone."""
+    def _unsensed(self, sensor: PositionSensor | VelocitySensor) -> Array:
+        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone. Of a velocity its mean is no
+        motion, as what is tested does not move away."""
         assert self._motion is not None
         signal = self._motion
         if sensor.lag > 0.0:
@@ -139,7 +142,8 @@ class JointReplay:
         if sensor.delay != 0.0:
             ticks = np.arange(len(signal))
             signal = np.interp(ticks + sensor.delay / self._period, ticks, signal)
-        return (signal - sensor.offset) / sensor.gain
+        signal = (signal - sensor.offset) / sensor.gain
+        return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
     def _carried(self, plant: Any, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
@@ -264,7 +268,7 @@ class JointReplay:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
-        if self._motion is not None and self._error > 0.0:
+        if self._motion is not None and self._error > 0.0 and not self._integrated:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smoothed(self._motion + level * random.standard_normal(ticks), self._period)

@@ -1,0 +1,29 @@
+"""Makes examples/damper.csv and damper-again.csv: what a data logger would write of a damper with friction, a spring and play."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rigtwin.blindcheck.benches import DamperTruth, damper_force, sampled, wander
+
+TRUTH = DamperTruth(slip=85.0, spring=5e4, lost=2.4e-3, viscous=(640.0, 640.0))
+PERIOD, FINE, SECONDS = 2e-3, 8, 10.0
+
+
+def written(path: Path, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    motion = wander(random, SECONDS, PERIOD / FINE, 0.03, 0.2, 2.5)
+    force = damper_force(TRUTH, motion, np.gradient(motion, PERIOD / FINE))
+    position, load = sampled(random, motion[::FINE], 4e-6, 1e-6), sampled(random, force[::FINE], 1.2, 0.1)
+    lines = ["Logger 4711;;", "Prüfling: Dämpfer 3;;", "Zeit;Weg;Kraft", "s;mm;N"]
+    for tick, (x, f) in enumerate(zip(position, load, strict=True)):
+        lines.append(f"{tick * PERIOD:.3f};{1e3 * x:.3f};{f:.1f}".replace(".", ","))
+    path.write_text("\n".join(lines) + "\n", encoding="latin-1")
+
+
+if __name__ == "__main__":
+    folder = Path(__file__).parent.parent / "examples"
+    written(folder / "damper.csv", 31)
+    written(folder / "damper-again.csv", 32)
