@@ -145,6 +145,8 @@ def _diagnosed(
     notes = [*_notes(evidence.recordings), *_clipped(evidence)]
     progress("judging on held-out data", 1)
     verdict_of_data = judged(evidence, best, held_out, others)
+    if verdict_of_data.fit is not None:
+        best = verdict_of_data.fit
     if verdict_of_data.rejected:
         names = " and ".join(effect.name for effect in verdict_of_data.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
@@ -231,7 +233,7 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
 def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[Finding]:
     if found.best is None:
         return []
-    fit = found.best.fit
+    fit = outcome.fit or found.best.fit
     widths = [
         tuple(
             # A rough model's error is no noise: how far it leads astray shows between one half of the data and the other.

@@ -99,6 +99,7 @@ class Judged:
     rejected: tuple[Effect, ...]
     data: str
     halves: tuple[Fit, ...] = ()
+    fit: Fit | None = None
 
 
 def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
@@ -146,8 +147,11 @@ def judged(
             return outside(with_effects(evidence.plant, fit, kept))
 
         kept, rejected = gated(fit.effects, kept_outside, worse)
+        if rejected and evidence.machine.rough:
+            values = [own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept]
+            fit = Fitter(evidence).settled(Fitter(evidence).refined(kept, values))
         apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
-        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart))
+        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit)
     parts, fits = _halved(evidence, fit)
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
@@ -176,10 +180,14 @@ def gated(effects: Effects, across: Callable[[Effects], Blocks], worse: float = 
     """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
     of the effects."""
     kept = effects
-    for effect in effects:
-        without = tuple(other for other in kept if other != effect)
-        if not len((left := across(kept)).after):
+    while kept:
+        left = across(kept)
+        if not len(left.after):
             break
-        if float(left.after.mean()) > worse * float(across(without).after.mean()):
-            kept = without
+        # One that is far off spoils the others' standing: the worst goes first.
+        without = {effect: across(tuple(other for other in kept if other != effect)) for effect in kept}
+        worst = min(kept, key=lambda effect: float(without[effect].after.mean()))
+        if float(left.after.mean()) <= worse * float(without[worst].after.mean()):
+            break
+        kept = tuple(other for other in kept if other != worst)
     return kept, tuple(effect for effect in effects if effect not in kept)

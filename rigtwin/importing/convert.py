@@ -17,8 +17,8 @@ from rigtwin.recording import Writer
 
 FLAT = 8
 """Equal samples in a row at a signal's very end of range, with a step into them: it is cut off there."""
-ABRUPT = 3.0
-"""Times a signal's typical step with which it runs into such a stretch."""
+ABRUPT, BITS = 0.1, 2.0
+"""Share of a signal's typical step, and its smallest steps, with which it runs into such a stretch at least."""
 JITTER = 0.5
 """Share of the period by which a time stamp may be off."""
 BLOCK = 10_000
@@ -185,11 +185,11 @@ def _oddities(values: Array, time: Array) -> list[str]:
         return [f"is {values[0]:g} throughout"]
     found = []
     steps = np.abs(np.diff(values))
-    typical = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    abrupt = max(ABRUPT * float(np.median(steps[steps > 0])), BITS * float(np.min(steps[steps > 0])))
     for end, extreme in (("above", values.max()), ("below", values.min())):
         flat = np.diff(np.concatenate([[0], (values == extreme).astype(np.int8), [0]]))
         for start, stop in zip(np.nonzero(flat == 1)[0], np.nonzero(flat == -1)[0], strict=True):
-            if stop - start >= FLAT and start > 0 and steps[start - 1] > ABRUPT * typical:
+            if stop - start >= FLAT and start > 3 and np.max(steps[start - 3 : start]) > abrupt:
                 share = 100.0 * float(np.mean(values == extreme))
                 found.append(f"is cut off {end} {extreme:.6g} ({share:.2g} % of the ticks), first at {time[start]:.4g} s")
                 break

@@ -401,7 +401,7 @@ class _Reader:
         if not isinstance(movers, list) or not movers:
             self._mistakes.note(
                 where,
-                f"moved_by is missing; expected an actuator or a sensor of the motion: {', '.join(known) or 'none is described'}",
+                f"moved_by is missing; expected an actuator or a sensor of the motion: {', '.join(known) or 'there is none'}",
             )
             movers = []
         for mover in movers:

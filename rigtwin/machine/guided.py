@@ -155,9 +155,17 @@ def pushed(
                         loop.registers[number] = transduced(sensors[each], states[each], x if kinds[each] == 0 else v)
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
+            earlier = force
             force = min(max(constant * conditioned(drive, held, command[tick]), -limit), limit)
             coefficient = damping(guide, v)
-            load = force + besides[tick] - gravity(inertia, x) - resting(guide, x, inertia.rest) - (1.0 - share) * viscous
+            # About this position half a step passes under the old force and half under the new one.
+            load = (
+                0.5 * (earlier + force)
+                + besides[tick]
+                - gravity(inertia, x)
+                - resting(guide, x, inertia.rest)
+                - (1.0 - share) * viscous
+            )
             total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
             rhs = inertia.mass * v + h * load
             forward, backward = limits(guide, v)

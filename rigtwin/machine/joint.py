@@ -26,6 +26,10 @@ ELASTIC = 0.3
 """Times a measured motion's error over which friction that reverses builds up at least."""
 SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
+RUNAWAY = 1e6
+"""In any unit of a joint: no machine goes there."""
+BEGINNING = 0.03
+"""s, from which a joint's motion at the start is estimated."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
@@ -87,8 +91,10 @@ class JointReplay:
             if channel is not None and isinstance(getattr(self._machine.plant, name), PositionSensor):
                 measured.append(channel)
         for channel in measured:
-            motion, _ = smoothed(self._recording.column(*channel), self._period)
-            return float(motion[0]), float((motion[1] - motion[0]) / self._period)
+            ticks = min(max(8, round(BEGINNING / self._period)), self._recording.ticks)
+            time = np.arange(ticks) * self._period
+            curve = np.polynomial.Polynomial.fit(time, self._recording.column(*channel)[:ticks], 2)
+            return float(curve(0.0)), float(curve.deriv()(0.0))
         return 0.0, 0.0
 
     def _parts(self, plant: Any) -> tuple[Guide, Inertia]:
@@ -128,6 +134,8 @@ class JointReplay:
             out = self._carried(plant, position if shift is None else position + shift, error)
             if force is not None:
                 out[2] -= force
+        # A plant that is not stable runs away; it must be a bad explanation, not an impossible number.
+        out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out

@@ -1,0 +1,154 @@
+"""The same engine on other machines: benches of the referee's own code, and a real machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.benches import recording_of
+from rigtwin.blindcheck.bench_cases import ACTUATORS, DAMPERS, Case, drawn
+from rigtwin.blindcheck.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, wander
+from rigtwin.diagnosis.diagnose import Outcome, diagnose
+from rigtwin.diagnosis.place import travelled
+from rigtwin.importing.convert import convert
+from rigtwin.machine.library import SHIPPED, find
+from rigtwin.machine.setting import nominal
+from rigtwin.recording import load
+
+EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"
+SINGLE = {
+    "lag": (ActuatorTruth(lags=(0.02,)), {"lag@actuator": 0.02}),
+    "two lags": (ActuatorTruth(lags=(0.03, 0.009)), {"two_lags@actuator": 0.03}),
+    "lag and delay": (ActuatorTruth(lags=(0.025,), late=0.012), {"lag@actuator": 0.025, "delay@actuator": 0.012}),
+    "resonance": (ActuatorTruth(own=(6.0, 0.4)), {"resonance@actuator": 6.0}),
+    "friction": (DamperTruth(slip=80.0), {"coulomb@damper": 80.0}),
+    "spring": (DamperTruth(slip=80.0, spring=4e4), {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5}),
+    "play": (DamperTruth(slip=80.0, lost=0.003), {"coulomb@damper": 80.0, "backlash@damper": 0.003}),
+    "spring and play": (
+        DamperTruth(slip=80.0, spring=4e4, lost=0.003),
+        {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5, "backlash@damper": 0.003},
+    ),
+    "one way": (
+        DamperTruth(slip=30.0, viscous=(2000.0, 900.0)),
+        {"viscous@damper": 1450.0, "viscous_asymmetry@damper": 1100.0, "coulomb@damper": 30.0},
+    ),
+}
+"""Truth → effects to be named, with their magnitudes."""
+
+
+def answered(truth: ActuatorTruth | DamperTruth, seed: int = 5) -> Outcome:
+    machine = "actuator" if isinstance(truth, ActuatorTruth) else "damper"
+    recording = recording_of(Case(machine, frozenset(), truth, 1e-3, seed))
+    described = find(recording.machine)
+    return diagnose(described, [recording], nominal(described))
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_what_is_in_a_bench_is_named_with_its_size(name: str):
+    truth, effects = SINGLE[name]
+    found = answered(truth).diagnosis
+    assert {str(effect.name) for effect in found.effects} == set(effects)
+    for effect in found.effects:
+        value = next(iter(effect.parameters.values())).value
+        # Half a tick is nobody's to know.
+        slack = 6e-4 if effect.name.kind == "delay" else 0.0
+        assert value == pytest.approx(effects[str(effect.name)], rel=0.02, abs=slack)
+    assert found.gap is not None
+    assert found.gap.shrinkage_held_out.value > 0.9
+
+
+@pytest.mark.parametrize("truth", [ActuatorTruth(), DamperTruth()], ids=["actuator", "damper"])
+def test_a_bench_without_anything_has_no_gap(truth):
+    found = answered(truth).diagnosis
+    assert found.verdict == "no gap"
+    assert not found.effects
+
+
+def test_play_lies_within_a_few_millimetres_after_a_reversal():
+    found = answered(SINGLE["spring and play"][0]).diagnosis
+    (place,) = [place for place in found.where if place.evidence.startswith("backlash")]
+    assert place.region.endswith("mm after a reversal")
+    assert 2.0 < float(place.region.split()[1]) < 8.0
+
+
+def test_what_was_found_one_after_another_is_told():
+    found = answered(SINGLE["spring and play"][0]).diagnosis
+    left = [step.left["load_cell"] for step in found.steps]
+    assert found.steps[0].added == "nominal"
+    assert left[-1] < 0.05 * left[0]
+    document = found.document()
+    assert document["steps"][1]["added"].startswith("with ")
+    assert document["machine"] == "damper-bench"
+
+
+def test_distance_since_a_reversal():
+    there = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.linspace(0.4, 0.9, 51)[1:]])
+    found = travelled(there)
+    assert found[100] == pytest.approx(1.0)
+    assert found[110] == pytest.approx(0.1)
+    assert found[160] == pytest.approx(0.6)
+    assert found[170] == pytest.approx(0.1)
+
+
+# The referee's benches themselves.
+
+
+def test_the_bench_actuator_has_its_frequency_response():
+    time = np.arange(20_000) * 1e-3
+    truth = ActuatorTruth(lags=(0.02, 0.01), late=0.005)
+    w = 2 * np.pi * 3.0
+    out = actuator_position(truth, np.sin(w * time), 1e-3)
+    last = slice(10_000, 20_000)
+    found = 2.0j * np.mean(out[last] * np.exp(-1j * w * time[last]))
+    expected = np.exp(-1j * w * (0.005 + 0.5e-3)) / ((1 + 0.02j * w) * (1 + 0.01j * w))
+    assert abs(found - expected) < 0.003
+
+
+def test_the_bench_damper_loses_what_its_friction_eats():
+    """Work over a cycle: 4·F·(a − F/k − b/2) of a stop behind a spring and a play, and π·c·w·a² of the viscous part."""
+    time = np.arange(100_001) * 1e-5
+    motion = 0.02 * np.cos(2 * np.pi * time)
+    speed = np.gradient(motion, 1e-5)
+    truth = DamperTruth(slip=80.0, spring=4e4, lost=0.003, viscous=(200.0, 200.0))
+    force = damper_force(truth, np.concatenate([motion, motion]), np.concatenate([speed, speed]))[100_001:]
+    work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(motion)))
+    expected = 4 * 80.0 * (0.02 - 80.0 / 4e4 - 0.0015) + np.pi * 200.0 * 2 * np.pi * 0.02**2
+    assert work == pytest.approx(expected, rel=0.002)
+
+
+def test_motions_start_at_rest_and_keep_their_reach():
+    motion = wander(np.random.default_rng(1), 5.0, 1e-3, 0.03, 0.1, 3.0)
+    assert np.max(np.abs(motion)) == pytest.approx(0.03)
+    assert abs(motion[0]) < 1e-9
+
+
+def test_cases_are_drawn_the_same_again_and_hold_every_sort():
+    assert drawn(7, 1) == drawn(7, 1)
+    names = {tuple(sorted(drawn(n, 1).names)) for n in range(2 * len(ACTUATORS) * len(DAMPERS))}
+    assert names == {tuple(sorted(set(sort.split()) - {"none"})) for sort in (*ACTUATORS, *DAMPERS)}
+
+
+# A real machine.
+
+
+@pytest.mark.skipif(not EMPS.is_dir(), reason="the EMPS data are not here")
+def test_emps_on_its_held_out_recording(tmp_path: Path):
+    for data, name in (("DATA_EMPS", "emps"), ("DATA_EMPS_PULSES", "emps_pulses")):
+        convert(EMPS / f"{data}.mat", SHIPPED / "maps" / f"{name}.toml", tmp_path / f"{name}.mcap")
+    machine = find("emps")
+    fitted, held_out = (load(tmp_path / f"{name}.mcap") for name in ("emps", "emps_pulses"))
+    found = diagnose(machine, [fitted], nominal(machine), [held_out]).diagnosis
+    assert str(found.effects[0].name) == "coulomb@guide"
+    # Janot, Gautier and Brunot give 20.4 N.
+    assert found.effects[0].parameters["coulomb"].value == pytest.approx(20.4, abs=1.5)
+    left = [step.left["force"] for step in found.steps]
+    assert left[0] == pytest.approx(21.9, abs=0.2)
+    assert left[1] < 5.0
+    # A least-squares fit of mass, viscous, Coulomb and offset leaves 2.9 N.
+    assert min(left) < 2.0
+    assert found.gap is not None
+    assert found.gap.shrinkage_held_out.low > 0.85
+    assert found.verdict == "partly explained"
+    assert found.leftovers

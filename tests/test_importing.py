@@ -1,0 +1,233 @@
+"""Import: files as spreadsheets, loggers and MATLAB write them; what is odd in them is said; a mistake is one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from rigtwin.cli import main
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.convert import convert
+from rigtwin.importing.table import layout, read
+from rigtwin.importing.units import UNITS, unit_of
+from rigtwin.recording import load
+
+TICKS = 300
+TIME = np.arange(TICKS) * 0.002
+POSITION = 20.0 * np.sin(8.0 * TIME)
+FORCE = 150.0 * np.cos(8.0 * TIME) + 3.0
+MAP = """
+machine = "bench"
+experiment = "sines"
+[time]
+column = "t"
+[channels]
+"/sensor.displacement" = { column = "x", unit = "mm" }
+"/sensor.force" = { column = "f", unit = "N" }
+"""
+
+
+def text(separator: str = ",", decimal: str = ".", head: str = "", names: str = "t,x,f", units: str = "") -> str:
+    rows = [f"{t:.4f},{x:.6f},{f:.5f}" for t, x, f in zip(TIME, POSITION, FORCE, strict=True)]
+    body = [row.replace(",", "|").replace(".", decimal).replace("|", separator) for row in rows]
+    lines = [*([head] if head else []), *([names.replace(",", separator)] if names else [])]
+    return "\n".join([*lines, *([units.replace(",", separator)] if units else []), *body]) + "\n"
+
+
+def imported(folder: Path, data: str | bytes, map_text: str = MAP, name: str = "data.csv"):
+    (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+    (folder / "map.toml").write_text(map_text)
+    report = convert(folder / name, folder / "map.toml", folder / "out.mcap")
+    return load(folder / "out.mcap"), report
+
+
+def assert_right(recording) -> None:
+    assert recording.machine == "bench"
+    assert recording.period == 0.002
+    np.testing.assert_allclose(recording.column("/sensor", "displacement"), 1e-3 * POSITION, atol=1e-8)
+    np.testing.assert_allclose(recording.column("/sensor", "force"), FORCE, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        text(),
+        text(";"),
+        text("\t"),
+        text("|"),
+        text(" "),
+        text(";", ","),
+        text("\t", ","),
+        text(";", ",", "Logger 7;;\nBediener: Müller;;"),
+        text(",", ".", "# made by nobody\n\n# 12 March 2026"),
+        text(",", ".", units="s,mm,N"),
+        text(";", ",", names="t [s];x [mm];f [N]".replace(";", ",")),
+        text().replace("\n", "\r\n"),
+        "\ufeff" + text(),
+        text().replace("\n", ",\n"),
+        text(" ").replace(" ", "    "),
+    ],
+    ids=range(15),
+)
+def test_text_is_read_however_it_is_written(tmp_path: Path, data: str):
+    assert_right(imported(tmp_path, data)[0])
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "latin-1", "utf-8-sig"])
+def test_any_encoding(tmp_path: Path, encoding: str):
+    assert_right(imported(tmp_path, text(";", ",", "Prüfstand 3;;").encode(encoding))[0])
+
+
+def test_units_of_the_file_are_used_where_the_map_has_none(tmp_path: Path):
+    bare = MAP.replace(', unit = "mm"', "").replace(', unit = "N"', "")
+    assert_right(imported(tmp_path, text(units="s,mm,N"), bare)[0])
+    assert_right(imported(tmp_path, text(names="t (s),x (mm),f (N)"), bare)[0])
+
+
+def test_scale_sign_offset_and_constants(tmp_path: Path):
+    changed = MAP.replace('unit = "N"', 'unit = "N", scale = 2.0, sign = -1, offset = 5.0')
+    recording, _ = imported(tmp_path, text(), changed + '"/command.pulse" = { constant = 4.0 }\n')
+    np.testing.assert_allclose(recording.column("/sensor", "force"), 5.0 - 2.0 * FORCE, atol=1e-3)
+    assert np.all(recording.column("/command", "pulse") == 4.0)
+
+
+def test_time_of_day_and_milliseconds(tmp_path: Path):
+    stamps = [f"2026-03-01T10:{int(t) // 60:02d}:{t % 60:09.6f}" for t in TIME]
+    lines = text().splitlines()
+    rows = [f"{s},{line.split(',', 1)[1]}" for s, line in zip(stamps, lines[1:], strict=True)]
+    assert_right(imported(tmp_path, "\n".join(["t,x,f", *rows]))[0])
+    rows = [f"{1e3 * t:.1f},{line.split(',', 1)[1]}" for t, line in zip(TIME, lines[1:], strict=True)]
+    assert_right(imported(tmp_path, "\n".join(["t,x,f", *rows]), MAP.replace('column = "t"', 'column = "t"\nunit = "ms"'))[0])
+
+
+def test_matlab_files(tmp_path: Path):
+    savemat(tmp_path / "data.mat", {"t": TIME[:, None], "x": POSITION[:, None], "f": FORCE[:, None], "gain": 3.0})
+    (tmp_path / "map.toml").write_text(MAP)
+    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert_right(load(tmp_path / "out.mcap"))
+    savemat(tmp_path / "data.mat", {"log": {"t": TIME, "both": np.column_stack([POSITION, FORCE])}})
+    names = MAP.replace('"t"', '"log.t"').replace('"x"', '"log.both:1"').replace('"f"', '"log.both:2"')
+    (tmp_path / "map.toml").write_text(names)
+    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert_right(load(tmp_path / "out.mcap"))
+
+
+def test_matlab_v73(tmp_path: Path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "data.mat", "w", userblock_size=512) as file:
+        file["t"], file["x"] = TIME[None, :], POSITION[None, :]
+        file.create_group("s")["f"] = FORCE[None, :]
+    with (tmp_path / "data.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    (tmp_path / "map.toml").write_text(MAP.replace('column = "f"', 'column = "s.f"'))
+    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert_right(load(tmp_path / "out.mcap"))
+
+
+def test_parquet(tmp_path: Path):
+    pyarrow = pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    parquet.write_table(pyarrow.table({"t": TIME, "x": POSITION, "f": FORCE}), tmp_path / "data.parquet")
+    (tmp_path / "map.toml").write_text(MAP)
+    convert(tmp_path / "data.parquet", tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert_right(load(tmp_path / "out.mcap"))
+
+
+def test_what_is_odd_is_said(tmp_path: Path):
+    lines = text().splitlines()
+    lines = [*lines[:100], lines[99], *lines[100:]]
+    clipped = [f"{a},{b},{min(float(c), 140.0)}" for a, b, c in (line.split(",") for line in lines[1:])]
+    recording, report = imported(tmp_path, "\n".join(["t,x,f", *clipped]) + "\n", MAP + '"/command.u" = { constant = 1.0 }\n')
+    said = "\n".join(report)
+    assert recording.ticks == TICKS
+    assert "1 rows were there twice" in said
+    assert "/sensor.force is cut off above 140" in said
+    assert "/command.u is 1 throughout" in said
+
+
+def test_resampling_only_when_asked(tmp_path: Path):
+    lines = text().splitlines()
+    gappy = "\n".join([*lines[:100], *lines[120:]])
+    with pytest.raises(RigtwinError, match=r"1 gaps in time, the first of 0\.042 s"):
+        imported(tmp_path, gappy)
+    recording, report = imported(tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nresample = 0.004'))
+    assert recording.period == 0.004
+    assert any("resampled" in line for line in report)
+    recording, _ = imported(tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nuntil = 0.19'))
+    assert recording.ticks == 96
+
+
+BAD_DATA = [
+    ("", "no lines of numbers"),
+    ("hello\nworld\n", "no lines of numbers"),
+    (text(names="t,y,f"), "no column 'x'; there are t, y, f"),
+    (text(names="t,x,x"), "two columns are named 'x'"),
+    (text() + "1,2\n", "line 302 has 2 cells; expected 3"),
+    (text() + "1,two,3\n", "line 302: two; expected numbers"),
+    (text() + "0.6,,3\n", "is not a number in 1 rows, the first at 0.6 s"),
+    (text() + "0.1,2,3\n", "time goes back in row 301"),
+    (text() + "0.5980,2,3\n", "has the same time as the one before"),
+    (b"\x00\x01\x02\x03" * 200, "no lines of numbers"),
+]
+
+
+@pytest.mark.parametrize(("data", "said"), BAD_DATA, ids=range(len(BAD_DATA)))
+def test_bad_data_is_one_line(tmp_path: Path, data, said: str):
+    with pytest.raises(RigtwinError) as caught:
+        imported(tmp_path, data)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out.mcap").exists()
+
+
+BAD_MAPS = [
+    (MAP.replace("machine", "machin"), "unknown key 'machin'"),
+    (MAP.replace('column = "t"', ""), "either column"),
+    (MAP.replace('column = "t"', 'column = "t"\nunit = "mm"'), "expected s, ms"),
+    (MAP.replace('unit = "mm"', 'unit = "furlong"'), "unknown unit 'furlong'"),
+    (MAP.replace('unit = "mm"', "sign = 2"), "expected 1 or -1"),
+    (MAP.replace('unit = "mm"', "scale = 0"), "expected anything else"),
+    (MAP.replace('unit = "mm"', 'scale = "2"'), "expected a number"),
+    (MAP.replace('unit = "mm"', "scal = 2"), "unknown key 'scal'"),
+    (MAP.replace('"/sensor.force"', '"force"'), 'expected "/command.NAME"'),
+    (MAP.split("[channels]")[0], "[channels] is missing"),
+    (MAP.replace('column = "x", unit = "mm"', ""), "either column"),
+    (MAP + "[controller]\nkp = [1]\n", "a table of settings"),
+    ("machine = ", "not valid TOML"),
+]
+
+
+@pytest.mark.parametrize(("map_text", "said"), BAD_MAPS, ids=range(len(BAD_MAPS)))
+def test_a_bad_map_is_one_line(tmp_path: Path, capsys, map_text: str, said: str):
+    (tmp_path / "data.csv").write_text(text())
+    (tmp_path / "map.toml").write_text(map_text)
+    arguments = ["import", str(tmp_path / "data.csv"), "--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "out.mcap")]
+    assert main(arguments) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["data.xlsx", "data.mat", "data.parquet"])
+def test_other_files_are_refused(tmp_path: Path, name: str):
+    with pytest.raises(RigtwinError):
+        imported(tmp_path, b"nothing of the sort" * 20, MAP, name)
+    with pytest.raises(RigtwinError, match="No such file"):
+        read(tmp_path / "absent.csv")
+
+
+def test_every_unit_has_an_si_unit_that_is_one_itself():
+    for name, (base, factor) in UNITS.items():
+        assert factor > 0.0
+        assert UNITS[base] == (base, 1.0), name
+    assert unit_of("[mm]") == ("m", 1e-3)
+
+
+def test_thousands_are_no_columns():
+    found = layout(["a;b", "1.234,5;2", "1.235,5;3", "1.236,5;4", "1.237,5;5", "1.238,5;6"])
+    assert found is not None
+    assert (found.separator, found.decimal) == (";", ",")

@@ -1,0 +1,216 @@
+"""Descriptions: what they give, every mistake in one line, and a new machine without any Python."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigtwin.cli import main
+from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.fit import possible
+from rigtwin.diagnosis.trials import searched, trials
+from rigtwin.effects import find as effect_of
+from rigtwin.machine.description import examined, load
+from rigtwin.machine.library import find, shipped
+from rigtwin.machine.setting import from_assignments, nominal, overridden, without
+from rigtwin.parameters import Plant
+from tests.described import MJCF, TOML, described, recording_of
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_shipped_machine_has_no_mistakes(name):
+    machine, mistakes = examined(shipped()[name])
+    assert mistakes == []
+    assert machine is not None
+    assert machine.name == name
+    assert machine.rows
+    assert all(row.unit for row in machine.rows)
+
+
+def test_the_suspension_rig_is_described_like_any_other():
+    machine = find("suspension-rig")
+    assert machine.plant == Plant()
+    assert [row.name for row in machine.rows] == ["ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell"]
+    assert len(machine.tolerances) == 20
+    tolerance = machine.tolerance_of("motor", "gain")
+    assert tolerance is not None
+    assert (tolerance.parameter, tolerance.half_width) == ("constant", 0.005)
+
+
+def test_nominal_values_come_from_the_mjcf_and_then_the_description(tmp_path: Path):
+    machine = described(tmp_path)
+    assert machine.plant.mass.mass == 2.0
+    assert (machine.plant.guide.stiffness, machine.plant.guide.viscous) == (150.0, 6.0)
+    text = TOML.replace('joint = "axis"', 'joint = "axis"\nviscous = { value = 9.0, tolerance = "5 %" }')
+    machine = described(tmp_path, toml=text)
+    assert machine.plant.guide.viscous == 9.0
+    tolerance = machine.tolerance_of("guide", "viscous")
+    assert tolerance is not None
+    assert tolerance.width(machine.plant) == pytest.approx(0.45)
+
+
+def test_units_follow_the_joint(tmp_path: Path):
+    slides, turns = described(tmp_path), described(tmp_path, "pendulum")
+    meaning = effect_of("viscous@guide", slides.plant).quantities()["viscous"]
+    assert slides.unit("guide", meaning) == "Ns/m"
+    assert turns.unit("guide", meaning) == "Nms/rad"
+    assert turns.rows[0].unit == "rad"
+
+
+def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
+    machine = described(tmp_path, "pendulum")
+    joint = machine.replays[0].joint
+    # A capsule of 1.5 kg hangs at 0.2 m; its inertia about the end is that of a rod and a little more.
+    assert joint.inertia == pytest.approx(1.5 * 0.4**2 / 3, rel=0.06)
+    load = np.interp(0.5, joint.positions, joint.gravity)
+    assert load == pytest.approx(1.5 * 9.81 * 0.2 * np.sin(0.5), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", [name for name in shipped() if name != "suspension-rig"])
+def test_every_effect_of_a_machine_can_be_searched_for(name):
+    from rigtwin.diagnosis.joint_trials import Scales
+    from rigtwin.diagnosis.trial import SHARES, Swing
+
+    machine = find(name)
+    scale = Scales(0.03, 0.1, 0.25, 0.8, 60.0, 1e-3)
+    for effect in machine.effects():
+        assert searched(effect), effect.name
+        swing = {effect.component: Swing((1.0,) * len(SHARES), (1.0,) * len(SHARES))}
+        found = trials(effect, machine.plant, swing, lambda _: scale)
+        quantities = list(effect.quantities().values())
+        assert len(found.steps) == len(quantities)
+        assert all(step > 0.0 for step in found.steps)
+        for start in found.starts:
+            assert all(q.low <= value <= q.high for q, value in zip(quantities, start, strict=True)), effect.name
+
+
+def test_what_acts_through_friction_needs_some():
+    machine = find("damper-bench")
+    play, dry = (effect_of(name, machine.plant) for name in ("backlash@damper", "coulomb@damper"))
+    assert not possible((play,), machine.plant)
+    assert possible((play, dry), machine.plant)
+
+
+MISTAKES = [
+    ('name = "bench"', "", "name is missing"),
+    ('name = "bench"', 'name = "b e n"', "expected letters"),
+    ('model = "bench.xml"', 'model = "other.xml"', "does not exist"),
+    ('model = "bench.xml"', "model = 3", "expected the name of an MJCF file"),
+    ('model = "bench.xml"', 'model = "bench.toml"', "model"),
+    ("[machine]", "[machin]", "unknown table [machin]; did you mean 'machine'?"),
+    ('body = "arm"', 'body = "leg"', "the MJCF has no body 'leg'"),
+    ('joint = "axis"', 'joint = "axes"', "did you mean 'axis'?"),
+    ('joint = "axis"', 'jiont = "axis"', "expected one of body, joint"),
+    ('joint = "axis"', 'joint = "axis"\nviscuos = 3.0', "did you mean 'viscous'?"),
+    ('joint = "axis"', 'joint = "axis"\nviscous = "3"', "expected a number"),
+    ('joint = "axis"', 'joint = "axis"\nviscous = -3', "expected a number from 0"),
+    ('joint = "axis"', 'joint = "axis"\nviscous = nan', "expected a number"),
+    (
+        'joint = "axis"',
+        'joint = "axis"\nviscous = { value = 3.0, tolerance = "much" }',
+        "expected a number in Ns/m or a percentage",
+    ),
+    ('joint = "axis"', 'joint = "axis"\nviscous = { valeu = 3.0 }', "did you mean 'value'?"),
+    ('joint = "axis"', 'joint = "axis"\ntype = "gide"', "did you mean 'guide'?"),
+    ('joint = "axis"', 'joint = "axis"\neffects = ["coulom"]', "did you mean 'coulomb'?"),
+    ('joint = "axis"', 'joint = "axis"\neffects = "coulomb"', "expected a list"),
+    ('joint = "axis"', 'joint = "axis"\ncommand = "x"', "command is for actuators"),
+    ('sensor = "encoder"', 'sensor = "encoder"\nunit = "mm"', "recordings are in SI"),
+    ("[components.mass]", "[components.computer]", "cannot be a component's name"),
+    ('moved_by = "drive"', 'moved_by = "dive"', "did you mean 'drive'?"),
+    ('moved_by = "drive"', "", "moved_by is missing"),
+    ('moved_by = "drive"', 'moved_by = ["drive", "encoder"]', "encoder moves the joint"),
+    ('observe = ["encoder"]', 'observe = ["encodr"]', "did you mean 'encoder'?"),
+    ('observe = ["encoder"]', "", "observe is missing"),
+    ("[[replays]]", "[[replay]]", "did you mean 'replays'?"),
+    ('[components.mass]\nbody = "arm"', "", "whose mass is no component"),
+    ("[[replays]]", '[controller]\noutput = "force"\nformula = "kp *"\n[[replays]]', "is no formula"),
+    ("[[replays]]", '[controller]\noutput = "farce"\nformula = "1"\n[[replays]]', "did you mean 'force'?"),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "1"\nsettings = { kp = 2 }\n[[replays]]',
+        "kp not in the formula",
+    ),
+    ("[machine]", "[machine", "not valid TOML"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTAKES)
+def test_a_mistake_is_one_line(tmp_path: Path, capsys, old: str, new: str, said: str):
+    (tmp_path / "bench.xml").write_text(MJCF.format(body='<joint name="axis" type="slide"/><geom size="0.05" mass="2"/>'))
+    path = tmp_path / "bench.toml"
+    assert old in TOML
+    path.write_text(TOML.replace(old, new, 1))
+    machine, mistakes = examined(path)
+    assert machine is None
+    assert any(said in mistake for mistake in mistakes), mistakes
+    assert all("\n" not in mistake for mistake in mistakes)
+    assert main(["machine", "check", str(path)]) == 1
+    assert said in capsys.readouterr().out
+
+
+def test_a_missing_description_is_said(tmp_path: Path, capsys):
+    assert main(["machine", "check", str(tmp_path / "none.toml")]) == 1
+    assert "No such file" in capsys.readouterr().out
+    with pytest.raises(Exception, match=re.escape("unknown machine 'nonsense'")):
+        find("nonsense")
+
+
+def test_settings_are_checked():
+    setup = nominal(find("emps"))
+    assert from_assignments(setup, ["guide.viscous=210", "controller.kp=150"]).settings["kp"] == 150.0
+    assert without(setup, "viscous@guide").plant.guide.viscous == 0.0
+    for changes, said in (
+        ({"gide": {}}, "unknown component"),
+        ({"guide": {"viscuos": 1}}, "unknown parameter"),
+        ({"guide": {"viscous": -1}}, "expected a number from 0"),
+        ({"controller": {"ki": 1}}, "unknown setting"),
+        ({"guide": 3}, "expected a table"),
+    ):
+        with pytest.raises(Exception, match=said):
+            overridden(setup, changes)
+
+
+def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:
+    """Position of 2 kg on a spring of 150 N/m with a friction that sets in over 0.2 mm/s, by Heun's rule in steps of 25 us."""
+    fine, step = 40, 2.5e-5
+
+    def acceleration(force: float, x: float, v: float) -> float:
+        return (force - 150.0 * x - viscous * v - slip * min(max(v / 2e-4, -1.0), 1.0)) / 2.0
+
+    x = v = 0.0
+    out = np.empty(len(command))
+    for tick, force in enumerate(command.tolist()):
+        out[tick] = x
+        for _ in range(fine):
+            here = acceleration(force, x, v)
+            there = acceleration(force, x + step * v, v + step * here)
+            x, v = x + step * (v + 0.5 * step * here), v + 0.5 * step * (here + there)
+    return out
+
+
+@pytest.mark.parametrize(("viscous", "slip", "kind"), [(6.0, 0.0, None), (14.0, 0.0, "viscous"), (6.0, 2.0, "coulomb")])
+def test_a_new_machine_takes_no_python(tmp_path: Path, viscous: float, slip: float, kind: str | None):
+    """A description and an MJCF in a folder, data of an independent integration, and the right answer."""
+    machine = described(tmp_path)
+    random = np.random.default_rng(3)
+    time = np.arange(8000) * 1e-3
+    command = sum(8.0 * np.sin(2 * np.pi * f * time + random.uniform(0, 6)) for f in (0.23, 0.61, 1.13, 1.9, 3.1))
+    position = truth(np.asarray(command), viscous, slip) + 1e-5 * random.standard_normal(8000)
+    found = diagnose(machine, [recording_of(machine, np.asarray(command), position)], nominal(machine)).diagnosis
+    if kind is None:
+        assert found.verdict == "no gap"
+        return
+    assert [str(effect.name) for effect in found.effects] == [f"{kind}@guide"]
+    value = found.effects[0].parameters[kind].value
+    assert value == pytest.approx(viscous if kind == "viscous" else slip, rel=0.03)
+
+
+def test_load_says_how_many_mistakes_there_are(tmp_path: Path):
+    path = tmp_path / "bench.toml"
+    path.write_text("[machine]\n")
+    with pytest.raises(Exception, match=r"name is missing \(and \d more"):
+        load(path)
