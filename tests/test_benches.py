@@ -86,9 +86,10 @@ def test_what_was_found_one_after_another_is_told():
 def test_distance_since_a_reversal():
     there = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.linspace(0.4, 0.9, 51)[1:]])
     found = travelled(there)
-    assert found[100] == pytest.approx(1.0)
+    assert found[99] == pytest.approx(0.99)
+    assert found[100] == 0.0
     assert found[110] == pytest.approx(0.1)
-    assert found[160] == pytest.approx(0.6)
+    assert found[159] == pytest.approx(0.59)
     assert found[170] == pytest.approx(0.1)
 
 

@@ -18,7 +18,7 @@ from rigtwin.recording import load
 TICKS = 300
 TIME = np.arange(TICKS) * 0.002
 POSITION = 20.0 * np.sin(8.0 * TIME)
-FORCE = 150.0 * np.cos(8.0 * TIME) + 3.0
+FORCE = 150.0 * np.cos(8.0 * TIME + 2.0) + 3.0
 MAP = """
 machine = "bench"
 experiment = "sines"

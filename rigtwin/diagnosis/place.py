@@ -27,8 +27,8 @@ LEAST = 0.1
 """Share of a difference's power that a region must hold."""
 MOST = 0.8
 """Share of a difference's power that lies within a distance after reversals."""
-CLEARER = 1.1
-"""How much clearer such a distance must be than a low speed."""
+CLEARER = 0.8
+"""How clear such a distance must be beside a low speed, which says less."""
 TURNED = 0.01
 """Share of the whole motion by which it must go back to have reversed."""
 
