@@ -176,7 +176,8 @@ def without(configuration: Configuration, name: str) -> Configuration:
 
 def _removable(effect: Effect, plant: Plant) -> bool:
     parameter, quantity = next(iter(effect.quantities().items()))
-    return effect.nominal(plant)[parameter] not in (0.0, quantity.high) and quantity.low <= 0.0
+    there = effect.nominal(plant)[parameter]
+    return there not in (0.0, quantity.high) and quantity.low <= 0.0 and effect.of not in DECLARED
 
 
 def applied(configuration: Configuration, texts: list[str]) -> Configuration:

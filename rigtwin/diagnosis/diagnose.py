@@ -193,7 +193,7 @@ def _diagnosed(
         gap,
         tuple((" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]),
         suggestion,
-        _unseen(found, effects),
+        _unseen(found, attributed),
         (),
         tuple(notes),
         tuple(str(recording.path) for recording in evidence.recordings),
@@ -262,11 +262,14 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
 def estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], evidence: Evidence) -> dict[str, Estimate]:
     """The parameters of an effect as fitted, with their intervals."""
     nominal = effect.nominal(evidence.plant)
+    # A delay cannot be known better than when in a tick the samples were taken.
+    timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
+    least = {"delay": timing / WIDER}
     return {
         name: Estimate(
             value,
-            max(value - WIDER * width, quantity.low),
-            min(value + WIDER * width, quantity.high),
+            max(value - WIDER * max(width, least.get(name, 0.0)), quantity.low),
+            min(value + WIDER * max(width, least.get(name, 0.0)), quantity.high),
             nominal[name],
             evidence.machine.unit(effect.group, quantity),
         )

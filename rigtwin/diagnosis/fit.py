@@ -92,7 +92,10 @@ class Space:
         self._columns = evidence.nuisances(plant)
         machine = evidence.machine
         own = [machine.tolerance_of(effect.group, parameter) for effect in effects for parameter in effect.kind.parameters]
-        self._columns[:, [tolerance in own for tolerance in machine.tolerances]] = 0.0
+        # With a delay to be found, when samples were taken is no question of its own any more.
+        timed = any("delay" in effect.kind.parameters for effect in effects)
+        fixed = [tolerance in own or (timed and tolerance.ticks) for tolerance in machine.tolerances]
+        self._columns[:, fixed] = 0.0
         self._used = np.zeros(len(machine.tolerances)) if used is None else used
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])

@@ -14,12 +14,16 @@ from rigtwin.machine.replaying import Setup, predictor
 from rigtwin.noise import rms, white_noise
 from rigtwin.recording import Recording
 
+SHORTEST_TIME = 0.5
+"""s."""
 STEPS = 2
 """Of integration a tick, for a rough prediction."""
 ALIKE = 0.8
 """How well a signal goes with what is expected of it, from which its sign and unit can be told."""
 MOVES = 10.0
 """A signal this many times its noise says what its scale is."""
+OUTLIER = 100.0
+"""Times the range of nearly all of a signal at which a sample is damage."""
 CLOSE = 0.15
 """How close a ratio must be to that of two units."""
 UNITS = {
@@ -68,7 +72,19 @@ def _presence(machine: Machine, recording: Recording, _setup: Setup) -> Iterator
         yield Fault("too short", "recording", f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
 
 
+def _lasts(recording: Recording) -> Iterator[Fault]:
+    """A test of less than a few periods of anything that a machine does says nothing."""
+    if recording.ticks * recording.period < SHORTEST_TIME:
+        lasts = recording.ticks * recording.period
+        yield Fault(
+            "too short",
+            "recording",
+            f"it lasts {lasts:.3g} s; a comparison needs at least {SHORTEST_TIME:g} s (is the time's unit right?)",
+        )
+
+
 def _values(machine: Machine, recording: Recording, _setup: Setup) -> Iterator[Fault]:
+    yield from _lasts(recording)
     yield from gaps(recording)
     moving = [machine.components[replay.moved_by[0]].channel for replay in machine.replays]
     for topic, name in channels(machine):
@@ -76,6 +92,15 @@ def _values(machine: Machine, recording: Recording, _setup: Setup) -> Iterator[F
         wrong = ~np.isfinite(signal)
         if wrong.any():
             yield Fault("not a number", where, f"{where} is not a number at {recording.time[np.argmax(wrong)]:.3f} s")
+            continue
+        spread = float(np.subtract(*np.quantile(signal, [0.999, 0.001])))
+        middle = float(np.median(signal))
+        if spread > 0.0 and float(np.max(np.abs(signal - middle))) > OUTLIER * spread:
+            at = int(np.argmax(np.abs(signal - middle)))
+            when = recording.time[at]
+            yield Fault(
+                "implausible", where, f"{where} is {signal[at]:.4g} at {when:.3f} s, far outside of all else ({spread:.3g})"
+            )
             continue
         if np.ptp(signal) == 0.0 and ((topic, name) in moving or topic == "/sensor"):
             yield Fault("dead", where, f"{where} does not change throughout: a dead or disconnected channel")

@@ -18,7 +18,7 @@ from rigtwin.noise import rms
 from rigtwin.recording import Recording
 
 OUTSTANDING = 1.3
-"""Times its noise from which a signal has something left."""
+"""Times its noise from which a signal has something left, if that is more than no model is held to."""
 
 
 def steps(
@@ -86,7 +86,8 @@ def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) ->
     )
     for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
         noise = float(evidence.lines[0].noise[number])
-        if levels[name] < OUTSTANDING * noise:
+        typical = rms(np.concatenate([each.measured[number] for each in evidence.lines]))
+        if levels[name] < max(OUTSTANDING * noise, evidence.machine.form_of(row) * typical):
             continue
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
         share = (levels[name] / noise) ** 2 / total

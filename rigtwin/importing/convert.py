@@ -12,13 +12,15 @@ from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.mapping import Map, Source, load
 from rigtwin.importing.table import Columns, read
-from rigtwin.importing.units import unit_of
+from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.recording import Writer
 
 FLAT = 8
 """Equal samples in a row at a signal's very end of range, with a step into them: it is cut off there."""
 ABRUPT, BITS = 0.1, 2.0
 """Share of a signal's typical step, and its smallest steps, with which it runs into such a stretch at least."""
+OUTLIER = 100.0
+"""Times the range of nearly all of a signal at which a sample is damage."""
 JITTER = 0.5
 """Share of the period by which a time stamp may be off."""
 BLOCK = 10_000
@@ -30,6 +32,7 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     wanted, columns = load(map_path), read(data)
     report = [f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, columns {', '.join(columns.values)}"]
     signals = {channel: _signal(data, columns, source) for channel, source in wanted.channels.items()}
+    report += [line for channel, source in wanted.channels.items() for line in _unit_notes(columns, channel, source)]
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if len(lengths) > 1:
         raise RigtwinError(f"{data}: the columns have different lengths: {', '.join(map(str, sorted(lengths)))}")
@@ -46,6 +49,12 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     period = wanted.period or _period(time)
     _whole(data, time, signals)
     if wanted.resample is not None:
+        bridged = np.diff(time)
+        bridged = bridged[bridged > (1.0 + JITTER) * period]
+        if len(bridged):
+            report.append(
+                f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, {bridged.sum():.4g} s in all"
+            )
         time, signals = _resampled(time, signals, period, wanted.resample)
         report.append(f"resampled from {period:g} s to {wanted.resample:g} s: {len(time)} ticks")
         period = wanted.resample
@@ -77,6 +86,19 @@ def _signal(data: Path, columns: Columns, source: Source) -> Array:
     except RigtwinError as error:
         raise RigtwinError(f"{data}: column {source.column!r}: {error}; say the unit in the map") from None
     return source.sign * source.scale * factor * values + source.offset
+
+
+def _unit_notes(columns: Columns, channel: tuple[str, str], source: Source) -> list[str]:
+    """What people should know of a channel's unit."""
+    if source.constant is not None:
+        return []
+    said = columns.units.get(source.column)
+    name = ".".join(channel)
+    if source.unit is None and said is None:
+        return [f"{name}: no unit is said of column {source.column!r}; taken as SI"]
+    if source.unit is not None and said is not None and is_unit(said) and unit_of(said) != unit_of(source.unit):
+        return [f"{name}: the file says {said} of column {source.column!r}, the map {source.unit}; taken as {source.unit}"]
+    return []
 
 
 def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
@@ -184,6 +206,10 @@ def _oddities(values: Array, time: Array) -> list[str]:
     if np.ptp(values) == 0.0:
         return [f"is {values[0]:g} throughout"]
     found = []
+    spread = float(np.subtract(*np.quantile(values, [0.999, 0.001])))
+    far = np.abs(values - np.median(values))
+    if spread > 0.0 and far.max() > OUTLIER * spread:
+        found.append(f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, far outside of all else")
     steps = np.abs(np.diff(values))
     abrupt = max(ABRUPT * float(np.median(steps[steps > 0])), BITS * float(np.min(steps[steps > 0])))
     for end, extreme in (("above", values.max()), ("below", values.min())):

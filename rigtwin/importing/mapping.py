@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import tomllib
 from collections.abc import Mapping
@@ -47,7 +48,7 @@ class Map:
 def load(path: Path) -> Map:
     """Reads a map. Raises RigtwinError naming the file, the key and what was expected."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -63,7 +64,9 @@ def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, An
         raise RigtwinError(f"{where}: expected a table")
     for key in table:
         if key not in known:
-            raise RigtwinError(f"{where}: unknown key {key!r}; there are {', '.join(known)}")
+            close = difflib.get_close_matches(key, known, 1)
+            hint = f"did you mean {close[0]!r}? " if close else ""
+            raise RigtwinError(f"{where}: unknown key {key!r}; {hint}there are {', '.join(known)}")
     return table
 
 
@@ -71,7 +74,8 @@ def _number(where: str, value: object, low: float = -math.inf, high: float = mat
     number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
     if not (low <= number <= high and math.isfinite(number)):
         limits = f" from {low:g} to {high:g}" if math.isfinite(low) else ""
-        raise RigtwinError(f"{where} = {str(value)[:40]}: expected a number{limits}")
+        shown = repr(value) if isinstance(value, str) else str(value)
+        raise RigtwinError(f"{where} = {shown[:40]}: expected a number{limits}")
     return number
 
 

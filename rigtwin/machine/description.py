@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +77,7 @@ def examined(path: Path) -> tuple[Machine | None, list[str]]:
     """The machine of a description, and all mistakes in it, one line each; no machine if there are any."""
     mistakes = _Mistakes()
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
     except (ValueError, RecursionError) as error:
@@ -115,7 +116,9 @@ class _Reader:
                 note("", f"unknown table [{key}]; {_near(key, ('machine', 'components', 'controller', 'replays', 'mains'))}")
         about = self._table("machine", ("name", "title", "model", "nominal", "form"), required=("name", "model"))
         name = str(about.get("name", ""))
-        if "name" in about and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
+        if "name" in about and not isinstance(about["name"], str):
+            note("[machine] name", f"{name}: expected a text, in quotes")
+        elif "name" in about and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             note("[machine] name", f"{name!r}: expected letters, digits, - and _")
         nominal = about.get("nominal", "rough")
         if nominal not in NOMINAL:
@@ -179,14 +182,15 @@ class _Reader:
     def _number(self, where: str, value: object, low: float, high: float) -> float:
         number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
         if not low <= number <= high:
-            self._mistakes.note(where, f"{str(value)[:40]}: expected a number from {low:g} to {high:g}")
+            shown = repr(value) if isinstance(value, str) else str(value)
+            self._mistakes.note(where, f"{shown[:40]}: expected a number from {low:g} to {high:g}")
             return low
         return number
 
     def _model_path(self, about: Mapping[str, Any]) -> Path:
         """Beside the description, or where the project keeps its models."""
         beside = self._path.parent / str(about.get("model", ""))
-        shipped = self._path.parent.parent / "models" / "xml" / str(about.get("model", ""))
+        shipped = Path(str(files("models"))) / "xml" / str(about.get("model", ""))
         return shipped if not beside.is_file() and shipped.is_file() else beside
 
     def _mechanism(self, about: Mapping[str, Any]) -> Mechanism | None:
@@ -228,6 +232,9 @@ class _Reader:
         self._values[name] = self._filled(name, where, kind, table, element, mjcf, joint, mechanism)
         turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
         unit = str(table.get("unit", ""))
+        for key in ("channel", "command", "unit"):
+            if key in table and not isinstance(table[key], str):
+                self._mistakes.note(where, f"{key} = {table[key]}: expected a text, in quotes")
         channel: tuple[str, str] | None = None
         if kind in SENSED:
             unit = UNITS[SENSED[kind]][turns]
@@ -323,7 +330,7 @@ class _Reader:
         if "tolerance" in table:
             width = table["tolerance"]
             share = _share(width) if isinstance(width, str) else None
-            if share is not None and share > 0.0:
+            if share is not None and 0.0 < share <= 1.0:
                 self._tolerances.append(Tolerance(name, key, share, True))
             elif isinstance(width, int | float) and not isinstance(width, bool) and 0.0 < width < math.inf:
                 self._tolerances.append(Tolerance(name, key, float(width)))
@@ -399,9 +406,11 @@ class _Reader:
         movers = [movers] if isinstance(movers, str) else movers
         known = [name for name, kind in self._types.items() if kind in (*MOVING, "position sensor", "velocity sensor")]
         if not isinstance(movers, list) or not movers:
+            said = "is missing" if "moved_by" not in table else "is no name"
+            there = ", ".join(known) or "there is none"
             self._mistakes.note(
                 where,
-                f"moved_by is missing; expected an actuator or a sensor of the motion: {', '.join(known) or 'there is none'}",
+                f"moved_by {said}; expected an actuator or a sensor of the motion: {there}",
             )
             movers = []
         for mover in movers:
@@ -444,6 +453,8 @@ class _Reader:
             self._mistakes.note(
                 where, f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass"
             )
+        if self._types[movers[0]] == "force actuator" and not at["guide"]:
+            self._mistakes.note(where, f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide")
         return ReplayOf(
             str(table.get("name", f"replay {number}")),
             joint,
@@ -462,7 +473,8 @@ class _Reader:
     def _observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
         observed = table.get("observe", [])
         if not isinstance(observed, list) or not observed or not all(isinstance(each, str) for each in observed):
-            self._mistakes.note(where, "observe is missing; expected a list of sensors, or of the controller's command")
+            said = "is missing" if "observe" not in table else f"= {str(observed)[:40]!r}"
+            self._mistakes.note(where, f"observe {said}; expected a list of sensors, or of the controller's command")
             return []
         return observed
 

@@ -46,7 +46,7 @@ class Mechanism:
         try:
             self.model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as error:
-            raise RigtwinError(f"model {path}: {str(error).splitlines()[0]}") from None
+            raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
 
     def names(self, element: str) -> list[str]:
         """Names of all elements of a sort."""
