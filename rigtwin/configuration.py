@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 from controllers import Settings
 from controllers.quantity import Choice, Quantity, fields
 from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Plant
 
+Applied = TypeVar("Applied")
 MOST_TICKS = 100_000_000
 """More than a day at 1 kHz."""
 
@@ -135,11 +136,10 @@ def overridden(configuration: Configuration, changes: Mapping[str, Mapping[str, 
     return rest._replace(plant=plant)
 
 
-def from_toml(configuration: Configuration, path: Path) -> Configuration:
-    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
+def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Applied:
+    """What `apply` makes of a TOML file's tables. Raises RigtwinError naming file and fault."""
     try:
-        with path.open("rb") as file:
-            return overridden(configuration, tomllib.load(file))
+        return apply(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -148,12 +148,23 @@ def from_toml(configuration: Configuration, path: Path) -> Configuration:
         raise RigtwinError(f"{path}: {error}") from None
 
 
-def from_assignments(configuration: Configuration, assignments: list[str]) -> Configuration:
-    """The configuration with `group.name=value` texts applied, as `--set` takes them."""
+def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
+    """group → name → value of each `group.name=value` text, as `--set` takes them. Raises RigtwinError for any other."""
     for text in assignments:
         key, equals, value = text.partition("=")
         group, dot, name = key.strip().partition(".")
         if not (equals and dot):
             raise RigtwinError(f"--set {text}: expected group.name=value, such as rail.coulomb=60")
-        configuration = overridden(configuration, {group: {name: value.strip()}})
+        yield {group: {name: value.strip()}}
+
+
+def from_toml(configuration: Configuration, path: Path) -> Configuration:
+    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
+    return read_toml(path, lambda tables: overridden(configuration, tables))
+
+
+def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
+    """The configuration with `group.name=value` texts applied."""
+    for changes in assigned(assignments):
+        configuration = overridden(configuration, changes)
     return configuration

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from controllers.quantity import Quantity, fields
-from rigtwin.configuration import checked
+from rigtwin.configuration import assigned, checked, read_toml
 from rigtwin.effects import find
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.machine import Machine
@@ -44,24 +43,13 @@ def overridden(setup: Setup, changes: Mapping[str, object]) -> Setup:
 
 def from_toml(setup: Setup, path: Path) -> Setup:
     """The setup with a TOML file's values. Raises RigtwinError naming file and fault."""
-    try:
-        return overridden(setup, tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
-        raise RigtwinError(f"{path} is not valid TOML: {error}") from None
-    except RigtwinError as error:
-        raise RigtwinError(f"{path}: {error}") from None
+    return read_toml(path, lambda tables: overridden(setup, tables))
 
 
 def from_assignments(setup: Setup, assignments: Sequence[str]) -> Setup:
     """The setup with `component.parameter=value` texts."""
-    for text in assignments:
-        key, equals, value = text.partition("=")
-        group, dot, name = key.strip().partition(".")
-        if not (equals and dot):
-            raise RigtwinError(f"--set {text}: expected component.parameter=value, such as guide.viscous=200")
-        setup = overridden(setup, {group: {name: value.strip()}})
+    for changes in assigned(assignments):
+        setup = overridden(setup, changes)
     return setup
 
 
