@@ -9,13 +9,13 @@ import pytest
 
 from benchmarks.benches import recording_of
 from rigtwin.blindcheck.bench_cases import ACTUATORS, DAMPERS, Case, drawn
-from rigtwin.blindcheck.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, wander
+from rigtwin.blindcheck.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, sampled, wander
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.place import travelled
 from rigtwin.importing.convert import convert
 from rigtwin.machine.library import SHIPPED, find
 from rigtwin.machine.setting import nominal
-from rigtwin.recording import load
+from rigtwin.recording import Recording, load
 
 EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"
 SINGLE = {
@@ -57,6 +57,24 @@ def test_what_is_in_a_bench_is_named_with_its_size(name: str):
         assert value == pytest.approx(effects[str(effect.name)], rel=0.02, abs=slack)
     assert found.gap is not None
     assert found.gap.shrinkage_held_out.value > 0.9
+
+
+def test_a_slow_logger_and_a_stepping_command():
+    """50 Hz, steps, half a millimetre a bit: a lag and a delay are not taken for one effect of second order."""
+    random, period = np.random.default_rng(4), 0.02
+    command = np.repeat(random.uniform(-0.05, 0.05, 50), 60)
+    truth = ActuatorTruth(lags=(0.06,), late=0.08, fastest=0.15)
+    position = sampled(random, actuator_position(truth, command, period), 1e-4, 5e-4)
+    time = np.arange(len(command)) * period
+    columns = {"/command": {"position": command}, "/sensor": {"position": position}}
+    machine = find("position-actuator")
+    recording = Recording(Path("slow"), machine.name, "", period, time, columns, {})
+    found = diagnose(machine, [recording], nominal(machine)).diagnosis
+    values = {str(effect.name): next(iter(effect.parameters.values())) for effect in found.effects}
+    assert set(values) == {"lag@actuator", "delay@actuator", "rate_limit@actuator"}
+    assert values["rate_limit@actuator"].value == pytest.approx(0.15, rel=0.03)
+    assert values["delay@actuator"].low <= 0.08 + 0.5 * period
+    assert values["lag@actuator"].value == pytest.approx(0.06, abs=0.01)
 
 
 @pytest.mark.parametrize("truth", [ActuatorTruth(), DamperTruth()], ids=["actuator", "damper"])

@@ -74,6 +74,8 @@ SECOND = 2.0
 """Times what a first effect must explain that each further one must."""
 NEAR = 0.2
 """Share of what is explained that an explanation with one effect replaced may lack."""
+SECOND_ORDER = ("two_lags", "resonance")
+"""Kinds that a lag and a delay may be taken for."""
 BEHIND = ("compliance", "backlash")
 """Kinds that hide their gateway."""
 Mapped = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
@@ -133,7 +135,7 @@ def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
     evidence = growth.fitter.evidence
     hopes = sorted(growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised)[:TRIED]
     found = mapped(lambda hope: growth.search.refined(hope.effects, hope.values, hope.space), hopes)
-    found += mapped(lambda start: growth.search.refined(*start), _through(leader, growth))
+    found += mapped(lambda start: growth.search.refined(*start), [*_through(leader, growth), *_unfolded(leader, growth)])
     found = mapped(growth.fitter.settled, sorted(found, key=priced)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
     left = max(leader.misfit - evidence.expected_at(leader.plant), 0.0)
@@ -161,6 +163,25 @@ def _through(leader: Fit, growth: Growth) -> list[tuple[tuple[Effect, ...], Valu
             residuals = (search.evidence.residual(with_values(search.plant, effects, start)) for start in starts)
             scored = [(search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True)]
             found.append((effects, min(scored)[1]))
+    return found
+
+
+def _unfolded(leader: Fit, growth: Growth) -> list[tuple[tuple[Effect, ...], Values]]:
+    """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
+    search = growth.search
+    found = []
+    for number, effect in enumerate(leader.effects):
+        if effect.kind.name not in SECOND_ORDER:
+            continue
+        pair = [each for each in growth.effects if each.group == effect.group and each.kind.name in ("lag", "delay")]
+        kept = tuple(place for place in range(len(leader.effects)) if place != number)
+        rest = tuple(leader.effects[place] for place in kept)
+        if len(pair) < 2 or any(clashing(each, rest) for each in pair):
+            continue
+        effects, values = (*rest, *pair), tuple(leader.values[place] for place in kept)
+        starts = [(*values, one, two) for one in search.trials(pair[0]).starts for two in search.trials(pair[1]).starts]
+        residuals = (search.evidence.residual(with_values(search.plant, effects, start)) for start in starts)
+        found.append((effects, min((search.space.misfit(r), start) for r, start in zip(residuals, starts, strict=True))[1]))
     return found
 
 

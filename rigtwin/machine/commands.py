@@ -53,6 +53,8 @@ def machine(parsed: Namespace) -> int:
         channel = ".".join(component.channel) if component.channel else ""
         rows.append((name, f"{component.element} {component.mjcf}", channel, values, own))
     print(table(rows))
+    for name, source in found.sources.items():
+        print(f"{name}: {source}")
     if found.control is not None:
         print(f"controller: {found.control.output} = {found.control.formula.text}")
     print("no mistakes")
