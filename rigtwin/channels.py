@@ -18,7 +18,7 @@ class Channel:
     meaning: str
 
 
-MACHINE = "suspension-rig"
+SUSPENSION_RIG = "suspension-rig"
 """The machine of the channel table."""
 CHANNELS = (
     Channel("/command", "ground", "m", "ground cylinder position demanded"),
@@ -40,7 +40,7 @@ def channels_of(machine: str, columns: Mapping[str, Mapping[str, object]]) -> li
     """The channels that a recording of a machine holds: those of the table, with unit and meaning, if it is of the machine that
     the table is about; else whatever there is."""
     there = [(topic, name) for topic, names in columns.items() for name in names]
-    if machine == MACHINE:
+    if machine == SUSPENSION_RIG:
         return [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
     return [Channel(topic, name, "", "") for topic, name in there]
 

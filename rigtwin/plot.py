@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rigtwin.arrays import Array
-from rigtwin.channels import MACHINE
+from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
@@ -110,7 +110,7 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     checked_ending(out)
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
-    panels = PANELS if recording.machine == MACHINE else _plainly(recording)
+    panels = PANELS if recording.machine == SUSPENSION_RIG else _plainly(recording)
     there = [
         (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
         for panel in panels

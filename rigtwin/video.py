@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.arrays import Array
-from rigtwin.channels import MACHINE
+from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.errors import RigtwinError
 from rigtwin.model import SCENE
 from rigtwin.plot import ASKED, SENSED, stretch
@@ -55,8 +55,8 @@ def film(
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
     if not 0.0 < magnify <= 20.0:
         raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
-    if recording.machine != MACHINE:
-        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; only {MACHINE} can be filmed")
+    if recording.machine != SUSPENSION_RIG:
+        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; only {SUSPENSION_RIG} can be filmed")
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}

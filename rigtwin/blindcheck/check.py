@@ -86,9 +86,10 @@ def _diagnosed(recordings: Path, answers: Path, cases: int, progress: Callable[[
 
 def answer(recordings: Path, answers: Path, number: int) -> dict[str, Any]:
     """One case's answer, worked out or read again if its recording is the same. Runs in a process that knows files alone."""
+    from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.configuration import Configuration
     from rigtwin.diagnosis import diagnose as module
-    from rigtwin.machine.library import SUSPENSION_RIG, find
+    from rigtwin.machine.library import find
     from rigtwin.recording import load
 
     path, held_out = recordings / f"{number:03d}.mcap", recordings / f"{number:03d}-held-out.mcap"

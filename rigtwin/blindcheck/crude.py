@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Measurements
+from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.configuration import Configuration, Safety
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.fit import with_values
@@ -15,7 +16,7 @@ from rigtwin.diagnosis.trial import swings
 from rigtwin.diagnosis.trials import TRIALS, trials
 from rigtwin.effects import candidates
 from rigtwin.loop import run_compiled
-from rigtwin.machine.library import SUSPENSION_RIG, find
+from rigtwin.machine.library import find
 from rigtwin.noise import white_noise
 from rigtwin.parameters import Plant
 from rigtwin.recording import load

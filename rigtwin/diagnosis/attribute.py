@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.fft import rfft
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values
-from rigtwin.diagnosis.growth import Growth, grown, plain, priced, within_tolerance
+from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values, without_each
+from rigtwin.diagnosis.growth import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
 from rigtwin.diagnosis.trials import searched
 from rigtwin.effects import Effect
 
@@ -26,8 +25,6 @@ DETECTED = 60.0
 """χ² that an effect must explain to be a finding,"""
 NOTICEABLE = 0.015
 """and share of what noise alone leaves: less is a trace that no closed loop shows."""
-SECOND = 2.0
-"""Times what a first effect must explain that each further one must."""
 UNEXPLAINED = 0.10
 """χ² per degree of freedom above 1 from which what is left counts as a gap."""
 MUCH = 0.03
@@ -37,9 +34,7 @@ TEMPER = 4.0
 FORM_TEMPER = 0.05
 """How much of what is left widens that."""
 REFITTED = 6
-"""Explanations that are fitted again with the tolerances taken at them, if they"""
-NEAR = 0.2
-"""lack no more than this share of what the best one explains."""
+"""Explanations that are fitted again with the tolerances taken at them."""
 BEAM = 3
 """First effects to which a second is sought."""
 MANY, FEW = 10, 3
@@ -213,8 +208,7 @@ def _independent(evidence: Evidence, plant: Any) -> float:
     """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
     imaginary parts."""
     total = square = 0.0
-    for each, difference in zip(evidence.lines, evidence.differences(plant), strict=True):
-        transform = rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
+    for transform in evidence.transforms(evidence.differences(plant)):
         power = np.abs(transform) ** 2
         total, square = total + float(power.sum()), square + float((power**2).sum())
     # The powers of white noise are spread as an exponential, of which this would count half.
@@ -227,8 +221,7 @@ def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:
         return {fit.name: explained}
     whole = float(np.sum(evidence.residual(fit.plant) ** 2))
     lost = []
-    for number in range(len(fit.effects)):
-        others = [place for place in range(len(fit.effects)) if place != number]
-        plant = with_values(evidence.plant, [fit.effects[p] for p in others], [fit.values[p] for p in others])
-        lost.append(max(float(np.sum(evidence.residual(plant) ** 2)) - whole, 0.0))
+    for _, others, values in without_each(fit):
+        residual = evidence.residual(with_values(evidence.plant, others, values))
+        lost.append(max(float(np.sum(residual**2)) - whole, 0.0))
     return {effect.name: explained * one / max(sum(lost), 1e-9) for effect, one in zip(fit.effects, lost, strict=True)}

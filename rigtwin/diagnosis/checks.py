@@ -11,13 +11,13 @@ import numpy as np
 from controllers import Commands, Measurements
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
+from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.diagnosis.runs import FLAT, longest_run
 from rigtwin.noise import rms, smallest_step, white_noise
 from rigtwin.recording import Recording
 
-MACHINE = "suspension-rig"
 SHORTEST = 200
 """Ticks below which a noise floor cannot be estimated."""
 STUCK = 200
@@ -74,8 +74,8 @@ def check(recording: Recording, configuration: Configuration) -> tuple[Fault, ..
 
 
 def _presence(recording: Recording) -> Iterator[Fault]:
-    if recording.machine != MACHINE:
-        yield Fault("wrong machine", "recording", f"it is of machine {recording.machine!r}; this twin is {MACHINE!r}")
+    if recording.machine != SUSPENSION_RIG:
+        yield Fault("wrong machine", "recording", f"it is of machine {recording.machine!r}; this twin is {SUSPENSION_RIG!r}")
     for topic, names in (("/sensor", Measurements._fields), ("/command", Commands._fields)):
         for name in names:
             if not recording.has(topic, name):

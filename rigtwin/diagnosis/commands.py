@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
+    from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.configuration import Configuration, Timing
     from rigtwin.diagnosis.compare import compare as replay_all
     from rigtwin.diagnosis.compare import compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.replays import REPLAYS
     from rigtwin.effects import applied
-    from rigtwin.machine.library import SUSPENSION_RIG
     from rigtwin.parameters import Plant
     from rigtwin.recording import load
 
@@ -116,9 +116,9 @@ def diagnose(parsed: Namespace) -> int:
     from tqdm import tqdm
 
     from experiments import EXPERIMENTS
+    from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.diagnosis.diagnose import diagnose as answer
     from rigtwin.diagnosis.text import described
-    from rigtwin.machine.library import SUSPENSION_RIG
     from rigtwin.recording import load
 
     inputs = [*parsed.recordings, *parsed.held_out]
@@ -178,10 +178,10 @@ def machine_of(recording: Recording, described: str | None) -> Machine:
 def base_of(machine: Machine, parsed: Namespace) -> Any:
     """The twin that recordings are compared with, as the command line has it: a Configuration, or a Setup of a described
     machine."""
+    from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.configuration import Configuration, Timing
     from rigtwin.effects import without
     from rigtwin.machine import setting
-    from rigtwin.machine.library import SUSPENSION_RIG
     from rigtwin.parameters import Plant
 
     if machine.name != SUSPENSION_RIG:

@@ -34,7 +34,7 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.formula_replay import formula_deviation
 from rigtwin.diagnosis.freeform import Disturbed, located
-from rigtwin.diagnosis.leftover import leftovers, steps, without_each
+from rigtwin.diagnosis.leftover import leftovers, missed, steps
 from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
 from rigtwin.diagnosis.next_test import Test, proposed
 from rigtwin.diagnosis.place import placed
@@ -122,7 +122,8 @@ def diagnose(
                 if fault.fatal:
                     raise RigtwinError(f"{recording.path}: {fault.message}")
         evidence = Evidence(machine, recordings, configurations)
-        return _diagnosed(evidence, held_out, others, tests, progress, started)
+        apart = Evidence(machine, held_out, others) if held_out else None
+        return _diagnosed(evidence, apart, tests, progress, started)
 
 
 def setting(machine: Machine, recording: Recording, base: Configuration | Setup) -> Configuration | Setup:
@@ -134,8 +135,7 @@ def setting(machine: Machine, recording: Recording, base: Configuration | Setup)
 
 def _diagnosed(
     evidence: Evidence,
-    held_out: Sequence[Recording],
-    others: Sequence[Configuration | Setup],
+    held_out: Evidence | None,
     tests: Sequence[Test],
     progress: Callable[[str, int], object],
     started: float,
@@ -144,7 +144,7 @@ def _diagnosed(
     best = found.best.fit if found.best is not None else Fit((), (), found.nothing.misfit, (), evidence.plant)
     notes = [*_notes(evidence.recordings), *_clipped(evidence)]
     progress("judging on held-out data", 1)
-    verdict_of_data = judged(evidence, best, held_out, others)
+    verdict_of_data = judged(evidence, best, held_out)
     if verdict_of_data.fit is not None:
         best = verdict_of_data.fit
     if verdict_of_data.rejected:
@@ -161,7 +161,7 @@ def _diagnosed(
     )
     attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
-    lost = without_each(evidence, best) if evidence.machine.rough else {}
+    lost = missed(evidence, best) if evidence.machine.rough else {}
     traces = tuple(each for each in attributed if lost and each.share < TRACE and lost[str(each.name)] < NOTICED)
     effects = [
         *(each for each in attributed if each not in traces),
@@ -199,7 +199,7 @@ def _diagnosed(
         tuple(str(recording.path) for recording in evidence.recordings),
         seconds,
         evidence.machine.name,
-        steps(evidence, found.chain if verdict != "no gap" else (), held_out, others) if evidence.machine.rough else (),
+        steps(evidence, found.chain if verdict != "no gap" else (), held_out or evidence) if evidence.machine.rough else (),
         {row.name: row.unit for row in evidence.machine.rows},
         tuple(leftovers(evidence, plant, disturbed)) if verdict != "no gap" and evidence.machine.rough else (),
         traces,

@@ -7,7 +7,7 @@ share of the signal, since no model is exact. The mains line says nothing of the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Any
@@ -257,11 +257,12 @@ class Evidence:
 
     def whitened(self, differences: Sequence[Array]) -> Array:
         """Differences in the time domain, shape (rows, ticks) each, as one whitened vector."""
-        parts = []
+        return np.concatenate([part.ravel() for each in self.transforms(differences) for part in (each.real, each.imag)])
+
+    def transforms(self, differences: Sequence[Array]) -> Iterator[NDArray[np.complex128]]:
+        """The same before it becomes a vector, shape (rows, lines) for each recording."""
         for each, difference in zip(self.lines, differences, strict=True):
-            transform = rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
-            parts += [transform.real.ravel(), transform.imag.ravel()]
-        return np.concatenate(parts)
+            yield rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
 
     def residual(self, plant: Any) -> Array:
         """Measured less predicted."""

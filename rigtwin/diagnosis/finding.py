@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
+from rigtwin.channels import SUSPENSION_RIG
+
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
 
 
@@ -112,7 +114,7 @@ class Unseen:
 @dataclass(frozen=True)
 class Step:
     """One effect more. added: its name, or of all that changed; values: of its parameters then; left: rms of what each
-    signal has left over the model, in its unit, on `data`."""
+    signal has left, in its unit, on the data that it is judged on."""
 
     added: str
     values: dict[str, Estimate]
@@ -137,7 +139,7 @@ class Diagnosis:
     notes: tuple[str, ...]
     recordings: tuple[str, ...]
     seconds: float
-    machine: str = "suspension-rig"
+    machine: str = SUSPENSION_RIG
     steps: tuple[Step, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
     leftovers: tuple[Place, ...] = ()

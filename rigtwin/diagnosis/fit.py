@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -82,6 +82,12 @@ def possible(effects: Sequence[Effect], plant: Any) -> bool:
         or getattr(plant, effect.group).coulomb > 0.0
         for effect in effects
     )
+
+
+def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]]:
+    """Each effect of a fit in turn, the others, and their values."""
+    for number, effect in enumerate(fit.effects):
+        yield effect, (*fit.effects[:number], *fit.effects[number + 1 :]), (*fit.values[:number], *fit.values[number + 1 :])
 
 
 class Space:

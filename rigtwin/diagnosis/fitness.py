@@ -126,6 +126,3 @@ def _scale(machine: Machine, recording: Recording, setup: Setup) -> Iterator[Fau
                 yield Fault(
                     "unit", where, f"{where} is {slope:.4g} times what is predicted, as if in {unit}; expected {row.unit}"
                 )
-
-
-__all__ = ["channels", "faults_of"]

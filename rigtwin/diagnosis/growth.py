@@ -8,28 +8,39 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values
+from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values, without_each
 from rigtwin.effects import Effect
 from rigtwin.parts import Guide
 
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
-
-
-def priced(fit: Fit) -> float:
-    return fit.misfit + PRICE * sum(len(effect.kind.parameters) for effect in fit.effects)
-
-
 WITHIN_TOLERANCE = 1.5
 """Tolerances below which a deviation is no finding."""
 CONTAINED = {"two_lags": "lag"}
 """Kind → the simpler one that it becomes at the end of its range."""
-
-
 SLIGHT = 1e-3
 """Share of what is explained by which it must do better."""
+TRIED, SETTLED = 8, 3
+"""Further effects that are fitted beside a leader, and those fitted again with the tolerances taken at them."""
+REPLACED = 6
+"""Explanations with one effect replaced that are settled at most."""
+GATEWAY = "coulomb"
+"""Kind without which others do nothing."""
+SECOND = 2.0
+"""Times what a first effect must explain that each further one must."""
+NEAR = 0.2
+"""Share of what is explained that an explanation with one effect replaced may lack."""
+SECOND_ORDER = ("two_lags", "resonance")
+"""Kinds that a lag and a delay may be taken for."""
+BEHIND = ("compliance", "backlash")
+"""Kinds that hide their gateway."""
+
+
+def priced(fit: Fit) -> float:
+    return fit.misfit + PRICE * sum(len(effect.kind.parameters) for effect in fit.effects)
 
 
 def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
@@ -64,20 +75,8 @@ def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
     return abs(value - effect.nominal(evidence.plant)[parameter]) <= WITHIN_TOLERANCE * width
 
 
-TRIED, SETTLED = 8, 3
-"""Further effects that are fitted beside a leader, and those fitted again with the tolerances taken at them."""
-REPLACED = 6
-"""Explanations with one effect replaced that are settled at most."""
-GATEWAY = "coulomb"
-"""Kind without which others do nothing."""
-SECOND = 2.0
-"""Times what a first effect must explain that each further one must."""
-NEAR = 0.2
-"""Share of what is explained that an explanation with one effect replaced may lack."""
-SECOND_ORDER = ("two_lags", "resonance")
-"""Kinds that a lag and a delay may be taken for."""
-BEHIND = ("compliance", "backlash")
-"""Kinds that hide their gateway."""
+Start = tuple[tuple[Effect, ...], Values]
+"""Effects, and values to start from."""
 Mapped = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
 
 
@@ -148,40 +147,35 @@ def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
     return accepted
 
 
-def _through(leader: Fit, growth: Growth) -> list[tuple[tuple[Effect, ...], Values]]:
+def _through(leader: Fit, growth: Growth) -> list[Start]:
     """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly resembles friction alone."""
-    search = growth.search
-    found = []
+    search, found = growth.search, []
     for gate in growth.effects:
         if gate.kind.name != GATEWAY or gate.of is not Guide or clashing(gate, leader.effects):
             continue
         for other in growth.effects:
             if other.group != gate.group or other.kind.name not in BEHIND or len(leader.effects) + 2 > growth.most:
                 continue
-            effects = (*leader.effects, gate, other)
-            starts = [(*leader.values, one, two) for one in search.trials(gate).starts for two in search.trials(other).starts]
-            residuals = (search.evidence.residual(with_values(search.plant, effects, start)) for start in starts)
-            scored = [(search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True)]
-            found.append((effects, min(scored)[1]))
+            found.append(_beside(search, leader.effects, leader.values, (gate, other)))
     return found
 
 
-def _unfolded(leader: Fit, growth: Growth) -> list[tuple[tuple[Effect, ...], Values]]:
+def _beside(search: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]) -> Start:
+    """A pair of effects beside others, with the best of all pairs of their starts."""
+    both = (*effects, *pair)
+    one, two = (search.trials(effect).starts for effect in pair)
+    starts = [(*values, *start) for start in product(one, two)]
+    residuals = (search.evidence.residual(with_values(search.plant, both, start)) for start in starts)
+    return both, min((search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True))[1]
+
+
+def _unfolded(leader: Fit, growth: Growth) -> list[Start]:
     """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
-    search = growth.search
     found = []
-    for number, effect in enumerate(leader.effects):
-        if effect.kind.name not in SECOND_ORDER:
-            continue
+    for effect, rest, values in without_each(leader):
         pair = [each for each in growth.effects if each.group == effect.group and each.kind.name in ("lag", "delay")]
-        kept = tuple(place for place in range(len(leader.effects)) if place != number)
-        rest = tuple(leader.effects[place] for place in kept)
-        if len(pair) < 2 or any(clashing(each, rest) for each in pair):
-            continue
-        effects, values = (*rest, *pair), tuple(leader.values[place] for place in kept)
-        starts = [(*values, one, two) for one in search.trials(pair[0]).starts for two in search.trials(pair[1]).starts]
-        residuals = (search.evidence.residual(with_values(search.plant, effects, start)) for start in starts)
-        found.append((effects, min((search.space.misfit(r), start) for r, start in zip(residuals, starts, strict=True))[1]))
+        if effect.kind.name in SECOND_ORDER and len(pair) == 2 and not any(clashing(each, rest) for each in pair):
+            found.append(_beside(growth.search, rest, values, (pair[0], pair[1])))
     return found
 
 
@@ -189,12 +183,8 @@ def _pruned(best: Fit, growth: Growth) -> list[Fit]:
     """The fit with one effect after another taken out that explains nothing any more, now that the others are there."""
     found: list[Fit] = []
     while len(best.effects) > 1:
-        tries = []
-        for number in range(len(best.effects)):
-            kept = [place for place in range(len(best.effects)) if place != number]
-            effects = tuple(best.effects[place] for place in kept)
-            if possible(effects, growth.fitter.plant):
-                tries.append(growth.fitter.refined(effects, [best.values[place] for place in kept]))
+        fewer = [(rest, values) for _, rest, values in without_each(best) if possible(rest, growth.fitter.plant)]
+        tries = [growth.fitter.refined(*each) for each in fewer]
         simpler = min(tries, key=priced, default=best)
         if simpler is best or simpler.misfit - best.misfit > growth.least:
             break

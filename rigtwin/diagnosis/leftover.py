@@ -7,25 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
-from rigtwin.diagnosis.fit import Fit, Fitter, possible
+from rigtwin.diagnosis.fit import Fit, Fitter, possible, without_each
 from rigtwin.diagnosis.freeform import Disturbed
 from rigtwin.diagnosis.place import placed
-from rigtwin.machine.replaying import Setup
 from rigtwin.noise import rms
-from rigtwin.recording import Recording
 
 OUTSTANDING = 1.3
 """Times its noise from which a signal has something left, if that is more than no model is held to."""
 
 
-def steps(
-    evidence: Evidence, chain: Sequence[Fit], held_out: Sequence[Recording], setups: Sequence[Configuration | Setup]
-) -> tuple[Step, ...]:
-    """The signals' rms left by each fit of a chain, the nominal plant first: on held-out data if there are any."""
-    judged = Evidence(evidence.machine, held_out, setups) if held_out else evidence
+def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[Step, ...]:
+    """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal plant first."""
     found = [Step("nominal", {}, remaining(judged, evidence.plant))]
     before: set[str] = set()
     for fit in chain:
@@ -59,18 +53,13 @@ def remaining(evidence: Evidence, plant: Any) -> dict[str, float]:
     return rows
 
 
-def without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
+def missed(evidence: Evidence, fit: Fit) -> dict[str, float]:
     """Effect → power of what is left without it, the others fitted again, as a multiple of what is left with it."""
     fitter = Fitter(evidence)
     found = {}
-    for number, effect in enumerate(fit.effects):
-        kept = [place for place in range(len(fit.effects)) if place != number]
-        others = tuple(fit.effects[place] for place in kept)
-        if not possible(others, evidence.plant):
-            found[effect.name] = np.inf
-            continue
-        again = fitter.refined(others, [fit.values[place] for place in kept])
-        found[effect.name] = again.misfit / max(fit.misfit, 1e-9)
+    for effect, others, values in without_each(fit):
+        there = possible(others, evidence.plant)
+        found[effect.name] = fitter.refined(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
     return found
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
+from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.configuration import Configuration, Safety, flattened
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
@@ -40,7 +41,7 @@ def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recor
     }
     period = configuration.timing.period
     controller = flattened(configuration)["controller"]
-    return Recording(Path(name), "suspension-rig", name, period, np.arange(len(commands)) * period, columns, controller)
+    return Recording(Path(name), SUSPENSION_RIG, name, period, np.arange(len(commands)) * period, columns, controller)
 
 
 def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
 from rigtwin.effects import Effect
-from rigtwin.machine.replaying import Setup
 from rigtwin.recording import Recording
 
 BLOCK = 0.5
@@ -126,19 +124,16 @@ def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array
     ]
 
 
-def judged(
-    evidence: Evidence, fit: Fit, held_out: Sequence[Recording], configurations: Sequence[Configuration | Setup]
-) -> Judged:
-    """Judges a fit on held-out recordings; without any, on each half of the recordings after a fit to the other half."""
+def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judged:
+    """Judges a fit on evidence held out of it; without any, on each half of the recordings after a fit to the other."""
     # Where much is left, an effect must help to stay.
     worse = BETTER if evidence.machine.rough else WORSE
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
-    if held_out:
-        other = Evidence(evidence.machine, held_out, configurations)
+    if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
         predicted = shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0
-        whole = [np.ones(recording.ticks) for recording in held_out]
-        data = f"{len(held_out)} held-out recording{'s' if len(held_out) > 1 else ''}"
+        whole = [np.ones(recording.ticks) for recording in other.recordings]
+        data = f"{len(whole)} held-out recording{'s' if len(whole) > 1 else ''}"
 
         def outside(plant: Any) -> Blocks:
             return blocks(other, evidence.plant, plant, whole)

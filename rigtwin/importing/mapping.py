@@ -31,7 +31,7 @@ class Source:
 @dataclass(frozen=True)
 class Map:
     """period: s, None if the time column says it; resample: s, None if the data stay as they are; start, until: s of the data
-    that are taken; zoh: nothing is interpolated but what is asked for."""
+    that are taken."""
 
     machine: str
     experiment: str

@@ -11,8 +11,6 @@ from rigtwin.machine.description import load
 from rigtwin.machine.machine import Machine
 
 SHIPPED = Path(str(files("machines")))
-SUSPENSION_RIG = "suspension-rig"
-"""The machine that commands are about unless they are told another."""
 
 
 def shipped() -> dict[str, Path]:

@@ -20,7 +20,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
 from rigtwin.arrays import Array
-from rigtwin.channels import MACHINE, topic_fields
+from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
 
@@ -108,7 +108,7 @@ def load(path: Path) -> Recording:
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period, machine = _period(path, about), about.get("machine", MACHINE)
+    period, machine = _period(path, about), about.get("machine", SUSPENSION_RIG)
     controller = _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
@@ -119,7 +119,7 @@ def load(path: Path) -> Recording:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
         if max(times) >= 2**63:
             raise RigtwinError(f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start")
-        values = _decoded(path, channel, schemas.get(channel.schema_id), data, machine == MACHINE)
+        values = _decoded(path, channel, schemas.get(channel.schema_id), data, machine == SUSPENSION_RIG)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
         raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}")

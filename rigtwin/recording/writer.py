@@ -35,7 +35,7 @@ from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
 from rigtwin.arrays import Array
-from rigtwin.channels import topic_fields
+from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, descriptor, tags, type_name
 
@@ -69,7 +69,7 @@ class Writer:
         experiment: str,
         period: float,
         controller: Mapping[str, object],
-        machine: str = "suspension-rig",
+        machine: str = SUSPENSION_RIG,
         fields: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         """period in s; controller: the operator's settings as `config.controller` holds them; fields: of each topic, by default

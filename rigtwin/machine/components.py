@@ -1,0 +1,209 @@
+"""The components of a description: what of the MJCF each is, its values, tolerances and effects."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from controllers.quantity import Quantity, fields
+from rigtwin import parameters, parts
+from rigtwin.effects import KINDS
+from rigtwin.machine.machine import Component
+from rigtwin.machine.mechanism import Mechanism
+from rigtwin.machine.mistakes import Mistakes, near
+from rigtwin.machine.tolerance import Tolerance
+
+TYPES: dict[str, type] = {
+    "mass": parts.Mass,
+    "guide": parts.Guide,
+    "force actuator": parts.ForceActuator,
+    "position actuator": parts.PositionActuator,
+    "position sensor": parts.PositionSensor,
+    "velocity sensor": parts.VelocitySensor,
+    "force sensor": parts.ForceSensor,
+    "carriage": parameters.Carriage,
+    "rail": parameters.Rail,
+    "tyre": parameters.Tyre,
+    "motor": parameters.Motor,
+    "cylinder": parameters.Cylinder,
+    "lvdt": parameters.Lvdt,
+    "load cell": parameters.LoadCell,
+}
+"""Type of component as a description calls it."""
+ELEMENTS = ("body", "joint", "tendon", "contact", "actuator", "sensor")
+"""Elements of an MJCF that can be components."""
+SENSED = {
+    "position sensor": "position",
+    "velocity sensor": "velocity",
+    "force sensor": "force",
+    "lvdt": "position",
+    "load cell": "force",
+}
+MOVING = ("force actuator", "position actuator", "motor", "cylinder")
+"""Types that take a command."""
+UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
+"""What is measured → its unit where the joint slides, and where it turns."""
+COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+QUARTER_CAR = ("carriage", "rail", "tyre", "motor", "cylinder", "cylinder", "lvdt", "lvdt", "lvdt", "load cell")
+QUARTER_CAR_NAMES = parameters.Plant._fields[:-2]
+"""Components of a quarter car between two cylinders, which has a faster solver of its own (rigtwin.machine.quarter_car)."""
+
+
+class Components:
+    """Components as they are read. found, types, values: name → component, type, NamedTuple of its values; sources: of values,
+    `component.parameter` → text."""
+
+    def __init__(self, mechanism: Mechanism, mistakes: Mistakes) -> None:
+        self._mechanism, self.mistakes = mechanism, mistakes
+        self.found: dict[str, Component] = {}
+        self.types: dict[str, str] = {}
+        self.values: dict[str, Any] = {}
+        self.tolerances: list[Tolerance] = []
+        self.sources: dict[str, str] = {}
+
+    @property
+    def quarter_car(self) -> bool:
+        """Whether its components are those of a quarter car between two cylinders."""
+        return sorted(self.types.values()) == sorted(QUARTER_CAR) and tuple(self.found) == QUARTER_CAR_NAMES
+
+    def add(self, name: str, table: object) -> None:
+        """Reads one component's table."""
+        mechanism = self._mechanism
+        where = f"[components.{name}]"
+        if not isinstance(table, Mapping):
+            self.mistakes.note(where, "expected a table")
+            return
+        if not NAME.fullmatch(name) or name in ("computer", "mains", "controller"):
+            self.mistakes.note(where, f"{name!r} cannot be a component's name; expected letters, digits and _")
+            return
+        elements = [key for key in ELEMENTS if key in table]
+        if len(elements) != 1:
+            self.mistakes.note(
+                where, f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}"
+            )
+            return
+        element, mjcf = elements[0], str(table[elements[0]])
+        if mjcf not in mechanism.names(element):
+            self.mistakes.note(where, f"the MJCF has no {element} {mjcf!r}; {near(mjcf, mechanism.names(element))}")
+            return
+        kind = self._type(where, table, element, mjcf)
+        if kind is None:
+            return
+        joint = mechanism.joint_of(element, mjcf)
+        self.types[name] = kind
+        self.values[name] = self._filled(name, where, kind, table, element, mjcf, joint)
+        turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
+        unit = str(table.get("unit", ""))
+        for key in ("channel", "command", "unit"):
+            if key in table and not isinstance(table[key], str):
+                self.mistakes.note(where, f"{key} = {table[key]}: expected a text, in quotes")
+        channel: tuple[str, str] | None = None
+        if kind in SENSED:
+            unit = UNITS[SENSED[kind]][turns]
+            channel = ("/sensor", str(table.get("channel", name)))
+            if table.get("unit", unit) != unit:
+                self.mistakes.note(
+                    where, f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts"
+                )
+        elif kind in MOVING:
+            channel = ("/command", str(table.get("command", name)))
+            if kind in ("position actuator", "cylinder"):
+                unit = UNITS["position"][turns]
+        for key, fits in (("channel", kind in SENSED), ("command", kind in MOVING)):
+            if key in table and not fits:
+                self.mistakes.note(where, f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}")
+        self.found[name] = Component(name, element, mjcf, joint, channel, unit, self._kinds(where, kind, table))
+
+    def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:
+        if "type" in table:
+            if table["type"] not in TYPES:
+                self.mistakes.note(where, f"unknown type {table['type']!r}; {near(table['type'], TYPES)}")
+                return None
+            return str(table["type"])
+        if element == "body":
+            return "mass"
+        if element == "joint":
+            return "guide"
+        if element == "actuator":
+            return "position actuator" if self._mechanism.positions(mjcf) else "force actuator"
+        if element == "sensor" and (measures := self._mechanism.measures(mjcf)):
+            return f"{measures} sensor"
+        self.mistakes.note(where, f"{element} {mjcf!r} needs a type; there are {', '.join(TYPES)}")
+        return None
+
+    def _kinds(self, where: str, kind: str, table: Mapping[str, Any]) -> frozenset[str] | None:
+        if "effects" not in table:
+            return None
+        possible = sorted({each.name for each in KINDS if TYPES[kind] in each.at})
+        wanted = table["effects"]
+        if not isinstance(wanted, list) or not all(isinstance(each, str) for each in wanted):
+            self.mistakes.note(where, 'effects: expected a list of kinds, such as ["gain", "offset"], or [] for none')
+            return None
+        for each in wanted:
+            if each not in possible:
+                self.mistakes.note(where, f"effects: a {kind} has no {each!r}; {near(each, possible)}")
+        return frozenset(wanted)
+
+    def _filled(
+        self,
+        name: str,
+        where: str,
+        kind: str,
+        table: Mapping[str, Any],
+        element: str,
+        mjcf: str,
+        joint: str,
+    ) -> Any:
+        """The component's values: those of its type, then of the MJCF, then of the description."""
+        component = TYPES[kind]()
+        meanings = {key: meaning for key, meaning in fields(TYPES[kind]).items() if isinstance(meaning, Quantity)}
+        if kind == "mass" and joint:
+            component = component._replace(mass=self._mechanism.joint(joint).inertia)
+        elif kind == "guide" and joint:
+            component = component._replace(**self._mechanism.friction(joint))
+        elif kind == "force actuator":
+            constant, limit = self._mechanism.force_per_command(mjcf)
+            if constant <= 0.0:
+                self.mistakes.note(where, f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0")
+                return component
+            component = component._replace(constant=constant, force_limit=min(limit, parameters.UNLIMITED))
+        for key, given in table.items():
+            if key in COMPONENT_KEYS:
+                continue
+            if key not in meanings:
+                known = [each for each in (*meanings, *COMPONENT_KEYS) if each not in ELEMENTS or each == element]
+                self.mistakes.note(where, f"unknown key {key!r}; {near(key, known)}")
+                continue
+            component = self._value(name, where, component, key, given, meanings[key])
+        return component
+
+    def _value(self, name: str, where: str, component: Any, key: str, given: object, meaning: Quantity) -> Any:
+        """One parameter: a number, or a table of value, tolerance and source."""
+        here = f"{where} {key}"
+        table: Mapping[str, Any] = given if isinstance(given, Mapping) else {"value": given}
+        self.mistakes.unknown(here, table, ("value", "tolerance", "source"))
+        if "value" in table:
+            component = component._replace(**{key: self.mistakes.number(here, table["value"], meaning.low, meaning.high)})
+        if "source" in table:
+            self.sources[f"{name}.{key}"] = str(table["source"])
+        if "tolerance" in table:
+            width = table["tolerance"]
+            share = share_of(width) if isinstance(width, str) else None
+            if share is not None and 0.0 < share <= 1.0:
+                self.tolerances.append(Tolerance(name, key, share, True))
+            elif isinstance(width, int | float) and not isinstance(width, bool) and 0.0 < width < math.inf:
+                self.tolerances.append(Tolerance(name, key, float(width)))
+            else:
+                self.mistakes.note(
+                    here, f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"'
+                )
+        return component
+
+
+def share_of(text: str) -> float | None:
+    """A percentage as a share."""
+    match = re.fullmatch(r"\s*([0-9.]+(?:e-?\d+)?)\s*%\s*", text)
+    return float(match.group(1)) / 100.0 if match else None
