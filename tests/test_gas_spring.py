@@ -1,0 +1,91 @@
+"""The gas spring against closed forms, and what it says of bad input."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+from rigtwin.errors import RigtwinError
+from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, force, stiffness
+
+SPRING = GasSpring(167_285.0, 0.673, 1.4)
+
+
+def test_isothermal_gas_keeps_pressure_times_volume():
+    spring = GasSpring(400.0, 0.25, 1.0)
+    for stroke in (-0.1, 0.0, 0.1, 0.2):
+        assert force(spring, stroke) * (spring.length - stroke) == pytest.approx(400.0 * 0.25)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.2, 1.4])
+@pytest.mark.parametrize("stroke", [-0.05, 0.0, 0.2, 0.42, 0.6])
+def test_stiffness_is_the_derivative_of_the_force(exponent: float, stroke: float):
+    spring, step = SPRING._replace(exponent=exponent), 1e-6
+    slope = (force(spring, stroke + step) - force(spring, stroke - step)) / (2.0 * step)
+    assert stiffness(spring, stroke) == pytest.approx(slope, rel=1e-7)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.5, 4.0, 30.0])
+def test_the_equilibrium_carries_the_load(share: float):
+    assert force(SPRING, equilibrium(SPRING, share * SPRING.force)) == pytest.approx(share * SPRING.force)
+
+
+def test_a_load_below_the_precharge_compresses_nothing():
+    assert equilibrium(SPRING, 0.9 * SPRING.force) == 0.0
+    assert equilibrium(SPRING, 0.0) == 0.0
+
+
+def test_no_room_left_is_infinite():
+    for stroke in (SPRING.length, 1.0):
+        assert force(SPRING, stroke) == math.inf
+        assert stiffness(SPRING, stroke) == math.inf
+    assert math.isfinite(force(SPRING, 0.999 * SPRING.length))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_designed_spring_has_the_forces_asked_for(seed: int):
+    draw = np.random.default_rng(seed)
+    extended, ratio, stroke, exponent = draw.uniform([10.0, 1.1, 0.01, 1.0], [1e6, 20.0, 2.0, 1.4])
+    spring = designed(extended, ratio * extended, stroke, exponent)
+    assert spring.length > stroke
+    assert force(spring, 0.0) == pytest.approx(extended)
+    assert force(spring, stroke) == pytest.approx(ratio * extended)
+
+
+def test_the_charge_is_that_spring_again():
+    """P V^γ is constant from the full gas volume to what the cylinder leaves of it."""
+    area, stroke = 0.00116, 0.18
+    spring = designed(395.0, 12.0 * 395.0, stroke, 1.4)
+    charge = charged(spring, area, stroke)
+    left = charge.gas - charge.cylinder
+    assert charge.pressure * area == pytest.approx(395.0)
+    assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(force(spring, stroke))
+    assert charge.cylinder / charge.gas == pytest.approx(stroke / spring.length)
+
+
+def test_compiled_code_has_the_same_force():
+    @njit
+    def compiled(spring: GasSpring, stroke: float, load: float) -> tuple[float, float, float]:
+        return force(spring, stroke), stiffness(spring, stroke), equilibrium(spring, load)
+
+    expected = force(SPRING, 0.3), stiffness(SPRING, 0.3), equilibrium(SPRING, 5e5)
+    assert compiled(SPRING, 0.3, 5e5) == pytest.approx(expected, rel=1e-14)
+    assert compiled(SPRING, 0.7, 5e5)[0] == math.inf
+
+
+def test_bad_input_is_one_line():
+    for make, words in (
+        (lambda: designed(0.0, 10.0, 0.1, 1.4), "the force fully extended of a gas spring is 0 N; it has to be positive"),
+        (lambda: designed(10.0, 10.0, 0.1, 1.4), "the force compressed, 10 N, has to exceed the one fully extended, 10 N"),
+        (lambda: designed(10.0, 40.0, math.nan, 1.4), "the stroke of a gas spring is nan m"),
+        (lambda: designed(10.0, 40.0, 0.1, -1.0), "the exponent of a gas spring is -1; it"),
+        (lambda: charged(SPRING, -1e-3, 0.5), "the area of a gas spring is -0.001 m²"),
+        (lambda: charged(SPRING, 1e-3, 0.7), "a stroke of 0.7 m leaves no room in a gas column of 0.673 m"),
+    ):
+        with pytest.raises(RigtwinError) as raised:
+            make()
+        assert words in str(raised.value)
+        assert "\n" not in str(raised.value)
