@@ -3,13 +3,15 @@
 They know nothing of the twin. `update` is one tick of the whole controller.
 """
 
-from controllers.mil import State, initial_state, update
+from controllers.mil import SIZE, Controller, State, controller, initial_state, packed, unpacked, update
 from controllers.settings import Compensator, Mode, Settings, Skyhook, Structure, Travel
 from controllers.signals import Commands, Demand, Measurements
 
 __all__ = [
+    "SIZE",
     "Commands",
     "Compensator",
+    "Controller",
     "Demand",
     "Measurements",
     "Mode",
@@ -18,6 +20,9 @@ __all__ = [
     "State",
     "Structure",
     "Travel",
+    "controller",
     "initial_state",
+    "packed",
+    "unpacked",
     "update",
 ]

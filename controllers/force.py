@@ -10,14 +10,16 @@ MOTOR_CONSTANT = 186.0
 
 
 @compilable
-def force_loop(settings: Settings, integral: float, demanded: float, measured: float, period: float) -> tuple[float, float]:
-    """One tick. demanded, measured, integral in N; returns (integral in N, voltage in V).
+def force_loop(
+    settings: Settings, integral: float, demanded: float, measured: float, added: float, period: float
+) -> tuple[float, float]:
+    """One tick. demanded, measured, integral, added (against friction) in N; returns (integral in N, voltage in V).
 
     When the voltage reaches its limit this tick's increment of the integral is discarded.
     """
     error = demanded - measured
     increment = settings.ki * error * period
-    voltage = (settings.kff * demanded + settings.kp * error + integral + increment) / MOTOR_CONSTANT
+    voltage = (settings.kff * demanded + settings.kp * error + integral + increment + added) / MOTOR_CONSTANT
     limit = settings.voltage_limit
     if abs(voltage) >= limit:
         return integral, min(max(voltage, -limit), limit)

@@ -6,6 +6,9 @@ from typing import Annotated, NamedTuple
 
 from controllers.quantity import Choice, Quantity
 
+_CHOSEN = "the thesis does not give it; docs/friction.md"
+_BEAM = "thesis Table 7.4"
+
 
 class Mode(Choice):
     """`mil`: suspension and structure models close the loop; `imposed`: force and motions are demanded from outside."""
@@ -15,22 +18,31 @@ class Mode(Choice):
 
 
 class Travel(Choice):
-    """What the suspension model's travel is measured from: the wheel, or the ground (single mass tests, thesis §3.6)."""
+    """What the suspension model's travel is of: plate against wheel, plate against ground (single mass tests, thesis §3.6), or
+    the structure model against the demanded ground, so that no sensor is in it (thesis Fig. 4.1)."""
 
     WHEEL = 0
     GROUND = 1
+    MODEL = 2
 
 
 class Structure(Choice):
-    """The structure model: a point mass."""
+    """The structure model: a point mass, or the cross of elastic beams (thesis §7.2)."""
 
     POINT = 0
+    BEAM = 1
 
 
 class Compensator(Choice):
-    """The friction compensator: none."""
+    """The friction compensator: none; the thesis' own with one or two steps (§4.5, §4.6), and the partial ones that it is
+    compared with (Table 4.1); or an observer of the friction force."""
 
     NONE = 0
+    ONE_STEP = 1
+    TWO_STEP = 2
+    FORCE_PROFILE = 3
+    FORCE_THRESHOLD = 4
+    OBSERVER = 5
 
 
 class Skyhook(Choice):
@@ -65,3 +77,22 @@ class Settings(NamedTuple):
     kp: Annotated[float, Quantity("1", 0.0, 20.0, "assumed, the thesis does not give it")] = 0.3
     ki: Annotated[float, Quantity("1/s", 0.0, 1e3, "assumed, the thesis does not give it")] = 10.0
     voltage_limit: Annotated[float, Quantity("V", 0.0, 10.0, "amplifier input ±10 V")] = 10.0
+    friction_step: Annotated[float, Quantity("N", 0.0, 1e3, "the jump 2·F_c, 0.15 V; thesis §4.4")] = 27.9
+    spike_threshold: Annotated[float, Quantity("N", 0.0, 1e3, "thesis Fig. 4.7")] = 4.0
+    spike_gradient: Annotated[float, Quantity("N/s", 0.0, 1e6, "0.2 N a sample, thesis §4.5.2")] = 200.0
+    spike_samples: Annotated[float, Quantity("1", 1.0, 5.0, "five gradients, thesis §4.5.2")] = 5.0
+    crossing_time: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §4.5.1")] = 0.03
+    crossing_prediction: Annotated[float, Quantity("s", 0.0, 0.1, _CHOSEN)] = 0.005
+    crossing_extension: Annotated[float, Quantity("s", 0.0, 0.5, _CHOSEN)] = 0.01
+    filter_acceleration: Annotated[float, Quantity("s", 0.0, 1.0, _CHOSEN)] = 0.02
+    compensation_buffer: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §4.6")] = 0.04
+    observer_lag: Annotated[float, Quantity("s", 0.0, 1.0, _CHOSEN)] = 0.01
+    observer_gate: Annotated[float, Quantity("N", 0.0, 1e3, _CHOSEN)] = 6.0
+    observer_notch: Annotated[float, Quantity("Hz", 0.0, 100.0, _CHOSEN)] = 0.5
+    beam_modulus: Annotated[float, Quantity("N/m^2", 1.0, 1e13, _BEAM)] = 1.2e6
+    beam_inertia: Annotated[float, Quantity("m^4", 1e-12, 1e3, _BEAM)] = 0.01
+    beam_length: Annotated[float, Quantity("m", 0.01, 100.0, _BEAM)] = 2.0
+    beam_area: Annotated[float, Quantity("m^2", 1e-9, 10.0, _BEAM)] = 3.828e-4
+    beam_density: Annotated[float, Quantity("kg/m^3", 1.0, 1e5, _BEAM)] = 2721.0
+    beam_damping: Annotated[float, Quantity("s", 0.0, 10.0, "times the stiffness; thesis Table 7.4")] = 0.01
+    beam_sag: Annotated[float, Quantity("1", 0.0, 1.0, "0: starts straight; 1: bent as the preload bends it")] = 0.0

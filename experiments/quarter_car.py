@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controllers import Settings, Skyhook
+from controllers import Settings, Skyhook, Structure
 from experiments.experiment import Experiment, flat_ground, road_ground
 from rigtwin.configuration import Configuration, Road, Timing
 
@@ -38,6 +38,16 @@ EXPERIMENTS = (
             f"{name} suspension, motorway at 25 km/h, 0.2-1.6 Hz",
             "thesis §7.1",
             Configuration(controller=settings, timing=_LONG, road=ROAD_CHAPTER_7),
+            road_ground,
+        )
+        for name, settings in (("passive", PASSIVE), ("semi-active", SEMI_ACTIVE), ("active", ACTIVE))
+    ),
+    *(
+        Experiment(
+            f"beam-{name}",
+            f"{name} suspension under a cross of elastic beams, motorway at 25 km/h",
+            "thesis §7.2",
+            Configuration(controller=settings._replace(structure=Structure.BEAM), timing=_LONG, road=ROAD_CHAPTER_7),
             road_ground,
         )
         for name, settings in (("passive", PASSIVE), ("semi-active", SEMI_ACTIVE), ("active", ACTIVE))

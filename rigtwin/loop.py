@@ -13,7 +13,7 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from controllers import Commands, Demand, Measurements, Settings, State, initial_state, update
+from controllers import SIZE, Commands, Controller, Demand, Measurements, controller, initial_state, packed, unpacked, update
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration, Safety
@@ -25,9 +25,6 @@ from rigtwin.twin import Twin
 
 BLOCK = 250
 """Ticks handed on at a time, so what is not yet in a recording is at most a quarter of a second."""
-
-
-STATE_SIZE = len(State._fields)
 
 
 @dataclass(frozen=True)
@@ -44,8 +41,8 @@ class Block:
 
 def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Block]:
     """Runs a test tick by tick. demands: shape (ticks, 3), columns of controllers.Demand."""
-    settings, period = configuration.controller, configuration.timing.period
-    state = initial_state(settings)
+    controlling = controller(configuration.controller, configuration.timing.period)
+    state = initial_state(controlling)
     rig.start()
     try:
         for first in range(0, len(demands), BLOCK):
@@ -59,7 +56,7 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
                 if isinstance(rig, Twin) and rig.misses(1)[0]:
                     commands = rig.held
                 else:
-                    state, commands = update(settings, state, measured, Demand(*demand.tolist()), period)
+                    state, commands = update(controlling, state, measured, Demand(*demand.tolist()))
                 rows.append((commands, measured))
                 trip = tripped(configuration.safety, measured, commands)
                 if trip != Trip.NONE:
@@ -81,7 +78,7 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
 @kernel
 def _ticks(
     machine: Machine,
-    settings: Settings,
+    controlling: Controller,
     limits: Safety,
     sensing: Sensing,
     memory: Array,
@@ -89,14 +86,13 @@ def _ticks(
     demands: Array,
     missed: NDArray[np.bool_],
     disturbance: Array,
-    period: float,
     commands_out: Array,
     measured_out: Array,
     truth_out: Array,
 ) -> tuple[int, int]:
     """Ticks done and the number of a Trip. Gives back plain numbers and arrays only: making any other Python object can run
     into a pending Ctrl-C, which compiled code does not survive."""
-    state = State(*to_fixed_tuple(memory, STATE_SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
     done, trip = 0, Trip.NONE
     for tick in range(len(demands)):
         true = sense(machine)
@@ -104,7 +100,7 @@ def _ticks(
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
         commands = held
         if not missed[tick]:
-            state, commands = update(settings, state, measured, demand, period)
+            state, commands = update(controlling, state, measured, demand)
         for column in range(4):
             commands_out[tick, column] = commands[column]
             measured_out[tick, column] = measured[column]
@@ -115,21 +111,22 @@ def _ticks(
             break
         advance(machine, commands.ground, commands.structure, commands.voltage)
         held = commands
-    for number in range(STATE_SIZE):
-        memory[number] = state[number]
+    numbers = packed(state)
+    for number in range(SIZE):
+        memory[number] = numbers[number]
     return done, trip.value
 
 
 def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
-    settings, period = configuration.controller, configuration.timing.period
-    memory = np.array(initial_state(settings))
+    controlling = controller(configuration.controller, configuration.timing.period)
+    memory = np.array(packed(initial_state(controlling)))
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
         done, number = _ticks(
             twin.simulation.machine,
-            settings,
+            controlling,
             configuration.safety,
             twin.sensing,
             memory,
@@ -137,7 +134,6 @@ def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block
             asked,
             twin.misses(len(asked)),
             twin.disturbance.take(len(asked)),
-            period,
             commands,
             measured,
             truth,

@@ -1,10 +1,12 @@
-"""Runs one test on the twin and records it."""
+"""Runs one test on the twin, into a recording or in memory."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from rigtwin import __version__
 from rigtwin.arrays import Array
@@ -24,6 +26,25 @@ class Outcome:
     ticks: int
     reason: str
     tripped: bool
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of controllers.Commands, .Measurements;
+    trip: why it ended early, or Trip.NONE."""
+
+    commands: Array
+    measurements: Array
+    truth: Array
+    trip: Trip
+
+
+def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
+    """Runs `demands`, shape (ticks, 3), on the twin and keeps everything in memory."""
+    blocks = list(run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands))
+    truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
+    commands, measured = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("commands", "measurements"))
+    return Ran(commands, measured, truth, blocks[-1].trip)
 
 
 def record(

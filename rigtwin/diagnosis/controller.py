@@ -9,7 +9,19 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from controllers import Commands, Demand, Measurements, Settings, State, initial_state, update
+from controllers import (
+    SIZE,
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    Settings,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
 from controllers.quantity import Quantity, fields
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
@@ -21,29 +33,27 @@ EXACT = 20.0
 """Roundings of a recorded command within which a replay is exact."""
 REPEATED = 0.2
 """Share of ticks above which equal commands are no missed ticks but a command that does not change."""
-STATE_SIZE = len(State._fields)
 LATE = 4
 """Ticks by which the controller's samples may be late."""
 
 
 @kernel
 def _replayed(
-    settings: Settings,
+    controlling: Controller,
     start: Array,
     sensors: Array,
     demands: Array,
     skipped: NDArray[np.bool_],
-    period: float,
     out: Array,
 ) -> None:
     """sensors, demands: shape (ticks, 4) and (ticks, 3); out: commands, shape (ticks, 4). A skipped tick repeats the last."""
-    state = State(*to_fixed_tuple(start, STATE_SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
     held = Commands(0.0, 0.0, 0.0, 0.0)
     for tick in range(len(sensors)):
         measured = Measurements(sensors[tick, 0], sensors[tick, 1], sensors[tick, 2], sensors[tick, 3])
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
         if not skipped[tick]:
-            state, held = update(settings, state, measured, demand, period)
+            state, held = update(controlling, state, measured, demand)
         for column in range(4):
             out[tick, column] = held[column]
 
@@ -77,8 +87,9 @@ class ControllerReplay:
         out, sensors = np.empty_like(self.recorded), self._sensors
         if late:
             sensors = np.concatenate([np.repeat(sensors[:1], late, axis=0), sensors[:-late]])
-        start = np.array(initial_state(settings))
-        _replayed(settings, start, sensors, self._demands, self._none if skipped is None else skipped, self._period, out)
+        controlling = controller(settings, self._period)
+        start = np.array(packed(initial_state(controlling)))
+        _replayed(controlling, start, sensors, self._demands, self._none if skipped is None else skipped, out)
         return out
 
     def misfit(self, commands: Array, counted: NDArray[np.bool_] | None = None) -> float:
