@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments.studies import chapter_6
 from rigtwin.errors import RigtwinError
 from rigtwin.plot import draw
 from rigtwin.video import FRAMES_PER_SECOND, SCENE_HEIGHT, film
@@ -65,9 +64,3 @@ def test_film_refuses_what_it_cannot_do(example, tmp_path):
     with pytest.raises(RigtwinError, match="suspension_lvdt is missing"):
         film(dataclasses.replace(example, columns={"/sensor": {"structure_lvdt": example.time}}), tmp_path / "f.mp4")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_chapter_6_is_drawn(tmp_path):
-    text = chapter_6(1, tmp_path / "c.png", lambda _: None)
-    assert "limit cycle at rest" in text
-    assert imread(tmp_path / "c.png").std() > 0.1

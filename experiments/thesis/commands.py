@@ -1,0 +1,70 @@
+"""`rigtwin reproduce`: does the jobs of what was asked for, then prints and draws what was concluded."""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+from tqdm import tqdm
+
+from experiments.thesis.catalogue import asked
+from experiments.thesis.reproduction import Chapter, cut, document, gallery, page, text
+from experiments.thesis.work import done
+from rigtwin.console import writable, write_json
+from rigtwin.errors import RigtwinError
+from rigtwin.plot import checked_ending, save
+
+MOST_SEEDS = 1000
+
+
+def reproduce(parsed: Namespace) -> int:
+    """Runs the studies asked for; a second run goes on where the first was stopped."""
+    wanted = asked(" ".join(parsed.what) or None)
+    if not 1 <= parsed.seeds <= MOST_SEEDS:
+        raise RigtwinError(f"--seeds {parsed.seeds}: expected 1 to {MOST_SEEDS}")
+    workers = parsed.workers or os.cpu_count() or 1
+    if workers < 1:
+        raise RigtwinError(f"--workers {parsed.workers}: expected 1 or more")
+    for out in (parsed.json, parsed.html):
+        if out is not None:
+            writable(out)
+    if parsed.draw is not None and parsed.draw.exists() and not parsed.draw.is_dir():
+        raise RigtwinError(f"cannot draw into {parsed.draw}: it is a file")
+    with tqdm(disable=None, desc="reproduce", unit="job", leave=False, file=sys.stderr) as bar:
+
+        def progress(count: int, total: int) -> None:
+            bar.total = total
+            bar.update(count - bar.n)
+
+        results = done(wanted.studies, parsed.seeds, parsed.folder, workers, progress)
+    chapters = [cut(study, study.conclude(results[study.name]), wanted) for study in wanted.studies]
+    every = len(parsed.what) == 0
+    print(text(chapters, every))
+    if parsed.json is not None:
+        write_json(parsed.json, document(chapters, every))
+    if parsed.html is not None:
+        try:
+            parsed.html.write_text(page(chapters, every), encoding="utf-8")
+        except OSError as error:
+            raise RigtwinError(f"cannot write {parsed.html}: {error.strerror}") from None
+        print(f"\nlook at {parsed.html}")
+    if parsed.draw is not None:
+        _draw(chapters, parsed.draw)
+    if parsed.gallery is not None:
+        print(f"\ngallery in {gallery(chapters, parsed.gallery, every)}")
+    return 0
+
+
+def _draw(chapters: list[Chapter], folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {folder}: {error.strerror}") from None
+    for chapter in chapters:
+        for drawing in chapter.conclusion.drawings:
+            out = folder / f"{chapter.study.name}-{drawing.name}.png"
+            checked_ending(out)
+            save(drawing.figure, out)
+            print(f"{drawing.covers} drawn in {out}")

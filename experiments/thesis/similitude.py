@@ -1,0 +1,407 @@
+"""Thesis §3.5: the Boeing 707's landing gear scaled down to the rig. Tables 3.1 to 3.3 and the gas spring, and a landing that
+is simulated in full size and at the rig's scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from controllers.quantity import Quantity, fields
+from experiments.thesis.entry import Entry, digits, number, statement
+from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
+from experiments.vehicles import VEHICLES, configuration
+from rigtwin.arrays import Array
+from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, force, stiffness
+from rigtwin.parameters import Cylinder, Motor
+from rigtwin.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
+
+_TABLE = "thesis Table 3.1"
+_LIFT = "the wings carry the aircraft at touch-down and let go within a second, assumed"
+
+
+class Landing(NamedTuple):
+    """A quarter car with a gas spring that touches down: thesis Eq. 3.4 and 3.5, with the exponent that they lack, a tyre that
+    stands on the ground and only pushes, the wheel's weight, and a stop where the strut is fully extended."""
+
+    sprung_mass: Annotated[float, Quantity("kg", 1.0, 1e6, _TABLE)] = 68_210.0
+    unsprung_mass: Annotated[float, Quantity("kg", 0.1, 1e5, _TABLE)] = 1140.0
+    damping: Annotated[float, Quantity("Ns/m", 0.0, 1e7, _TABLE)] = 105_400.0
+    tyre_stiffness: Annotated[float, Quantity("N/m", 1e2, 1e9, _TABLE)] = 8_461_000.0
+    gas_force: Annotated[float, Quantity("N", 1.0, 1e7, "thesis §3.5")] = 167_285.0
+    gas_length: Annotated[float, Quantity("m", 0.01, 10.0, "thesis §3.5")] = 0.673
+    exponent: Annotated[float, Quantity("1", 1.0, 2.0, "adiabatic air; it reproduces the printed stiffness")] = 1.4
+    stop_stiffness: Annotated[float, Quantity("N/m", 0.0, 1e10, "ten times the tyre's and more, assumed")] = 1e8
+    gravity: Annotated[float, Quantity("m/s^2", 0.0, 30.0, "standard")] = 9.81
+    velocity: Annotated[float, Quantity("m/s", 0.0, 10.0, "thesis Table 3.2")] = 3.0
+    lift: Annotated[float, Quantity("1", 0.0, 1.0, "1 at touch-down, a share of the weight; " + _LIFT)] = 1.0
+    lift_time: Annotated[float, Quantity("s", 0.01, 100.0, "time constant of its decay; " + _LIFT)] = 1.0
+
+    @property
+    def spring(self) -> GasSpring:
+        return GasSpring(self.gas_force, self.gas_length, self.exponent)
+
+
+BOEING = Landing()
+UNITS = {name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)}
+UNITS |= {"stroke": "m", "time": "s"}
+RIG_STROKE = 0.18
+"""m, Table 3.2."""
+PRINTED = (200.0, 0.589)
+"""Sprung mass of the rig, kg, and stroke of the landing gear, m, as printed (Table 3.2, §3.5)."""
+RECONSTRUCTED = (500.0, 0.559)
+"""The same as Table 3.3 and the gas spring's stiffness ask for; 0.559 m are 22 in."""
+BORE, ROD = 0.050, 0.032
+"""m, of a standard cylinder whose annulus gives the printed area, volume and pressure; assumed."""
+INSTANTS = np.linspace(0.0, 3.0, 1501)
+"""s of full size, of the landing."""
+
+
+def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
+    """Rig over aircraft. mass: sprung mass of the rig, kg; stroke: of the landing gear, m."""
+    return scaling(UNITS, {"sprung_mass": mass / BOEING.sprung_mass, "stroke": RIG_STROKE / stroke, "time": time})
+
+
+def at_scale(landing: Landing, scale: Scaling) -> Landing:
+    """The landing of the scaled system."""
+    return Landing(**scaled(landing._asdict(), UNITS, scale))
+
+
+def touch_down(landing: Landing, instants: Array) -> Array:
+    """Compression of the strut, m, velocity of the sprung mass, m/s, force of gas and damper, N; shape (3, instants)."""
+    spring, weight = landing.spring, landing.sprung_mass + landing.unsprung_mass
+
+    def between(travel: float, speed: float) -> float:
+        return force(spring, travel) + landing.damping * speed
+
+    def change(time: float, state: Array) -> list[float]:
+        body, wheel, body_velocity, wheel_velocity = state.tolist()
+        strut = between(wheel - body, wheel_velocity - body_velocity) + landing.stop_stiffness * min(wheel - body, 0.0)
+        lift = landing.lift * weight * landing.gravity * math.exp(-time / landing.lift_time)
+        tyre = max(-landing.tyre_stiffness * wheel, 0.0)
+        return [
+            body_velocity,
+            wheel_velocity,
+            (strut + lift) / landing.sprung_mass - landing.gravity,
+            (tyre - strut) / landing.unsprung_mass - landing.gravity,
+        ]
+
+    # In flight the gas presses the wheel, and its weight pulls it, against the stop.
+    hanging = (landing.gas_force + landing.unsprung_mass * landing.gravity) / (landing.stop_stiffness + stiffness(spring, 0.0))
+    start = [hanging, 0.0, -landing.velocity, -landing.velocity]
+    span = (float(instants[0]), float(instants[-1]))
+    run = solve_ivp(change, span, start, "DOP853", instants, rtol=1e-9, atol=1e-11, max_step=span[1] / 100.0)
+    body, wheel, body_velocity, wheel_velocity = run.y
+    travel = wheel - body
+    pushed = [between(x, v) for x, v in zip(travel.tolist(), (wheel_velocity - body_velocity).tolist(), strict=True)]
+    return np.array([travel, body_velocity, pushed])
+
+
+def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
+    """The scaled landing, simulated at its own size and pace, in the measures of the original; instants: of the original, s."""
+    factors = np.array([scale.factor(unit) for unit in ("m", "m/s", "N")])
+    return touch_down(landing, instants * scale.time) / factors[:, None]
+
+
+def difference(original: Array, other: Array) -> float:
+    """Largest, over the peak of each signal."""
+    return float(np.max(np.abs(other - original) / np.max(np.abs(original), axis=1, keepdims=True)))
+
+
+def _table_1() -> list[Entry]:
+    vehicle, tyre = VEHICLES["boeing-707"], configuration(VEHICLES["boeing-707"]).plant.tyre
+    note = "Table 6.1's, as the twin runs it"
+    return [
+        digits("Table 3.1", "sprung mass", "68210", vehicle.sprung_mass, "kg", note),
+        digits("Table 3.1", "unsprung mass", "1140", vehicle.unsprung_mass, "kg", note),
+        digits("Table 3.1", "suspension stiffness", "11250000", vehicle.suspension_stiffness, "N/m", note),
+        digits("Table 3.1", "suspension damping", "105400", vehicle.suspension_damping, "Ns/m", note),
+        digits("Table 3.1", "tyre stiffness", "8461000", tyre.stiffness, "N/m", note),
+        digits("Table 3.1", "tyre damping", "0", tyre.damping, "Ns/m", note),
+    ]
+
+
+def _springs() -> dict[str, tuple[GasSpring, float]]:
+    """By words, the gas spring and its stroke, m: as printed, with the exponent of four times the static load; and the one
+    that the printed stiffness asks for."""
+    load, length = BOEING.sprung_mass * BOEING.gravity, BOEING.gas_length
+    _, printed = PRINTED
+    exponent = math.log(4.0 * load / BOEING.gas_force) / math.log(length / (length - printed))
+    as_printed = f"0.589 m and four times the static load (exponent {exponent:.3f})"
+    return {
+        as_printed: (GasSpring(BOEING.gas_force, length, exponent), printed),
+        "0.559 m and exponent 1.4": (BOEING.spring, RECONSTRUCTED[1]),
+    }
+
+
+def _equation_3() -> list[Entry]:
+    where, load = "Equation 3.3", BOEING.sprung_mass * BOEING.gravity
+    _, stroke = RECONSTRUCTED
+    lengths = [designed(load / 4.0, f * load, x, BOEING.exponent).length for f, x in ((4.0, PRINTED[1]), (3.0, stroke))]
+    wrong = "0.589 m and four times are not what this was computed with"
+    entries = [
+        digits(where, "force fully extended, a quarter of the static load", "167285", load / 4.0, "N"),
+        digits(where, "length for 0.589 m, exponent 1.4, four times the static load", "0.673", lengths[0], "m", wrong),
+        digits(where, "length for 0.559 m, exponent 1.4, three times the static load", "0.673", lengths[1], "m"),
+        digits(
+            where,
+            "stroke at which an exponent of 1.4 has 24.7 MN/m",
+            "0.589",
+            _reaches(BOEING.spring, 24.7e6),
+            "m",
+            "0.559 m (22 in) is right: length, stiffness and equilibrium here, velocity and gas force in Table 3.3 all need it",
+        ),
+    ]
+    for words, (spring, travel) in _springs().items():
+        at_rest = equilibrium(spring, load)
+        differs = wrong if travel == PRINTED[1] else ""
+        small = f"the stroke is not in it; 3.79 MN/m is reached {1e3 * (_reaches(spring, 3.79e6) - at_rest):.1f} mm further on"
+        entries += [
+            digits(where, f"stiffness at equilibrium, {words}", "3.79", 1e-6 * stiffness(spring, at_rest), "MN/m", small),
+            digits(where, f"stiffness fully compressed, {words}", "24.7", 1e-6 * stiffness(spring, travel), "MN/m", differs),
+            digits(where, f"equilibrium over stroke, {words}", "76", 100.0 * at_rest / travel, "%", differs),
+        ]
+    spring, travel = BOEING.spring, stroke
+    pressed = force(spring, travel) / load
+    beyond = "sized for three times: its length, 24.7 MN/m and 76 % ask for that"
+    entries.append(digits(where, "force fully compressed over static load, exponent 1.4", "4", pressed, "1", beyond))
+    soft, hard = (1e-6 * stiffness(spring, x) for x in (equilibrium(spring, load), travel))
+    rated = 1e-6 * VEHICLES["boeing-707"].suspension_stiffness
+    says = "11.25 MN/m lies between equilibrium and full compression"
+    return [*entries, statement(where, "rated stiffness", says, soft < rated < hard, f"{soft:.2f} < {rated:.2f} < {hard:.2f}")]
+
+
+def _reaches(spring: GasSpring, wanted: float) -> float:
+    """Compression at which the stiffness is the one wanted, N/m: where γ F L^γ = k (L − x)^(γ + 1)."""
+    constant = spring.exponent * spring.force * spring.length**spring.exponent
+    return spring.length - (constant / wanted) ** (1.0 / (spring.exponent + 1.0))
+
+
+def _equation_6() -> list[Entry]:
+    units = {"m_u": "kg", "m_s": "kg", "x_u": "m", "x_s": "m", "u": "m", "L": "m", "P_iA_g": "N", "b_s": "Ns/m"}
+    units |= {"b_t": "Ns/m", "k_t": "N/m", "g": "m/s^2", "t": "s"}
+    groups = pi_groups(units, ("m_s", "x_s", "t"))
+    ours = ", ".join(str(group) for group in groups)
+    printed = (
+        {"m_u": 1, "m_s": -1},
+        {"x_u": 1, "x_s": -1},
+        {"u": 1, "x_s": -1},
+        {"L": 1, "x_s": -1},
+        {"P_iA_g": 1, "t": 2, "x_s": -1, "m_s": -1},
+        {"b_s": 1, "t": 1, "m_s": -1},
+        {"b_t": 1, "t": 1, "m_s": -1},
+        {"k_t": 1, "t": 2, "m_s": -1},
+        {"g": 1, "t": 2, "x_s": -1},
+    )
+    same = [dict(group.exponents) for group in groups] == [dict(group) for group in printed]
+    note = "numbered to π8 because there are two π4; the exponent γ, a group of its own, is not counted"
+    scale = scaling(units, {"m_s": 0.0123, "x_s": 0.345, "t": 6.78})
+    relations = ("m_s = m_u", "x_s = x_u", "x_s = u", "x_s = L", "m_s x_s = P_iA_g t t", "m_s = b_s t", "m_s = b_t t")
+    relations += ("m_s = k_t t t", "x_s = g t t")
+    sides = [
+        [math.prod(scale.factor(units[name]) for name in side.split()) for side in each.split(" = ")] for each in relations
+    ]
+    apart = max(abs(left / right - 1.0) for left, right in sides)
+    # The groups are kept by any scale factors of these relations, and by no others.
+    before = dict.fromkeys(units, 1.0)
+    change = max(apart, largest_change(units, before, scaled(before, units, scale)))
+    return [
+        statement("Equation 3.6", "groups of 12 variables", "n − m dimensionless groups, listed", same, ours, note),
+        statement(
+            "Equation 3.8", "nine relations of factors", "keep every group", change < 1e-12, f"to {change:.0e}, time scale too"
+        ),
+    ]
+
+
+def _table_2() -> list[Entry]:
+    where, (_, stroke) = "Table 3.2", RECONSTRUCTED
+    wheel, damper, fast = number("8.36") / BOEING.unsprung_mass, number("772") / BOEING.damping, number("0.966")
+    because = "wheel mass and damping of Table 3.3 both ask for 500 kg; 500 is right"
+    back = "worked back from Table 3.3"
+    return [
+        digits(where, "rig suspension stroke, of 0.559 m", "0.18", fast / BOEING.velocity * stroke, "m", back),
+        digits(
+            where, "rig suspension stroke, of 0.589 m", "0.18", fast / BOEING.velocity * PRINTED[1], "m", "0.559 m is right"
+        ),
+        digits(where, "rig sprung mass, by the wheel mass", "200", wheel * BOEING.sprung_mass, "kg", because),
+        digits(where, "rig sprung mass, by the damping", "200", damper * BOEING.sprung_mass, "kg", because),
+        digits(where, "time scaling factor, mass over damping", "1", wheel / damper, "1", back),
+        digits(where, "landing velocity, of 0.559 m", "3", fast / RIG_STROKE * stroke, "m/s", back),
+    ]
+
+
+def _table_3() -> list[Entry]:
+    entries = []
+    for mass, stroke in (PRINTED, RECONSTRUCTED):
+        rig = at_scale(BOEING, similar(mass, stroke))
+        words = f"{mass:g} kg and {stroke:g} m"
+        printed = (mass, stroke) == PRINTED
+        note = "Table 3.3 was not computed from Table 3.2; it needs 500 kg and 0.559 m" if printed else ""
+        product = rig.damping * rig.velocity
+        # The thesis multiplies its own rounded figures.
+        rounded = product if printed else round(rig.damping) * round(rig.velocity, 3)
+        cut, multiplied = (
+            (note, note) if printed else ("772.6, cut off and not rounded", f"773 × 0.966; unrounded {product:.1f}")
+        )
+        entries += [
+            digits("Table 3.3", f"gas spring force constant, {words}", "395", rig.gas_force, "N", note),
+            digits("Table 3.3", f"damping coefficient, {words}", "772", rig.damping, "Ns/m", cut),
+            digits("Table 3.3", f"maximum velocity, {words}", "0.966", rig.velocity, "m/s", note),
+            digits("Table 3.3", f"maximum damping force, {words}", "747", rounded, "N", multiplied),
+            digits("Table 3.3", f"wheel mass, {words}", "8.36", rig.unsprung_mass, "kg", note),
+        ]
+    return entries
+
+
+def _cylinder() -> list[Entry]:
+    where, rig = "§3.5", at_scale(BOEING, similar(*RECONSTRUCTED))
+    area = math.pi / 4.0 * (BORE**2 - ROD**2)
+    charge, plain = (charged(rig.spring, each, RIG_STROKE) for each in (area, number("0.0012")))
+    bar = 1e-5
+    whose = "annulus of a 50 mm bore with a 32 mm rod; an area of 0.00116 m² gives all three printed figures"
+    litres = "a thousand times too large: litres, not m³"
+    ratio = charge.gas / charge.cylinder
+    odd = BOEING.exponent * BOEING.gas_length / PRINTED[1]
+    gas = (
+        f"by the thesis' own rule cylinder : gas = stroke : length, 1 : {ratio:.3f}; printed 1 : {334 / 209:.3f}, "
+        f"near 1.4 · 0.673/0.589 = {odd:.3f}, as if multiplied by the exponent"
+    )
+    motor, limit = Motor(), Cylinder().speed_limit
+    damper = rig.damping * rig.velocity
+    return [
+        digits(where, "cylinder's area", "0.0012", area, "m²", whose),
+        digits(where, "cylinder's volume, in m³ as printed", "209e-3", charge.cylinder, "m³", litres),
+        digits(where, "cylinder's volume, in litres", "209e-3", 1e3 * charge.cylinder, "l"),
+        digits(where, "initial pressure", "3.41", bar * charge.pressure, "bar"),
+        digits(where, "initial pressure, area as printed", "3.41", bar * plain.pressure, "bar", "0.0012 m² is rounded"),
+        digits(where, "accumulator's volume, in m³ as printed", "334e-3", charge.gas, "m³", litres),
+        digits(where, "accumulator's volume, in litres", "334e-3", 1e3 * charge.gas, "l", gas),
+        digits(where, "stroke of the electric actuator", "0.21", motor.stroke, "m", "the twin's"),
+        digits(where, "force of the electric actuator", "1860", motor.force_limit, "N", "the twin's"),
+        digits(where, "maximum velocity of the hydraulic actuator", "0.3", limit, "m/s", "the twin's"),
+        statement(
+            where,
+            "damping force against the actuator",
+            "well within its capability",
+            damper < motor.force_limit,
+            f"{damper:.0f} N of {motor.force_limit:g} N",
+            f"the gas spring's {force(rig.spring, RIG_STROKE):.0f} N fully compressed are not; it has to be hardware",
+        ),
+        statement(where, "velocity", "greater than 0.3 m/s", rig.velocity > limit, f"{rig.velocity:.3f} m/s"),
+        statement(
+            where,
+            "gravity without a scale of time",
+            "is altered",
+            not math.isclose(rig.gravity, BOEING.gravity, rel_tol=1e-3),
+            f"{rig.gravity:.2f} m/s² on the rig",
+        ),
+    ]
+
+
+def _landings() -> tuple[list[Entry], Drawing, list[str]]:
+    real = similar(*RECONSTRUCTED)
+    slow = slowed(real, BOEING.velocity, Cylinder().speed_limit)
+    full = touch_down(BOEING, INSTANTS)
+    pairs = [(scale, at_scale(BOEING, scale)) for scale in (real, slow)]
+    backs = [mapped_back(landing, scale, INSTANTS) for scale, landing in pairs]
+    mixed = pairs[0][1]._replace(sprung_mass=PRINTED[0])
+    wrong = mapped_back(mixed, real, INSTANTS)
+    apart = [difference(full, back) for back in backs]
+    off = difference(full, wrong)
+    fastest = [float(np.max(np.abs(back[1]))) * scale.factor("m/s") for (scale, _), back in zip(pairs, backs, strict=True)]
+    limit = Cylinder().speed_limit
+    entries = [
+        statement(
+            "§3.5",
+            f"simulated landing mapped back, {words}",
+            "can be scaled back to the original system",
+            worst < 1e-6,
+            f"largest difference {worst:.0e} of the peak; sprung mass up to {speed:.3f} m/s on the rig",
+        )
+        for words, worst, speed in zip(("real time", f"{slow.time:.2f} times slower"), apart, fastest, strict=True)
+    ]
+    entries.append(
+        statement(
+            "§3.5",
+            "pseudo-dynamic time scale",
+            "lowers the velocity requirement",
+            fastest[1] <= limit * (1.0 + 1e-9) < fastest[0],
+            f"{slow.time:.2f} times slower for {limit:g} m/s",
+        )
+    )
+    return entries, _drawing(full, backs, wrong, [scale for scale, _ in pairs], off), _remarks(real, slow, off)
+
+
+def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
+    area = math.pi / 4.0 * (BORE**2 - ROD**2)
+    pressures = [1e-5 * charged(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure for each in (real, slow)]
+    kept = scaling(UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time})
+    no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
+    inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
+    return [
+        "Tables 3.2 and 3.3: 500 kg and 0.559 m are right, not 200 kg and 0.589 m. Table 3.3's figures with a sprung mass of "
+        f"200 kg are no similar system: that landing, mapped back, is off by {100.0 * off:.0f} % of the peak.",
+        "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, exponent 1.4 and three times the static load fully "
+        "compressed; the text says 0.589 m and four times. No stroke gives the 3.79 MN/m at equilibrium: the closed form is "
+        f"{1e-6 * stiffness(BOEING.spring, equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)):.2f} MN/m.",
+        f"Pseudo-dynamic: {BOEING.velocity:g} m/s are {real.factor('m/s') * BOEING.velocity:.3f} m/s on the rig; a time scale "
+        f"of {slow.time:.3f} brings them to {Cylinder().speed_limit:g} m/s. Forces fall by its square: the gas charge from "
+        f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas spring, scale its force in place of the mass: the "
+        f"numerical sprung mass is then {kept.mass * BOEING.sprung_mass:.0f} kg and the wheel "
+        f"{kept.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that is compressed slower gives off more heat, so its "
+        "exponent falls: time cannot be stretched freely where the gas is hardware.",
+        "Eq. 3.4 and 3.5 as printed lack the exponent γ, take the tyre's deflection between the masses and leave out the "
+        "wheel's weight; the landing is simulated with all three put right.",
+        f"With full weight from touch-down on, as in Eq. 3.4, the strut is compressed by {no_lift:.3f} m, of "
+        f"{RECONSTRUCTED[1]:g} m; with lift that fades over {BOEING.lift_time:g} s by {inside:.3f} m.",
+    ]
+
+
+SIGNALS = (("strut compression", "m", 1.0), ("velocity of the sprung mass", "m/s", 1.0), ("strut force", "kN", 1e-3))
+STYLES = (("rig, real time", "#2a6fa8", "--"), ("rig, pseudo-dynamic", "#d1603d", ":"))
+
+
+def _drawing(full: Array, backs: list[Array], wrong: Array, scales: list[Scaling], off: float) -> Drawing:
+    figure, axes = sheet(2, len(SIGNALS), 13.0, 3.4)
+    worst = max(difference(full, back) for back in backs)
+    for column, (name, unit, size) in enumerate(SIGNALS):
+        above, below = axes[0][column], axes[1][column]
+        above.set_title(f"{name}, {unit}: mapped back", fontsize=9)
+        above.plot(INSTANTS, size * full[column], color="#c3c8d0", linewidth=6.0, label="full size")
+        below.set_title(f"{name}, {unit if size == 1.0 else 'N'}: on the rig", fontsize=9)
+        for (label, colour, dashes), back, scale in zip(STYLES, backs, scales, strict=True):
+            above.plot(INSTANTS, size * back[column], dashes, color=colour, linewidth=2.0, label=label)
+            own = scale.factor(("m", "m/s", "N")[column]) * back[column]
+            below.plot(INSTANTS * scale.time, own, color=colour, label=f"{label}, time scale {scale.time:.2f}")
+        above.plot(INSTANTS, size * wrong[column], color="#6b7280", linewidth=0.8, label="Table 3.3 with 200 kg")
+        above.set_xlabel("s of full size", fontsize=8)
+        below.set_xlabel("s on the rig", fontsize=8)
+    for sign in (-1.0, 1.0):
+        axes[1][1].axhline(sign * Cylinder().speed_limit, color="black", linewidth=0.8, linestyle="--")
+    axes[1][1].text(9.6, 1.1 * Cylinder().speed_limit, "hydraulic actuator ± 0.3 m/s", fontsize=7, ha="right", va="bottom")
+    axes[0][1].legend(fontsize=7, loc="lower right")
+    axes[1][2].legend(fontsize=7)
+    caption = (
+        "A Boeing 707 lands at 3 m/s: full size, and the rig of 500 kg and 0.18 m of stroke in real time and "
+        f"{scales[1].time:.2f} times slower. Mapped back by the scale factors they differ by {worst:.0e} of the peak at most; "
+        f"Table 3.3's figures with Table 3.2's 200 kg by {100.0 * off:.0f} %."
+    )
+    return Drawing("similitude", "landing in full size and at the rig's scale, §3.5", caption, figure)
+
+
+def conclude(results: Mapping[str, Result]) -> Conclusion:
+    entries, drawing, remarks = _landings()
+    tables = [*_table_1(), *_equation_3(), *_equation_6(), *_table_2(), *_table_3(), *_cylinder()]
+    return Conclusion((*tables, *entries), (drawing,), tuple(remarks))
+
+
+STUDY = Study(
+    "similitude",
+    "Dynamic similitude: a Boeing 707's landing gear at the rig's scale",
+    "3",
+    ("Table 3.1", "Table 3.2", "Table 3.3", "Equation 3.3", "Equation 3.6", "Equation 3.8"),
+    conclude,
+)

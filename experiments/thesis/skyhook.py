@@ -1,0 +1,172 @@
+"""§7.1 and appendix B1, B2: semi-active and active skyhook under a point mass, over many roads: Tables 7.1 to 7.3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from experiments import find
+from experiments.thesis import ride
+from experiments.thesis.entry import Entry, band, digits, statement
+from experiments.thesis.ride import MEASURED, SHOWN_SEED
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
+from experiments.thesis.trial import over_seeds, seeded, trial
+from rigtwin.plot import ASKED, COLOURS, SENSED
+
+WITHIN = 1.5
+GAINS = {"active 100": 100.0, "active": 200.0, "active 500": 500.0}
+TABLE_7_2 = {"active 100": "0.1039", "active": "0.0819", "active 500": "0.0588"}
+TABLE_7_3 = {"passive": "0.2264", "semi-active": "0.0874", "active": "0.0819"}
+"""rms sprung mass acceleration, m/s²."""
+LIMIT_CYCLE = "below the twin's friction limit cycle at 3.4 Hz and above, whose tail is still in it"
+
+
+def _run(name: str, seed: int) -> Result:
+    if name in GAINS:
+        gain = GAINS[name]
+        return ride.kept(
+            trial("active", seed, lambda c: c._replace(controller=c.controller._replace(skyhook_damping=gain))), seed
+        )
+    return ride.kept(trial(name, seed), seed)
+
+
+def jobs(seeds: int) -> Mapping[str, Job]:
+    return seeded({name: lambda seed, name=name: _run(name, seed) for name in ("passive", "semi-active", *GAINS)}, seeds)
+
+
+def _entries(results: dict[str, Result]) -> list[Entry]:
+    configuration = find("semi-active").configuration
+    settings, plant = configuration.controller, configuration.plant
+    entries = [
+        digits("Table 7.1", "sprung mass", "25", settings.sprung_mass, "kg"),
+        digits("Table 7.1", "suspension stiffness", "1000", settings.suspension_stiffness, "N/m"),
+        digits("Table 7.1", "suspension damping", "50", settings.suspension_damping, "Ns/m"),
+        digits("Table 7.1", "skyhook damping", "200", settings.skyhook_damping, "Ns/m"),
+        digits("Table 7.1", "highest damping", "500", settings.damping_max, "Ns/m"),
+        digits("Table 7.1", "lowest damping", "10", settings.damping_min, "Ns/m"),
+        digits("Table 7.1", "unsprung mass", "34", plant.carriage.mass, "kg"),
+        digits("Table 7.1", "tyre stiffness", "50000", plant.tyre.stiffness, "N/m"),
+        digits("Table 7.1", "tyre damping", "0", plant.tyre.damping, "Ns/m"),
+    ]
+    for table, printed in (("Table 7.2", TABLE_7_2), ("Table 7.3", TABLE_7_3)):
+        for name, text in printed.items():
+            entries.append(band(table, name, text, over_seeds(results, name, "acceleration"), "m/s²", WITHIN, MEASURED))
+    entries += [
+        ride.reduced("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
+        ride.reduced("§7.1.2", results, "active", "passive", "63.8", WITHIN),
+        digits("§7.1.1", "61.4 % from Table 7.3 itself", "61.4", 100 * (1 - 0.0874 / 0.2264), "%"),
+        digits("§7.1.2", "63.8 % from Table 7.3 itself", "63.8", 100 * (1 - 0.0819 / 0.2264), "%"),
+        *ride.tracking("Table B1.1", results, "semi-active", ("7.50", "286", "0.0593", "58"), 1.5),
+        *ride.tracking("Table B2.1", results, "active", ("8.47", "425", "0.0595", "58"), 1.5),
+    ]
+    return entries + _statements(results)
+
+
+def _statements(results: dict[str, Result]) -> list[Entry]:
+    def all_of(name: str, value: str) -> np.ndarray:
+        return over_seeds(results, name, value)
+
+    falls = np.all(np.diff([all_of(name, "acceleration") for name in GAINS], axis=0) < 0, axis=0)
+    text = f"in {int(np.sum(falls))} of {len(falls)} seeds"
+    more = all_of("active 500", "ideal tyre rms") > all_of("active 100", "ideal tyre rms")
+    tyre = all_of("active 500", "tyre rms") > all_of("active 100", "tyre rms")
+    words = f"twin: in {int(np.sum(tyre))} of {len(tyre)} seeds, ideal: in {int(np.sum(more))}"
+    alike = np.abs(all_of("semi-active", "travel rms") / all_of("active", "travel rms") - 1)
+    less = all_of("semi-active", "travel rms") < all_of("passive", "travel rms")
+    switches = all_of("semi-active", "switches")
+    return [
+        statement("Table 7.2", "more skyhook damping", "less body acceleration", bool(np.all(falls)), text),
+        statement("§7.1.2", "more skyhook damping", "more tyre vibration", bool(np.mean(tyre) > 0.5), words),
+        statement(
+            "Figure 7.8",
+            "travel, semi-active and active",
+            "nearly identical",
+            bool(np.median(alike) < 0.1),
+            f"rms differs by {100 * np.median(alike):.1f} %",
+        ),
+        statement(
+            "Figure 7.8",
+            "travel, semi-active",
+            "less than passive",
+            bool(np.all(less)),
+            f"in {int(np.sum(less))} of {len(less)} seeds",
+        ),
+        statement(
+            "Figure 7.2",
+            "damper",
+            "switches at high frequency",
+            bool(np.median(switches) > 5),
+            f"{ride.interval(switches, ' switches a second')}; the road alone would need about 4",
+        ),
+    ]
+
+
+def _forces(results: dict[str, Result]) -> Drawing:
+    figure, axes = sheet(3, 1, height=2.2)
+    for name, axis in (("semi-active", axes[0][0]), ("active", axes[2][0])):
+        for label, colour in (("passive", COLOURS["other"]), (name, SENSED if name == "semi-active" else ASKED)):
+            result = results[f"{label}/{SHOWN_SEED}"]
+            axis.plot(result["time"], result["asked damper"], color=colour, linewidth=0.8, label=label)
+        axis.set(ylabel="damping force, N", xlim=(0, 15))
+        axis.legend(fontsize=8)
+    result = results[f"semi-active/{SHOWN_SEED}"]
+    axes[1][0].plot(result["time"], result["damping"], color=SENSED, linewidth=0.6)
+    axes[1][0].set(ylabel="damper, Ns/m", xlim=(0, 15))
+    axes[2][0].set(xlabel="time, s")
+    return Drawing("figure-7.1", "Figure 7.1 to 7.3", "Demanded damping forces and the semi-active coefficient.", figure)
+
+
+def _box(results: dict[str, Result]) -> Drawing:
+    figure, axes = sheet(1, 2, height=3.2)
+    for axis, printed in ((axes[0][0], TABLE_7_3), (axes[0][1], TABLE_7_2)):
+        for number, (name, text) in enumerate(printed.items()):
+            values = over_seeds(results, name, "acceleration")
+            ideal = over_seeds(results, name, "ideal acceleration")
+            axis.boxplot([values], positions=[number], whis=(5, 95), widths=0.35)
+            axis.plot(
+                number - 0.3,
+                np.median(ideal),
+                "_",
+                color=COLOURS["other"],
+                markersize=14,
+                label="ideal" if number == 0 else None,
+            )
+            axis.plot(number + 0.3, float(text), "*", color=ASKED, markersize=9, label="thesis" if number == 0 else None)
+        axis.set(xticks=range(len(printed)), xticklabels=printed, ylabel="rms body acceleration, m/s²", ylim=(0, None))
+        axis.legend(fontsize=8)
+    return Drawing("table-7.3", "Table 7.2 and 7.3", "Boxes: the twin over all seeds, whiskers 5 and 95 %.", figure)
+
+
+def conclude(results: Mapping[str, Result]) -> Conclusion:
+    found = dict(results)
+    shown = {name: found[f"{name}/{SHOWN_SEED}"] for name in ("passive", "semi-active", "active")}
+    gains = {f"{gain:g} Ns/m": found[f"{name}/{SHOWN_SEED}"] for name, gain in GAINS.items()}
+    drawings = [
+        _forces(found),
+        ride.histories("figure-7.4", "Figure 7.4 to 7.6", "Active skyhook, three gains.", gains),
+        ride.histories("figure-7.7", "Figure 7.7 to 7.9, B1.1 to B2.6", "Passive, semi-active and active skyhook.", shown),
+        _box(found),
+    ]
+    remarks = [
+        f"{name}: body acceleration {ride.interval(over_seeds(found, name, 'acceleration'), ' m/s²')}, with everything in it "
+        f"{ride.interval(over_seeds(found, name, 'everything'), '')}; ideal {ride.interval(over_seeds(found, name, 'ideal everything'), '')}"
+        for name in ("passive", "semi-active", *GAINS)
+    ]
+    remarks.append(MEASURED + "; " + LIMIT_CYCLE)
+    return Conclusion(_entries(found), drawings, remarks)
+
+
+STUDY = Study(
+    "skyhook",
+    "Skyhook under a point mass",
+    "7",
+    (
+        *("Table 7.1", "Table 7.2", "Table 7.3", "Table B1.1", "Table B2.1"),
+        *span("Figure", "7.", 1, 9),
+        *span("Figure", "B1.", 1, 8),
+        *span("Figure", "B2.", 1, 8),
+    ),
+    conclude,
+    jobs,
+)
