@@ -1,4 +1,4 @@
-.PHONY: setup demo test check benchmark system browser clean
+.PHONY: setup demo test check benchmark gallery system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -12,6 +12,7 @@ help:
 	@echo "make setup      make $(VENV) with everything in it"
 	@echo "make check      ruff and pyright"
 	@echo "make benchmark  speeds, side by side"
+	@echo "make gallery    the thesis reproduced: docs/gallery.md, its pictures and videos"
 
 setup: $(VENV)/.done
 
@@ -47,6 +48,16 @@ check: setup
 
 benchmark: setup
 	$(BIN)/python -m benchmarks
+
+gallery: setup system
+	@mkdir -p $(OUT) docs/gallery
+	$(BIN)/rigtwin reproduce --folder $(OUT)/reproduction --gallery docs --html $(OUT)/thesis.html
+	$(BIN)/rigtwin run drop --out $(OUT)/drop.mcap
+	$(BIN)/rigtwin run road10 --out $(OUT)/road10.mcap
+	$(BIN)/rigtwin run beam-semi-active --out $(OUT)/beams.mcap
+	$(BIN)/rigtwin video $(OUT)/drop.mcap -o docs/gallery/drop.mp4 --until 6
+	$(BIN)/rigtwin video $(OUT)/road10.mcap -o docs/gallery/road10.mp4 --until 8
+	$(BIN)/rigtwin video $(OUT)/beams.mcap -o docs/gallery/beams.mp4 --until 6
 
 clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info

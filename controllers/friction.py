@@ -2,7 +2,8 @@
 
 The thesis' own (§4.5, §4.6): a window is open while the velocity is about to cross zero; within it a force error that has risen
 for some samples is a friction spike; then the force added against friction changes its sign, at most once per buffer time. Two
-steps: twice as much at first, half of it taken back when the error has fallen. Another, which needs no velocity: an observer of the friction force, see `observed`.
+steps: twice as much at first, half of it taken back when the error has fallen. Another, which needs no velocity: an observer of
+the friction force, see `observed`.
 """
 
 from __future__ import annotations

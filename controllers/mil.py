@@ -10,6 +10,7 @@ from controllers.compiled import compilable
 from controllers.filters import low_pass
 from controllers.force import MOTOR_CONSTANT, force_loop
 from controllers.friction import NO_ERRORS, NO_VELOCITIES, REST, Compensation, Errors, Velocities, observed, pushed, stepped
+from controllers.gas_spring import gas_force
 from controllers.settings import Compensator, Mode, Settings, Structure, Travel
 from controllers.signals import Commands, Demand, Measurements
 from controllers.skyhook import skyhook_force
@@ -110,12 +111,16 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
         position, structure_velocity = demand.structure, 0.0
     else:
         demanded = suspension_force(settings, travel, velocity) - skyhook_force(settings, state.structure_velocity, velocity)
+        carried = force
+        if settings.gas_force > 0.0:
+            # The load cell is on the motor's rod; what the real spring beside it carries follows from its travel.
+            carried += gas_force(settings.gas_force, settings.gas_length, settings.gas_exponent, -travel)
         if settings.structure == Structure.BEAM:
-            modal, modal_rates = beam(controller.modes, modal, modal_rates, force)
+            modal, modal_rates = beam(controller.modes, modal, modal_rates, carried)
             position, structure_velocity = centre(controller.modes, modal), centre(controller.modes, modal_rates)
         else:
             position, structure_velocity = point_mass(
-                settings, state.structure_position, state.structure_velocity, force, period
+                settings, state.structure_position, state.structure_velocity, carried, period
             )
     compensation, velocities, errors = state.compensation, state.velocities, state.errors
     if settings.compensator == Compensator.OBSERVER:

@@ -96,3 +96,6 @@ class Settings(NamedTuple):
     beam_density: Annotated[float, Quantity("kg/m^3", 1.0, 1e5, _BEAM)] = 2721.0
     beam_damping: Annotated[float, Quantity("s", 0.0, 10.0, "times the stiffness; thesis Table 7.4")] = 0.01
     beam_sag: Annotated[float, Quantity("1", 0.0, 1.0, "0: starts straight; 1: bent as the preload bends it")] = 0.0
+    gas_force: Annotated[float, Quantity("N", 0.0, 1e7, "of a real gas spring beside the motor, extended; 0: none")] = 0.0
+    gas_length: Annotated[float, Quantity("m", 0.01, 10.0, "of its gas column, thesis Eq. 3.3")] = 0.217
+    gas_exponent: Annotated[float, Quantity("1", 1.0, 1.7, "of its gas, thesis Eq. 3.3")] = 1.4

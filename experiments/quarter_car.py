@@ -5,6 +5,7 @@ from __future__ import annotations
 from controllers import Settings, Skyhook, Structure
 from experiments.experiment import Experiment, flat_ground, road_ground
 from rigtwin.configuration import Configuration, Road, Timing
+from rigtwin.parameters import GasSpring, Plant
 
 PASSIVE = Settings()
 SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
@@ -16,8 +17,26 @@ ROAD_CHAPTER_7 = Road(speed=25 / 3.6, lowest=0.2, highest=1.6, spacing=0.2)
 
 _LONG = Timing(duration=45.0)
 
+GAS = GasSpring(force=120.0, length=0.5, exponent=1.2)
+"""Beside the motor, which plays the damper and a soft spring; stiffer ones are unstable with the rig's delays."""
+ON_GAS = Settings(
+    start=-220.0 / 50_000.0,
+    preload=100.0,
+    suspension_stiffness=300.0,
+    gas_force=GAS.force,
+    gas_length=GAS.length,
+    gas_exponent=GAS.exponent,
+)
+
 EXPERIMENTS = (
     Experiment("drop", "passive quarter car dropped, ground at rest", "thesis §6.3.1", Configuration(), flat_ground),
+    Experiment(
+        "gas-spring",
+        "quarter car on a real gas spring beside the motor, dropped",
+        "thesis §3.5, Eq. 3.3",
+        Configuration(plant=Plant(gas_spring=GAS), controller=ON_GAS),
+        flat_ground,
+    ),
     Experiment(
         "road1.6",
         "passive quarter car, motorway at 25 km/h, 0.02-1.6 Hz",

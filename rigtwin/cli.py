@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
+from rigtwin.stability.commands import arguments as stability_arguments
 
 OVERVIEW = """\
 The digital twin of a hybrid suspension rig, and the tool that says why the twin and the rig disagree.
@@ -169,12 +170,41 @@ def _parser() -> argparse.ArgumentParser:
 
     reproduce = command(
         "reproduce",
-        "run a study of the thesis and print its figures beside ours",
-        "studies: table-3.5 (single mass), identification (Eq. 6.1, 6.2), chapter-6 (drop and road; draws)",
+        "reproduce the thesis: its tables, figures and statements beside ours",
+        "examples:\n"
+        "  rigtwin reproduce                       everything, under ten minutes on two cores\n"
+        "  rigtwin reproduce 5                     a chapter\n"
+        "  rigtwin reproduce table-4.2             a table, figure or equation\n"
+        "  rigtwin reproduce skyhook --html F.html --draw FOLDER\n\n"
+        "Results of finished jobs are kept; a second run goes on where the first was stopped.",
     )
-    reproduce.add_argument("study", help="table-3.5, identification or chapter-6")
-    reproduce.add_argument("--seeds", type=int, default=16, help="noise seeds to take the median over (default 16)")
-    reproduce.add_argument("--out", "-o", type=Path, metavar="F.png", help="where to draw the figure, if the study has one")
+    reproduce.add_argument(
+        "what", nargs="*", help="a chapter (3 to 7, A), study, table, figure or equation; default: everything"
+    )
+    reproduce.add_argument("--seeds", type=int, default=32, help="roads and noise to judge over (default 32)")
+    reproduce.add_argument("--workers", type=int, help="jobs at a time (default: one a core)")
+    reproduce.add_argument("--folder", type=Path, default=Path("reproduction"), help="of the results (default reproduction)")
+    reproduce.add_argument("--json", type=Path, metavar="F.json", help="also write everything for other programs")
+    reproduce.add_argument("--html", type=Path, metavar="F.html", help="also write a page to look at, one file")
+    reproduce.add_argument("--draw", type=Path, metavar="FOLDER", help="also draw the figures as PNG files")
+    reproduce.add_argument("--gallery", type=Path, metavar="FOLDER", help="also write gallery.md with its pictures")
+
+    calibrate = command(
+        "calibrate",
+        "find the friction compensator's settings from a recording",
+        "The recording must be made without compensation and reverse often, such as friction-road.\n\n"
+        "example:\n  rigtwin calibrate friction.mcap -o compensator.toml\n"
+        "  rigtwin run friction-road --config compensator.toml",
+    )
+    calibrate.add_argument("recording", type=Path)
+    calibrate.add_argument("--out", "-o", type=Path, metavar="F.toml", help="where to write them (default: print)")
+
+    stability = command(
+        "stability",
+        "say whether a vehicle is stable on the rig with its delays, and how much delay it bears",
+        "example:\n  rigtwin stability --vehicle car --tau 0.01",
+    )
+    stability_arguments(stability)
     return top
 
 

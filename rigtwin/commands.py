@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import textwrap
 from argparse import Namespace
 from collections.abc import Callable
@@ -153,16 +152,47 @@ def export(parsed: Namespace) -> int:
 
 
 def reproduce(parsed: Namespace) -> int:
-    from tqdm import tqdm
+    from experiments.thesis.commands import reproduce as work
 
-    from experiments.studies import STUDIES
+    return work(parsed)
 
-    if parsed.study not in STUDIES:
-        raise RigtwinError(f"unknown study {parsed.study!r}; there are {', '.join(STUDIES)}")
-    if parsed.seeds < 1:
-        raise RigtwinError(f"--seeds {parsed.seeds}: expected 1 or more")
-    with tqdm(total=parsed.seeds, disable=None, desc=parsed.study, leave=False, file=sys.stderr) as bar:
-        print(STUDIES[parsed.study](parsed.seeds, parsed.out, bar.update))
+
+def stability(parsed: Namespace) -> int:
+    from rigtwin.stability.commands import stability as work
+
+    return work(parsed)
+
+
+def calibrate(parsed: Namespace) -> int:
+    from controllers import Compensator, Settings
+    from rigtwin.channels import SUSPENSION_RIG
+    from rigtwin.configuration import Configuration, overridden
+    from rigtwin.recording import load
+    from rigtwin.spikes import BOUNDS, calibrated
+
+    recording = load(parsed.recording)
+    if recording.machine != SUSPENSION_RIG:
+        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; expected {SUSPENSION_RIG}")
+    if parsed.out is not None:
+        writable(apart(parsed.out, parsed.recording))
+    told: Settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    found = calibrated(recording, told)
+    print(f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, from {found.reversals} reversals")
+    print(
+        f"tried on the recording: {found.detected} of {found.reversals} reversals detected, {found.false} false steps, "
+        f"{1e3 * found.delay:.0f} ms after the reversal"
+    )
+    values = {name: float(getattr(found.settings, name)) for name in ("friction_step", *BOUNDS)}
+    lines = [
+        "[controller]",
+        f'compensator = "{Compensator.TWO_STEP.label}"',
+        *(f"{name} = {v:.6g}" for name, v in values.items()),
+    ]
+    if parsed.out is None:
+        print("\n".join(lines))
+    else:
+        parsed.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        print(f"settings in {parsed.out}, for --config")
     return 0
 
 
@@ -191,4 +221,6 @@ COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "diagnose": diagnose,
     "blindcheck": blindcheck,
     "reproduce": reproduce,
+    "stability": stability,
+    "calibrate": calibrate,
 }

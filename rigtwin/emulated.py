@@ -9,13 +9,15 @@ from scipy.linalg import expm
 
 from controllers import Settings, Skyhook, Structure, Travel
 from controllers.beam import at_start, modes
+from controllers.gas_spring import gas_force
 from controllers.skyhook import semi_active_damping
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
+from rigtwin.plant import deflected
 
 SUBSTEPS = 4
-"""Steps a tick for a semi-active damper, whose force is held over each; a linear suspension is exact with one."""
+"""Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear suspension is exact with one."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     k, b = settings.suspension_stiffness, settings.suspension_damping
     sky = settings.skyhook_damping if settings.skyhook == Skyhook.ACTIVE else 0.0
     # Rows of the state that give the sprung centre's and the wheel's position and velocity; inputs: ground, its rate, one, and
-    # the force of a semi-active damper.
+    # what is not linear: the force of a semi-active damper less that of a gas spring.
     rate = np.diff(ground, prepend=ground[0]) / period
     inputs = np.column_stack([ground, rate, np.ones_like(ground), np.zeros_like(ground)])
     position, velocity, wheel, wheel_rate = (np.zeros(size) for _ in range(4))
@@ -108,14 +110,13 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     start = np.zeros(size)
     start[:count] = body.start
     if on_wheel:
-        start[-2] = ground[0] - settings.preload / plant.tyre.stiffness
-    semi_active = settings.skyhook == Skyhook.SEMI_ACTIVE
-    substeps = SUBSTEPS if semi_active else 1
+        start[-2] = ground[0] - deflected(plant, settings.preload)
+    substeps = SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
     transition, step = _sampled(a, entry, period / substeps)
-    over = velocity - wheel_rate
-    states, dampers = np.empty((len(ground), size)), np.zeros(len(ground))
-    _simulated(settings, semi_active, transition, step, inputs, velocity, over, start, substeps, states, dampers)
-    inputs[:, 3] = dampers
+    states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
+    rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
+    _simulated(settings, on_wheel, transition, step, inputs, rows, start, substeps, states, besides)
+    inputs[:, 3] = besides
     wing = None if body.wing is None else states[:, :count] @ body.wing
     return Ideal(
         states @ position,
@@ -137,31 +138,33 @@ def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
 @kernel
 def _simulated(
     settings: Settings,
-    semi_active: bool,
+    on_wheel: bool,
     transition: Array,
     step: Array,
     inputs: Array,
-    velocity: Array,
-    over: Array,
+    rows: Array,
     start: Array,
     substeps: int,
     states: Array,
-    dampers: Array,
+    besides: Array,
 ) -> None:
-    """States at every tick under inputs held over each. velocity, over: rows that give the sprung velocity and the
-    suspension's, less the ground's rate; dampers: force of the semi-active damper at every tick."""
+    """States at every tick under inputs held over each. rows: give of a state the sprung velocity, the suspension's velocity
+    and its travel, the last two less the ground's where there is no wheel. besides: the force of what is not linear."""
     state = start.copy()
     given = np.zeros(inputs.shape[1])
-    on_ground = not (over != velocity).any()
     for tick in range(len(inputs)):
         given[:] = inputs[tick]
         for part in range(substeps):
-            if semi_active:
-                sprung, travel = np.dot(velocity, state), np.dot(over, state)
-                if on_ground:
-                    travel -= given[1]
-                given[3] = semi_active_damping(settings, sprung, travel) * travel
+            if substeps > 1:
+                sprung, velocity, travel = np.dot(rows[0], state), np.dot(rows[1], state), np.dot(rows[2], state)
+                if not on_wheel:
+                    velocity, travel = velocity - given[1], travel - given[0]
+                given[3] = 0.0
+                if settings.skyhook == Skyhook.SEMI_ACTIVE:
+                    given[3] += semi_active_damping(settings, sprung, velocity) * velocity
+                if settings.gas_force > 0.0:
+                    given[3] -= gas_force(settings.gas_force, settings.gas_length, settings.gas_exponent, -travel)
             if part == 0:
                 states[tick] = state
-                dampers[tick] = given[3]
+                besides[tick] = given[3]
             state = np.dot(transition, state) + np.dot(step, given)

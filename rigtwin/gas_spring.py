@@ -6,16 +6,9 @@ import math
 from typing import NamedTuple
 
 from controllers.compiled import compilable
+from controllers.gas_spring import gas_force
 from rigtwin.errors import RigtwinError
-
-
-class GasSpring(NamedTuple):
-    """force: fully extended, initial pressure times area, N. length: of the gas column, volume over area, m.
-    exponent: polytropic, 1 isothermal to 1.4 adiabatic air."""
-
-    force: float
-    length: float
-    exponent: float
+from rigtwin.parameters import GasSpring
 
 
 class Charge(NamedTuple):
@@ -28,11 +21,9 @@ class Charge(NamedTuple):
 
 
 @compilable
-def force(spring: GasSpring, stroke: float) -> float:
+def spring_force(spring: GasSpring, stroke: float) -> float:
     """F = P_i A_g (L/(L − x))^γ, N, at a compression x, m (Eq. 3.3); infinite where no room is left for the gas."""
-    if stroke >= spring.length:
-        return math.inf
-    return spring.force * (spring.length / (spring.length - stroke)) ** spring.exponent
+    return gas_force(spring.force, spring.length, spring.exponent, stroke)
 
 
 @compilable
@@ -40,7 +31,7 @@ def stiffness(spring: GasSpring, stroke: float) -> float:
     """dF/dx = γ F/(L − x), N/m."""
     if stroke >= spring.length:
         return math.inf
-    return spring.exponent * force(spring, stroke) / (spring.length - stroke)
+    return spring.exponent * spring_force(spring, stroke) / (spring.length - stroke)
 
 
 @compilable

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
-from rigtwin.emulated import ideal
+from rigtwin.emulated import Ideal, ideal
 from rigtwin.noise import rms
 from rigtwin.recording import Recording
 
@@ -28,9 +28,9 @@ class Tracking:
     force_total: float
 
 
-def tracked(configuration: Configuration, commands: Array, structure: Array, load_cell: Array) -> Tracking:
-    """e1 and e2 of a model-in-the-loop test. commands: shape (ticks, 4); structure, load_cell: what was sensed, m and N."""
-    target = ideal(configuration, commands[:, 0])
+def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
+    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
+    structure, load_cell: what was sensed, m and N."""
     position, force = commands[:, 1], commands[:, 2]
     return Tracking(
         position_e1=rms(target.structure - position),
@@ -48,4 +48,4 @@ def tracking(recording: Recording, configuration: Configuration) -> Tracking:
     structure = recording.column("/truth", "structure") if known else recording.column("/sensor", "structure_lvdt")
     load_cell = recording.column("/truth" if known else "/sensor", "load_cell")
     commands = np.column_stack([recording.column("/command", name) for name in ("ground", "structure", "force")])
-    return tracked(configuration, commands, structure, load_cell)
+    return tracked(ideal(configuration, commands[:, 0]), commands, structure, load_cell)

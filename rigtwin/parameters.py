@@ -88,6 +88,19 @@ class Cylinder(NamedTuple):
     compliance: Annotated[float, Quantity("m/N", 0.0, 2e-5, "0: a cylinder in position control does not yield, §3.2")] = 0.0
 
 
+class GasSpring(NamedTuple):
+    """A real gas spring beside the motor, between carriage and plate; the load cell is on the motor's rod and does not feel it.
+    Travel 0 is its full extension."""
+
+    force: Annotated[
+        float, Quantity("N", 0.0, 1e7, "fully extended, initial pressure times area; 0: the rig ran without, §3.2")
+    ] = 0.0
+    length: Annotated[float, Quantity("m", 0.01, 10.0, "of the gas column, volume over area; 0.673 m at rig scale, §3.5")] = (
+        0.217
+    )
+    exponent: Annotated[float, Quantity("1", 1.0, 1.7, "1 isothermal to 1.4 adiabatic air; thesis Eq. 3.3")] = 1.4
+
+
 class Lvdt(NamedTuple):
     """Position sensor as the DAQ reads it."""
 
@@ -132,6 +145,7 @@ class Plant(NamedTuple):
     rail: Rail = Rail()
     tyre: Tyre = Tyre()
     motor: Motor = Motor()
+    gas_spring: GasSpring = GasSpring()
     ground_cylinder: Cylinder = Cylinder()
     structure_cylinder: Cylinder = Cylinder()
     ground_lvdt: Lvdt = Lvdt()

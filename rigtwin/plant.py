@@ -15,8 +15,9 @@ from rigtwin.arrays import Array
 from rigtwin.compiling import forward, integrate
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
 from rigtwin.friction import Friction, breakaway, friction, gap_at
+from rigtwin.gas_spring import spring_force
 from rigtwin.model import Handles, build, handles
-from rigtwin.parameters import Plant
+from rigtwin.parameters import GasSpring, Plant
 
 SCALE = 0.01
 """m; at this deflection a tyre hardens as much whatever the power of its law."""
@@ -42,6 +43,7 @@ class Contacts(NamedTuple):
     hardening_power: float
     ground_compliance: float
     structure_compliance: float
+    gas: GasSpring
     yielded: Array
 
 
@@ -69,7 +71,7 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
     """The plant's contacts with the carriage and the travel at those positions, m."""
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
-    forces = (tyre.hardening, plant.motor.cogging, *compliances)
+    forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
     return Contacts(
         rail.changing or motor.changing or any(forces),
         rail,
@@ -84,8 +86,14 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
         tyre.hardening,
         tyre.hardening_power,
         *compliances,
+        plant.gas_spring,
         np.zeros(2),
     )
+
+
+def deflected(plant: Plant, preload: float) -> float:
+    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
+    return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 class Simulation:
@@ -103,7 +111,7 @@ class Simulation:
         held = [holding(drives[0], ground), holding(drives[1], structure), holding(drives[2], preload / plant.motor.constant)]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - preload / plant.tyre.stiffness
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(plant, preload)
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
         self.machine = Machine(
@@ -163,6 +171,8 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity)
     mechanics.rail_friction[0] = 0.5 * (forward + backward)
     mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
+    if now.gas.force > 0.0:
+        mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
     forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding)
     mechanics.motor_friction[0] = 0.5 * (forward + backward)
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)

@@ -212,8 +212,8 @@ def _jump(friction: Array, tick: int, way: float, beside: int) -> tuple[int, flo
 def _seen(
     steps: Array, turns: NDArray[np.intp], directions: Array, within: int, others: NDArray[np.intp]
 ) -> tuple[list[int], int]:
-    """Ticks from each reversal that is detected to its detection, and how many steps were false. A step near one of the `others`
-    is not held against it."""
+    """Ticks from each reversal that is detected to its detection, and how many steps were false. A step near one of the
+    `others` is not held against it."""
     made = np.flatnonzero(steps)
     used, delays = np.zeros(len(made), bool), []
     for turn, way in zip(turns, directions, strict=True):

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,15 @@ from rigtwin.errors import RigtwinError
 from rigtwin.model import SCENE
 from rigtwin.plot import ASKED, SENSED, stretch
 from rigtwin.recording import Recording
+from rigtwin.structure_motion import recorded_wing
 
 Image = NDArray[np.uint8]
 
 FRAMES_PER_SECOND = 30
 WIDTH, SCENE_HEIGHT, TRACE_HEIGHT = 960, 432, 288
+BEAM_DRAWN = 0.13
+"""m; drawn length of a beam."""
+BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 SMOOTHING = 20.0
 """Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
 NO_RENDERING = (
@@ -61,6 +66,8 @@ def film(
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}
     traces = _Traces(recording, ticks)
+    beams = recorded_wing(recording)
+    bent = None if beams is None else magnify * beams[ticks]
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
@@ -68,9 +75,9 @@ def film(
             stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
             stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
             for number, tick in enumerate(frames):
-                picture = np.vstack(
-                    [render({name: float(m[tick]) for name, m in motions.items()}), traces.at(float(time[tick]))]
-                )
+                at = {name: float(values[tick]) for name, values in motions.items()}
+                scene = render(at, None if bent is None else bent[tick])
+                picture = np.vstack([scene, traces.at(float(time[tick]))])
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")))
                 if progress is not None:
                     progress(number + 1, len(frames))
@@ -111,8 +118,8 @@ def _context() -> Any:
 
 
 @contextmanager
-def _renderer(camera: str) -> Iterator[Callable[[dict[str, float]], Image]]:
-    """A function from joint positions to a picture of the scene."""
+def _renderer(camera: str) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
+    """A function from joint positions, and the beams' heights over their centre where there are any, to a picture."""
     model = mujoco.MjModel.from_xml_path(str(SCENE))
     cameras = [model.camera(number).name for number in range(model.ncam)]
     if camera not in cameras:
@@ -128,12 +135,14 @@ def _renderer(camera: str) -> Iterator[Callable[[dict[str, float]], Image]]:
     window = mujoco.MjrRect(0, 0, WIDTH, SCENE_HEIGHT)
     picture = np.empty((SCENE_HEIGHT, WIDTH, 3), np.uint8)
 
-    def render(positions: dict[str, float]) -> Image:
+    def render(positions: dict[str, float], bent: Array | None) -> Image:
         for joint, position in positions.items():
             data.qpos[model.joint(joint).qposadr[0]] = position
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         mujoco.mjv_updateScene(model, data, options, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
+        if bent is not None:
+            _draw_beams(scene, data.body("structure_plate").xpos, bent)
         mujoco.mjr_render(window, scene, drawing)
         mujoco.mjr_readPixels(picture, None, window, drawing)
         return picture[::-1]
@@ -143,6 +152,19 @@ def _renderer(camera: str) -> Iterator[Callable[[dict[str, float]], Image]]:
     finally:
         drawing.free()
         context.free()
+
+
+def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
+    """Adds the cross of beams to a scene, its centre at the plate; its arms are drawn across the rig and far shorter than they
+    are, what they do along it in full size."""
+    for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
+        points = [plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm) for n, height in enumerate(bent)]
+        for inner, outer in pairwise(points):
+            geom = scene.geoms[scene.ngeom]
+            kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+            mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), BEAM_COLOUR)
+            mujoco.mjv_connector(geom, kind, 0.012, inner, outer)
+            scene.ngeom += 1
 
 
 class _Traces:

@@ -45,7 +45,7 @@ def test_one_arm_is_an_euler_bernoulli_cantilever():
     mass, stiffness = assembled(SETTINGS)
     arm = [6 * node + freedom for node in (1, 2, 3) for freedom in (2, 4)]
     squares = eigh(stiffness[np.ix_(arm, arm)], mass[np.ix_(arm, arm)])[0]
-    root = brentq(lambda x: math.cos(x) * math.cosh(x) + 1, 1.5, 2.2)
+    root = float(brentq(lambda x: math.cos(x) * math.cosh(x) + 1, 1.5, 2.2))  # type: ignore[arg-type]
     s = SETTINGS
     exact = root**2 * math.sqrt(s.beam_modulus * s.beam_inertia / (s.beam_density * s.beam_area)) / 6.0**2
     assert math.sqrt(squares[0]) == pytest.approx(exact, rel=1e-3)

@@ -83,8 +83,12 @@ def bad(tmp_path: Path) -> dict[str, tuple[list[str], str]]:
         "ending": (["export", str(EXAMPLE), "-o", str(tmp_path / "e.xyz")], ".csv or .mat"),
         "json": (["compare", str(EXAMPLE), "--json", str(tmp_path / "absent" / "j.json")], "cannot write"),
         "two and set": (["compare", str(EXAMPLE), str(EXAMPLE), "--set", "rail.coulomb=3"], "without one"),
-        "study": (["reproduce", "table-9.9"], "there are table-3.5"),
+        "study": (["reproduce", "table-9.9"], "there are chapters 3, 4, 5, 6, 7, A, B"),
         "seeds": (["reproduce", "table-3.5", "--seeds", "0"], "--seeds 0"),
+        "workers": (["reproduce", "table-3.5", "--workers", "-1"], "--workers -1"),
+        "page": (["reproduce", "table-3.5", "--html", str(tmp_path / "absent" / "p.html")], "cannot write"),
+        "vehicle": (["stability", "--vehicle", "bicycle"], "there are"),
+        "calibrate": (["calibrate", str(empty)], "is empty"),
     }
 
 

@@ -70,7 +70,7 @@ def test_semi_active_quarter_car():
 
 def test_beams_on_a_quarter_car_against_all_78_freedoms():
     settings = Settings(structure=Structure.BEAM)
-    mass, stiffness = assembled(settings)
+    mass, _ = assembled(settings)
     angular, shapes = all_modes(settings)
     upward = np.zeros(len(mass))
     upward[2::6] = 1.0

@@ -9,7 +9,7 @@ import pytest
 from numba import njit
 
 from rigtwin.errors import RigtwinError
-from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, force, stiffness
+from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
 
 SPRING = GasSpring(167_285.0, 0.673, 1.4)
 
@@ -17,20 +17,20 @@ SPRING = GasSpring(167_285.0, 0.673, 1.4)
 def test_isothermal_gas_keeps_pressure_times_volume():
     spring = GasSpring(400.0, 0.25, 1.0)
     for stroke in (-0.1, 0.0, 0.1, 0.2):
-        assert force(spring, stroke) * (spring.length - stroke) == pytest.approx(400.0 * 0.25)
+        assert spring_force(spring, stroke) * (spring.length - stroke) == pytest.approx(400.0 * 0.25)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.4])
 @pytest.mark.parametrize("stroke", [-0.05, 0.0, 0.2, 0.42, 0.6])
 def test_stiffness_is_the_derivative_of_the_force(exponent: float, stroke: float):
     spring, step = SPRING._replace(exponent=exponent), 1e-6
-    slope = (force(spring, stroke + step) - force(spring, stroke - step)) / (2.0 * step)
+    slope = (spring_force(spring, stroke + step) - spring_force(spring, stroke - step)) / (2.0 * step)
     assert stiffness(spring, stroke) == pytest.approx(slope, rel=1e-7)
 
 
 @pytest.mark.parametrize("share", [1.0, 1.5, 4.0, 30.0])
 def test_the_equilibrium_carries_the_load(share: float):
-    assert force(SPRING, equilibrium(SPRING, share * SPRING.force)) == pytest.approx(share * SPRING.force)
+    assert spring_force(SPRING, equilibrium(SPRING, share * SPRING.force)) == pytest.approx(share * SPRING.force)
 
 
 def test_a_load_below_the_precharge_compresses_nothing():
@@ -40,9 +40,9 @@ def test_a_load_below_the_precharge_compresses_nothing():
 
 def test_no_room_left_is_infinite():
     for stroke in (SPRING.length, 1.0):
-        assert force(SPRING, stroke) == math.inf
+        assert spring_force(SPRING, stroke) == math.inf
         assert stiffness(SPRING, stroke) == math.inf
-    assert math.isfinite(force(SPRING, 0.999 * SPRING.length))
+    assert math.isfinite(spring_force(SPRING, 0.999 * SPRING.length))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -51,8 +51,8 @@ def test_a_designed_spring_has_the_forces_asked_for(seed: int):
     extended, ratio, stroke, exponent = draw.uniform([10.0, 1.1, 0.01, 1.0], [1e6, 20.0, 2.0, 1.4])
     spring = designed(extended, ratio * extended, stroke, exponent)
     assert spring.length > stroke
-    assert force(spring, 0.0) == pytest.approx(extended)
-    assert force(spring, stroke) == pytest.approx(ratio * extended)
+    assert spring_force(spring, 0.0) == pytest.approx(extended)
+    assert spring_force(spring, stroke) == pytest.approx(ratio * extended)
 
 
 def test_the_charge_is_that_spring_again():
@@ -62,16 +62,16 @@ def test_the_charge_is_that_spring_again():
     charge = charged(spring, area, stroke)
     left = charge.gas - charge.cylinder
     assert charge.pressure * area == pytest.approx(395.0)
-    assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(force(spring, stroke))
+    assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(spring_force(spring, stroke))
     assert charge.cylinder / charge.gas == pytest.approx(stroke / spring.length)
 
 
 def test_compiled_code_has_the_same_force():
     @njit
     def compiled(spring: GasSpring, stroke: float, load: float) -> tuple[float, float, float]:
-        return force(spring, stroke), stiffness(spring, stroke), equilibrium(spring, load)
+        return spring_force(spring, stroke), stiffness(spring, stroke), equilibrium(spring, load)
 
-    expected = force(SPRING, 0.3), stiffness(SPRING, 0.3), equilibrium(SPRING, 5e5)
+    expected = spring_force(SPRING, 0.3), stiffness(SPRING, 0.3), equilibrium(SPRING, 5e5)
     assert compiled(SPRING, 0.3, 5e5) == pytest.approx(expected, rel=1e-14)
     assert compiled(SPRING, 0.7, 5e5)[0] == math.inf
 

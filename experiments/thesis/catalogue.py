@@ -60,7 +60,7 @@ class Asked:
 
 
 def asked(name: str | None) -> Asked:
-    """Of a study's name, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`, `figure 6.26`), or None for everything.
+    """Of a study's name, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`, `figure 6.26`), or None for all.
 
     Raises RigtwinError listing what there is.
     """

@@ -47,7 +47,7 @@ def digits(where: str, what: str, printed: str, ours: float, unit: str = "1", no
     """Agrees if ours rounds to the printed digits."""
     difference = ours - number(printed)
     agrees = abs(difference) <= SLACK * last_digit(printed)
-    return Entry(where, what, printed, _like(printed, ours), f"{difference:+.2g}", unit, "printed digits", agrees, note)
+    return Entry(where, what, printed, _like(printed, ours), f"{difference:+.2g}", unit, "printed digits", bool(agrees), note)
 
 
 def factor(
@@ -57,7 +57,7 @@ def factor(
     middle, text = _spread(ours)
     ratio = middle / number(printed)
     agrees = 1.0 / within <= ratio <= within
-    return Entry(where, what, printed, text, f"x {ratio:.2f}", unit, f"factor {within:g}", agrees, note)
+    return Entry(where, what, printed, text, f"x {ratio:.2f}", unit, f"factor {within:g}", bool(agrees), note)
 
 
 def band(
@@ -73,7 +73,7 @@ def band(
 
 def statement(where: str, what: str, says: str, holds: bool, ours: str, note: str = "") -> Entry:
     """A statement in words. holds: whether it is true here; ours: what was found."""
-    return Entry(where, what, says, ours, "", "", "statement", holds, note)
+    return Entry(where, what, says, ours, "", "", "statement", bool(holds), note)
 
 
 def share(entries: Sequence[Entry]) -> str:

@@ -1,4 +1,4 @@
-"""The tests of chapter 4 on the twin: what a compensator leaves of the force errors, and steps made at times known in advance."""
+"""The tests of chapter 4 on the twin: what a compensator leaves of the force errors, and steps made at known times."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def compensated(seed: int, **settings: object) -> Trial:
 
 
 def errors(test: Trial) -> dict[str, float]:
-    """rms tracking and numerical error (N) of the force that is felt, and the mean peak of the friction spikes (N) in the force as
-    the controller sees it, through its filter."""
+    """rms tracking and numerical error (N) of the force that is felt, and the mean size of the friction spikes (N) in the force
+    as the controller sees it, through its filter."""
     asked = test.ran.commands[:, 2]
     return {
         "tracking": rms(asked - test.force),
@@ -52,8 +52,8 @@ def errors(test: Trial) -> dict[str, float]:
 
 
 def spikes(test: Trial) -> Array:
-    """How far the filtered force error shoots at every reversal that stands alone, N: its peak after it, towards the new direction,
-    less what it was before."""
+    """How far the filtered force error shoots at every reversal that stands alone, N: its peak after it, towards the new
+    direction, less what it was before."""
     settings, period = test.configuration.controller, test.configuration.timing.period
     velocity = np.gradient(gaussian_filter1d(test.travel, 2), period)
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
@@ -89,9 +89,8 @@ def rows(loop: str, variants: Mapping[str, Mapping[str, object]], seed: int) -> 
     return found
 
 
-def calibrated_rows(loop: str, seeds: int) -> Result:
-    """The compensator calibrated, and its errors for every seed: arrays of shape (seeds,)."""
-    found, settings = calibration(loop)
+def calibrated_rows(loop: str, found: Calibration, settings: Mapping[str, float], seeds: int) -> Result:
+    """What the calibration found, and the errors with it for every seed: arrays of shape (seeds,)."""
     variants = {
         kind.label: {"compensator": kind, **settings}
         for kind in (Compensator.ONE_STEP, Compensator.TWO_STEP, Compensator.FORCE_PROFILE, Compensator.FORCE_THRESHOLD)

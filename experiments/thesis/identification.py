@@ -112,8 +112,8 @@ def fitted(frequencies: Array, response: Response, zeros: int, poles: int) -> tu
 
 
 def _pressed(seed: int) -> Result:
-    """The tyre pressed slowly by the motor and let go again: load and deflection. Half the difference of both ways is the rail's
-    friction."""
+    """The tyre pressed slowly by the motor and let go again: load and deflection. Half the difference of both ways is the
+    rail's friction."""
     settings = Settings(mode=Mode.IMPOSED)
     configuration = Configuration(controller=settings, timing=Timing(duration=40.0), safety=Safety(force=1700.0))
     time = time_of(configuration)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from controllers import SIZE, Controller, Demand, Measurements, Skyhook, controller, initial_state, packed, unpacked, update
+from controllers import Skyhook
 from controllers.skyhook import semi_active_damping
 from experiments.thesis.entry import Entry, band, factor
 from experiments.thesis.study import Drawing, Result, sheet
 from experiments.thesis.trial import BODY, SHOWN, Trial, body_acceleration, curves, errors, over_seeds
 from rigtwin.arrays import Array
-from rigtwin.compiling import kernel
 from rigtwin.noise import rms
 from rigtwin.plot import ASKED, COLOURS, SENSED
+from rigtwin.structure_motion import states, wing
 
 SHOWN_SEED = 0
 OFFSET = "the same 0.06 m (58 %) in every table: an offset of the zero"
@@ -22,45 +21,23 @@ TAXIING = 10.0
 COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
 
 
-@kernel
-def _states(controlling: Controller, start: Array, measured: Array, ground: Array, out: Array) -> None:
-    """State of the controller at every tick of a recording of what was measured, packed."""
-    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
-    for tick in range(len(measured)):
-        sample = Measurements(measured[tick, 0], measured[tick, 1], measured[tick, 2], measured[tick, 3])
-        state, _ = update(controlling, state, sample, Demand(ground[tick], 0.0, 0.0))
-        numbers = packed(state)
-        for number in range(SIZE):
-            out[tick, number] = numbers[number]
-
-
-def states(test: Trial) -> Array:
-    """The controller's packed state at every tick, shape (ticks, SIZE): its replay on what was measured."""
-    controlling = controller(test.configuration.controller, test.configuration.timing.period)
-    out = np.empty((len(test.ran.commands), SIZE))
-    start = np.array(packed(initial_state(controlling)))
-    _states(controlling, start, test.ran.measurements, np.ascontiguousarray(test.ran.commands[:, 0]), out)
-    return out
-
-
-def wing(test: Trial) -> Array:
-    """Of the beams: height above the centre at 2, 4 and 6 m from it, m, shape (ticks, 4), the first zero."""
-    model = controller(test.configuration.controller, test.configuration.timing.period).modes
-    heights = states(test)[:, 7:13] @ model.wing
-    return heights - heights[:, :1]
+def states_of(test: Trial) -> Array:
+    """The controller's packed state at every tick, shape (ticks, SIZE)."""
+    demands = test.ran.commands[:, :3]
+    return states(test.configuration.controller, test.configuration.timing.period, test.ran.measurements, demands)
 
 
 def damping(test: Trial) -> Array:
     """Coefficient of the semi-active damper at every tick, Ns/m."""
-    settings, found = test.configuration.controller, states(test)
+    settings, found = test.configuration.controller, states_of(test)
     # The tick uses the structure's velocity of the tick before.
     sprung = np.concatenate([[0.0], found[:-1, 6]])
     return np.array([semi_active_damping(settings, s, v) for s, v in zip(sprung.tolist(), found[:, 2].tolist(), strict=True)])
 
 
 def measures(test: Trial) -> dict[str, Array | float]:
-    """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their means, switches of the damper a
-    second, and the errors of appendix B."""
+    """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their means, switches of the damper
+    a second, and the errors of appendix B."""
     period = test.configuration.timing.period
     late = slice(round(TAXIING / period), None)
     tyre, should_tyre = (wheel - test.ran.commands[:, 0] for wheel in (test.wheel, test.should.wheel))
@@ -92,7 +69,7 @@ def kept(test: Trial, seed: int) -> Result:
         found["asked damper"] = _damper(test)[::SHOWN]
         if test.should.wing is not None:
             found |= {
-                "wing": 1e3 * wing(test)[::SHOWN],
+                "wing": 1e3 * _wing(test)[::SHOWN],
                 "ideal wing": 1e3 * (test.should.wing - test.should.wing[:, :1])[::SHOWN],
             }
     elif "damping" in found:
@@ -100,9 +77,13 @@ def kept(test: Trial, seed: int) -> Result:
     return found
 
 
+def _wing(test: Trial) -> Array:
+    return wing(test.configuration.controller, test.configuration.timing.period, states_of(test))
+
+
 def _damper(test: Trial) -> Array:
     """The part of the demanded force that is not the spring's, N."""
-    settings, found = test.configuration.controller, states(test)
+    settings, found = test.configuration.controller, states_of(test)
     return test.ran.commands[:, 2] - settings.preload + settings.suspension_stiffness * found[:, 1]
 
 
@@ -114,6 +95,15 @@ def reduction(results: dict[str, Result], better: str, base: str, value: str = "
 def interval(values: Array, unit: str) -> str:
     low, middle, high = np.percentile(values, [5, 50, 95])
     return f"{middle:.3g}{unit} ({low:.3g} to {high:.3g})"
+
+
+def remark(results: dict[str, Result], name: str) -> str:
+    """The body's acceleration by both measures, and the ideal's."""
+    body, everything, should = (over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything"))
+    return (
+        f"{name}: body acceleration {interval(body, ' m/s²')}, with everything in it {interval(everything, '')}; "
+        f"ideal {interval(should, '')}"
+    )
 
 
 def reduced(where: str, results: dict[str, Result], better: str, base: str, printed: str, within: float) -> Entry:

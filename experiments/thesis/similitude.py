@@ -5,45 +5,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from controllers.quantity import Quantity, fields
 from experiments.thesis.entry import Entry, digits, number, statement
+from experiments.thesis.landing import Landing, touch_down
 from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
 from experiments.vehicles import VEHICLES, configuration
 from rigtwin.arrays import Array
-from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, force, stiffness
+from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
 from rigtwin.parameters import Cylinder, Motor
 from rigtwin.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
-
-_TABLE = "thesis Table 3.1"
-_LIFT = "the wings carry the aircraft at touch-down and let go within a second, assumed"
-
-
-class Landing(NamedTuple):
-    """A quarter car with a gas spring that touches down: thesis Eq. 3.4 and 3.5, with the exponent that they lack, a tyre that
-    stands on the ground and only pushes, the wheel's weight, and a stop where the strut is fully extended."""
-
-    sprung_mass: Annotated[float, Quantity("kg", 1.0, 1e6, _TABLE)] = 68_210.0
-    unsprung_mass: Annotated[float, Quantity("kg", 0.1, 1e5, _TABLE)] = 1140.0
-    damping: Annotated[float, Quantity("Ns/m", 0.0, 1e7, _TABLE)] = 105_400.0
-    tyre_stiffness: Annotated[float, Quantity("N/m", 1e2, 1e9, _TABLE)] = 8_461_000.0
-    gas_force: Annotated[float, Quantity("N", 1.0, 1e7, "thesis §3.5")] = 167_285.0
-    gas_length: Annotated[float, Quantity("m", 0.01, 10.0, "thesis §3.5")] = 0.673
-    exponent: Annotated[float, Quantity("1", 1.0, 2.0, "adiabatic air; it reproduces the printed stiffness")] = 1.4
-    stop_stiffness: Annotated[float, Quantity("N/m", 0.0, 1e10, "ten times the tyre's and more, assumed")] = 1e8
-    gravity: Annotated[float, Quantity("m/s^2", 0.0, 30.0, "standard")] = 9.81
-    velocity: Annotated[float, Quantity("m/s", 0.0, 10.0, "thesis Table 3.2")] = 3.0
-    lift: Annotated[float, Quantity("1", 0.0, 1.0, "1 at touch-down, a share of the weight; " + _LIFT)] = 1.0
-    lift_time: Annotated[float, Quantity("s", 0.01, 100.0, "time constant of its decay; " + _LIFT)] = 1.0
-
-    @property
-    def spring(self) -> GasSpring:
-        return GasSpring(self.gas_force, self.gas_length, self.exponent)
-
 
 BOEING = Landing()
 UNITS = {name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)}
@@ -68,36 +41,6 @@ def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
 def at_scale(landing: Landing, scale: Scaling) -> Landing:
     """The landing of the scaled system."""
     return Landing(**scaled(landing._asdict(), UNITS, scale))
-
-
-def touch_down(landing: Landing, instants: Array) -> Array:
-    """Compression of the strut, m, velocity of the sprung mass, m/s, force of gas and damper, N; shape (3, instants)."""
-    spring, weight = landing.spring, landing.sprung_mass + landing.unsprung_mass
-
-    def between(travel: float, speed: float) -> float:
-        return force(spring, travel) + landing.damping * speed
-
-    def change(time: float, state: Array) -> list[float]:
-        body, wheel, body_velocity, wheel_velocity = state.tolist()
-        strut = between(wheel - body, wheel_velocity - body_velocity) + landing.stop_stiffness * min(wheel - body, 0.0)
-        lift = landing.lift * weight * landing.gravity * math.exp(-time / landing.lift_time)
-        tyre = max(-landing.tyre_stiffness * wheel, 0.0)
-        return [
-            body_velocity,
-            wheel_velocity,
-            (strut + lift) / landing.sprung_mass - landing.gravity,
-            (tyre - strut) / landing.unsprung_mass - landing.gravity,
-        ]
-
-    # In flight the gas presses the wheel, and its weight pulls it, against the stop.
-    hanging = (landing.gas_force + landing.unsprung_mass * landing.gravity) / (landing.stop_stiffness + stiffness(spring, 0.0))
-    start = [hanging, 0.0, -landing.velocity, -landing.velocity]
-    span = (float(instants[0]), float(instants[-1]))
-    run = solve_ivp(change, span, start, "DOP853", instants, rtol=1e-9, atol=1e-11, max_step=span[1] / 100.0)
-    body, wheel, body_velocity, wheel_velocity = run.y
-    travel = wheel - body
-    pushed = [between(x, v) for x, v in zip(travel.tolist(), (wheel_velocity - body_velocity).tolist(), strict=True)]
-    return np.array([travel, body_velocity, pushed])
 
 
 def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
@@ -165,7 +108,7 @@ def _equation_3() -> list[Entry]:
             digits(where, f"equilibrium over stroke, {words}", "76", 100.0 * at_rest / travel, "%", differs),
         ]
     spring, travel = BOEING.spring, stroke
-    pressed = force(spring, travel) / load
+    pressed = spring_force(spring, travel) / load
     beyond = "sized for three times: its length, 24.7 MN/m and 76 % ask for that"
     entries.append(digits(where, "force fully compressed over static load, exponent 1.4", "4", pressed, "1", beyond))
     soft, hard = (1e-6 * stiffness(spring, x) for x in (equilibrium(spring, load), travel))
@@ -288,7 +231,7 @@ def _cylinder() -> list[Entry]:
             "well within its capability",
             damper < motor.force_limit,
             f"{damper:.0f} N of {motor.force_limit:g} N",
-            f"the gas spring's {force(rig.spring, RIG_STROKE):.0f} N fully compressed are not; it has to be hardware",
+            f"the gas spring's {spring_force(rig.spring, RIG_STROKE):.0f} N fully compressed are not; it has to be hardware",
         ),
         statement(where, "velocity", "greater than 0.3 m/s", rig.velocity > limit, f"{rig.velocity:.3f} m/s"),
         statement(

@@ -148,11 +148,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
         ride.histories("figure-7.7", "Figure 7.7 to 7.9, B1.1 to B2.6", "Passive, semi-active and active skyhook.", shown),
         _box(found),
     ]
-    remarks = [
-        f"{name}: body acceleration {ride.interval(over_seeds(found, name, 'acceleration'), ' m/s²')}, with everything in it "
-        f"{ride.interval(over_seeds(found, name, 'everything'), '')}; ideal {ride.interval(over_seeds(found, name, 'ideal everything'), '')}"
-        for name in ("passive", "semi-active", *GAINS)
-    ]
+    remarks = [ride.remark(found, name) for name in ("passive", "semi-active", *GAINS)]
     remarks.append(MEASURED + "; " + LIMIT_CYCLE)
     return Conclusion(_entries(found), drawings, remarks)
 
@@ -160,7 +156,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
 STUDY = Study(
     "skyhook",
     "Skyhook under a point mass",
-    "7",
+    "7 B",
     (
         *("Table 7.1", "Table 7.2", "Table 7.3", "Table B1.1", "Table B2.1"),
         *span("Figure", "7.", 1, 9),

@@ -20,8 +20,8 @@ from rigtwin.runner import Ran, simulated
 from rigtwin.safety import Trip, explained
 
 BODY = 3.0
-"""Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the twin's friction limit cycle, whose
-size depends on gains that the thesis does not give, begins at 3.4 Hz."""
+"""Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the twin's friction limit cycle,
+whose size depends on gains that the thesis does not give, begins at 3.4 Hz."""
 SHOWN = 20
 """Ticks between the samples of a curve that is kept to be drawn."""
 
@@ -70,7 +70,7 @@ def trial(name: str, seed: int, change: Callable[[Configuration], Configuration]
 
 def errors(test: Trial) -> dict[str, float]:
     """rms e1, e2 and e1 + e2 of position (m) and force (N), and of what they are a share: the ideal's motion about its mean."""
-    found = tracked(test.configuration, test.ran.commands, test.plate, test.force)
+    found = tracked(test.should, test.ran.commands, test.plate, test.force)
     swing = {"ideal_position": float(np.std(test.should.structure)), "ideal_force": float(np.std(test.should.force))}
     return {**vars(found), **swing}
 

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def kept(path: Path) -> Result | None:
     try:
         with np.load(path) as stored:
             return {name: stored[name] if stored[name].ndim else float(stored[name]) for name in stored.files}
-    except (OSError, ValueError, EOFError):
+    except (OSError, ValueError, EOFError, BadZipFile):
         return None
 
 
@@ -43,12 +44,12 @@ def keep(path: Path, result: Result) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     with temporary.open("wb") as file:
-        np.savez(file, **{name: np.asarray(value) for name, value in result.items()})
+        np.savez(file, **{name: np.asarray(value) for name, value in result.items()})  # type: ignore[arg-type]
     temporary.replace(path)
 
 
 def done(
-    studies: Sequence[Study], seeds: int, folder: Path, workers: int, progress: Callable[[int, int], object] = lambda a, b: None
+    studies: Sequence[Study], seeds: int, folder: Path, workers: int, progress: Callable[[int, int], object] = lambda *_: None
 ) -> dict[str, dict[str, Result]]:
     """Results of every study's jobs, study → key → result. progress is called with (jobs done, jobs in all).
 

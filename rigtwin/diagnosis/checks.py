@@ -16,6 +16,7 @@ from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.diagnosis.runs import FLAT, longest_run
 from rigtwin.noise import rms, smallest_step, white_noise
+from rigtwin.plant import deflected
 from rigtwin.recording import Recording
 
 SHORTEST = 200
@@ -143,7 +144,7 @@ def expected(recording: Recording, configuration: Configuration) -> dict[str, Ar
         "ground_lvdt": u,
         "structure_lvdt": x,
         # The tyre is stiff: the wheel goes with the ground, a preload's deflection apart.
-        "suspension_lvdt": x - u + configuration.controller.preload / plant.tyre.stiffness,
+        "suspension_lvdt": x - u + deflected(plant, configuration.controller.preload),
         "load_cell": MOTOR_CONSTANT * recording.column("/command", "voltage"),
     }
 

@@ -33,8 +33,15 @@ def configuration_of(recording: Recording, base: Configuration | None = None) ->
     substeps = max(1, math.ceil(recording.period / start.timing.timestep - 1e-9))
     duration = max(recording.ticks * recording.period, 0.01)
     timing = {"period": recording.period, "duration": duration, "timestep": recording.period / substeps}
+    changes: dict[str, dict[str, object]] = {"controller": dict(recording.controller), "timing": dict(timing)}
+    if start.plant.gas_spring.force == 0.0:
+        # What the operator says stands beside the motor does stand there.
+        keys = {"force": "gas_force", "length": "gas_length", "exponent": "gas_exponent"}
+        changes["gas_spring"] = {
+            key: changes["controller"][name] for key, name in keys.items() if name in changes["controller"]
+        }
     try:
-        return overridden(start, {"controller": recording.controller, "timing": timing})
+        return overridden(start, changes)
     except RigtwinError as error:
         raise RigtwinError(f"{recording.path}: {error}") from None
 

@@ -17,8 +17,8 @@ from rigtwin.compiling import forward, integrate, kernel
 from rigtwin.configuration import Configuration
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
 from rigtwin.model import Handles, build, handles
-from rigtwin.parameters import Carriage, Cylinder, Motor, Plant, Rail
-from rigtwin.plant import Contacts, brace, contacts, drive, motor_force, touch, true_measurements
+from rigtwin.parameters import Carriage, Cylinder, GasSpring, Motor, Plant, Rail
+from rigtwin.plant import Contacts, brace, contacts, deflected, drive, motor_force, touch, true_measurements
 
 FIXED = 1e6
 """kg; a carriage this heavy goes where it is driven."""
@@ -157,23 +157,23 @@ def _run(
 
 
 def replay_carriage(configuration: Configuration, ground: Array, force: Array, preload: float) -> Array:
-    """Ground motion and measured suspension force → wheel position, m. The motor is out of it."""
+    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both are out of it."""
     plant = configuration.plant
-    alone = plant._replace(motor=Motor(coulomb=0.0))
+    alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
-    wheel = float(ground[0]) - preload / plant.tyre.stiffness
+    wheel = float(ground[0]) - deflected(plant, preload)
     return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
 
 
 def replay_mechanics(configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float) -> Output:
     """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
     plant = configuration.plant
-    wheel = float(ground[0]) - preload / plant.tyre.stiffness
+    wheel = float(ground[0]) - deflected(plant, preload)
     return _run(plant, configuration, ground, structure, None, voltage, np.zeros_like(voltage), preload, wheel)
 
 
 def replay_motor(configuration: Configuration, travel: Array, voltage: Array, preload: float) -> Array:
     """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
-    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(coulomb=0.0))
+    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(travel)
     return _run(alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0).load_cell

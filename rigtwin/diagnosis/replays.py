@@ -16,8 +16,10 @@ from rigtwin.diagnosis.checks import check
 from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
 from rigtwin.errors import RigtwinError
+from rigtwin.gas_spring import spring_force
 from rigtwin.loop import run, run_compiled
 from rigtwin.noise import Motion, band, motion, rms, white_noise, without_mains
+from rigtwin.plant import deflected
 from rigtwin.recording import Recording
 from rigtwin.replay import Replay
 from rigtwin.twin import Twin
@@ -95,7 +97,7 @@ class Replays:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
         # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
-        uncompressed = self._ground_start - self.preload / self.configuration.plant.tyre.stiffness
+        uncompressed = self._ground_start - deflected(self.configuration.plant, self.preload)
         unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start, uncompressed)
         return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
 
@@ -111,7 +113,16 @@ class Replays:
     def carriage_output(self) -> Array:
         sensor = self.configuration.plant.load_cell
         force = unseen(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
-        return replay_carriage(self.configuration, self.ground_motion.position, force, self.preload)
+        return replay_carriage(self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload)
+
+    def _gas_force(self) -> Array:
+        """Of the gas spring beside the motor, N, at the travel measured."""
+        spring = self.configuration.plant.gas_spring
+        if spring.force == 0.0:
+            return np.zeros(self.recording.ticks)
+        sensor = self.configuration.plant.suspension_lvdt
+        travel = unseen(sensor, self._clean(self._sensor("suspension_lvdt")) - sensor.offset, self.period)
+        return np.array([spring_force(spring, -stroke) for stroke in travel.tolist()])
 
     @cached_property
     def travel_motion(self) -> Motion:

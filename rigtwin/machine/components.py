@@ -48,7 +48,7 @@ UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", 
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 QUARTER_CAR = ("carriage", "rail", "tyre", "motor", "cylinder", "cylinder", "lvdt", "lvdt", "lvdt", "load cell")
-QUARTER_CAR_NAMES = parameters.Plant._fields[:-2]
+QUARTER_CAR_NAMES = tuple(name for name in parameters.Plant._fields if name not in ("gas_spring", "computer", "mains"))
 """Components of a quarter car between two cylinders, which has a faster solver of its own (rigtwin.machine.quarter_car)."""
 
 

@@ -86,7 +86,7 @@ class _Reader:
         names = [*components.found, "computer", "mains"]
         values = [*components.values.values(), parameters.Computer(), parameters.Mains(mains)]
         made = parameters.Plant if components.quarter_car else namedtuple("Plant", names)  # type: ignore[misc]
-        plant: Any = made(*values)
+        plant: Any = made(**dict(zip(names, values, strict=True)))
         title = str(about.get("title", name))
         model = self._model_path(about)
         tolerances = tuple(components.tolerances)

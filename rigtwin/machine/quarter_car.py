@@ -24,17 +24,18 @@ from rigtwin.configuration import Configuration
 from rigtwin.converters import seen, sensors
 from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
 from rigtwin.friction import breakaway
+from rigtwin.gas_spring import spring_force
 from rigtwin.machine.predictor import Form, Motion
 from rigtwin.machine.quarter_car_forms import PLACES, STRENGTH, quarter_car_forms, signals
 from rigtwin.parameters import Computer, Cylinder, Motor, Plant
-from rigtwin.plant import YIELDING, Contacts, contacts, stiffening
+from rigtwin.plant import YIELDING, Contacts, contacts, deflected, stiffening
 
 KEPT = 64
 """Motions of plates that are kept."""
 
 KEPT_MOTIONS = 7
 """Motions of the whole plant that are kept."""
-MECHANICAL = ("carriage", "rail", "tyre", "motor", "ground_cylinder", "structure_cylinder", "computer")
+MECHANICAL = ("carriage", "rail", "tyre", "motor", "gas_spring", "ground_cylinder", "structure_cylinder", "computer")
 """Components that the true motion depends on."""
 
 
@@ -174,14 +175,16 @@ def _mechanics(
             travel = structure_now - x
             deflection = ground_now - x
             rail, motor = (h * now.rail.coulomb, h * now.rail.coulomb), (h * now.motor.coulomb, h * now.motor.coulomb)
-            bias = 0.0
+            bias = beside = 0.0
             if now.changing:
                 forward, backward = breakaway(now.rail, now.rail_gap, x, v)
                 rail = (h * forward, h * backward)
                 forward, backward = breakaway(now.motor, now.motor_gap, travel, plate_velocity - v)
                 motor = (h * forward, h * backward)
                 bias = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias + pushed[tick])
+            if now.gas.force > 0.0:
+                beside = spring_force(now.gas, -travel)
+            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick])
             rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
                 spring = now.stiffness * deflection * stiffening(now, deflection)
@@ -245,7 +248,7 @@ class Reduced:
         timestep = self._period / self._steps
         ground = self._plate(plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None)
         # The spring is uncompressed at the start, the tyre carries the preload.
-        start = float(ground.position[0]) - self._preload / plant.tyre.stiffness
+        start = float(ground.position[0]) - deflected(plant, self._preload)
         structure = self._plate(plant.structure_cylinder, plant.computer, self._structure, self._start, start)
         nothing = np.zeros_like(self._voltage)
         besides = besides or Disturbances(nothing, nothing, nothing, nothing)

@@ -1,0 +1,149 @@
+"""The figures of chapter 4: timing of the step, spikes, a stretch of the test, two-step compensation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from controllers.friction import MOTOR_LAG
+from experiments.thesis.study import Drawing, Result, sheet
+from rigtwin.arrays import Array
+from rigtwin.plot import ASKED, COLOURS, SENSED
+
+IN_TIME, LATE = 0.9e-3, 15e-3
+"""s from the first step to the second: when the error has gone, and when the loop has turned it round."""
+
+
+def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, Array]:
+    """rms errors of a row over the seeds, and the spike; row: `one-step 4`, or `calibrated one-step`."""
+    kind, _, name = row.partition("calibrated ")
+    if name:
+        found = {key: np.asarray(results[f"calibrated-{loop}"][f"{name}/{key}"]) for key in ("tracking", "numerical", "spike")}
+    else:
+        seeds = sorted((key for key in results if key.startswith(f"{loop}/")), key=lambda key: int(key.partition("/")[2]))
+        found = {
+            key: np.array([float(results[seed][f"{kind}/{key}"]) for seed in seeds])
+            for key in ("tracking", "numerical", "spike")
+        }
+    return {**found, "total": found["tracking"] + found["numerical"]}
+
+
+def drawings(results: Mapping[str, Result]) -> list[Drawing]:
+    return [
+        _timing_drawing(results),
+        _envelope_drawing(results),
+        _section_drawing(results),
+        _two_step_drawing(),
+        _bars(results),
+    ]
+
+
+def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
+    figure, axes = sheet(1, 3, height=3.0)
+    none = results["timing/None"]
+    for axis, offsets in zip(axes[0], ((0.0, 0.005), (-0.015, -0.005), (0.015,)), strict=True):
+        axis.plot(none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step")
+        for offset, colour in zip(offsets, (SENSED, ASKED), strict=False):
+            one = results[f"timing/{offset}"]
+            axis.plot(
+                one["time"], one["error"], color=colour, linewidth=0.8, label=f"step {1e3 * offset:+.0f} ms from reversal"
+            )
+        axis.set(xlim=(2.0, 3.2), xlabel="time, s", ylabel="force error, N")
+        axis.legend(fontsize=7)
+    return Drawing("figure-4.6", "Figure 4.6", "Reversals known in advance, motion of 1 Hz and 20 mm, constant force.", figure)
+
+
+def _envelope_drawing(results: Mapping[str, Result]) -> Drawing:
+    figure, axes = sheet(1, 2, height=3.0)
+    for loop, colour in (("nominal", SENSED), ("fitted", ASKED)):
+        found = results[f"calibrated-{loop}"]
+        envelope = np.asarray(found["envelope"])
+        axes[0][0].plot(np.arange(len(envelope)), envelope, color=colour, marker=".", label=f"{loop} force loop")
+        axes[0][0].axhline(float(found["setting spike_threshold"]), color=colour, linestyle=":", linewidth=1)
+    axes[0][0].set(xlabel="ms after the reversal", ylabel="force error, N", title="mean spike and the threshold found (dotted)")
+    axes[0][0].legend(fontsize=8)
+    section = results["calibrated-nominal"]
+    for name, colour in (("none", COLOURS["other"]), ("two-step", SENSED), ("observer", "#2f9e44")):
+        error = np.asarray(section[f"{name} asked"]) - np.asarray(section[f"{name} force"])
+        axes[0][1].plot(section[f"{name} velocity"], error, color=colour, linewidth=0.5, label=name)
+    axes[0][1].set(xlabel="motor velocity, m/s", ylabel="force error, N", title="error against velocity")
+    axes[0][1].legend(fontsize=8)
+    return Drawing("figure-4.7", "Figure 4.4, 4.7 and 4.17", "Left: what the calibration reads off a recording.", figure)
+
+
+def _section_drawing(results: Mapping[str, Result]) -> Drawing:
+    figure, axes = sheet(3, 1, height=2.3)
+    section = results["calibrated-nominal"]
+    time = np.asarray(section["time"])
+    axes[0][0].plot(time, section["none force"], color=SENSED, linewidth=0.8, label="felt")
+    axes[0][0].plot(time, section["none asked"], color=ASKED, linewidth=0.9, label="demanded")
+    axes[0][0].set(ylabel="force, N", title="no compensation")
+    pairs = (
+        (("none", COLOURS["other"]), ("one-step", SENSED), ("two-step", ASKED)),
+        (("two-step", ASKED), ("observer", "#2f9e44")),
+    )
+    for axis, names in zip((axes[1][0], axes[2][0]), pairs, strict=True):
+        for name, colour in names:
+            error = np.asarray(section[f"{name} asked"]) - np.asarray(section[f"{name} force"])
+            axis.plot(time, error, color=colour, linewidth=0.8, label=name)
+        axis.set(ylabel="force error, N")
+    axes[2][0].set(xlabel="time, s")
+    for row in axes:
+        row[0].legend(fontsize=8, ncols=3, loc="upper right")
+    caption = "Nominal force loop, compensator calibrated on another recording."
+    return Drawing("figure-4.10", "Figure 4.10 to 4.12 and 4.16", caption, figure)
+
+
+def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
+    """Time (s), force error and motor force (N) after friction turns at 0, with an integral force loop alone (Fig. 4.14): step
+    one of `first` times the jump at 4 ms, step two back to the jump `wait` s later, or never."""
+    period, gain, jump = 1e-4, 40.0, 28.0
+    motor, integral = 0.0, 0.0
+    time = (np.arange(900) - 50) * period
+    error, force = np.empty(900), np.empty(900)
+    for tick, now in enumerate(time):
+        felt = motor - (jump if now >= 0 else 0.0)
+        error[tick], force[tick] = -felt, motor
+        added = 0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
+        integral -= gain * felt * period
+        motor += (integral + added - motor) * period / MOTOR_LAG
+    return time, error, force
+
+
+def _two_step_drawing() -> Drawing:
+    figure, axes = sheet(1, 3, height=3.0)
+    cases = (
+        ("step two after 1 ms", 2.0, IN_TIME, SENSED),
+        ("late, after 15 ms", 2.0, LATE, ASKED),
+        ("never: 0.3 V for good", 2.0, None, COLOURS["other"]),
+    )
+    for label, first, second, colour in cases:
+        time, error, force = two_step(first, second)
+        axes[0][0].plot(1e3 * time, error, color=colour, label=label)
+        axes[0][1].plot(1e3 * time, force, color=colour)
+    for first, colour in ((1.0, COLOURS["other"]), (2.0, SENSED), (3.0, ASKED)):
+        time, error, _ = two_step(first, IN_TIME / (first - 1.0) if first > 1 else None)
+        axes[0][2].plot(1e3 * time, error, color=colour, label=f"{first:g} times the jump at first")
+    axes[0][0].set(xlabel="ms", ylabel="force error, N")
+    axes[0][1].set(xlabel="ms", ylabel="motor force, N")
+    axes[0][2].set(xlabel="ms", ylabel="force error, N")
+    axes[0][0].legend(fontsize=7)
+    axes[0][2].legend(fontsize=7)
+    caption = "Simulated with an integral loop alone: a late second step overshoots, larger steps settle sooner."
+    return Drawing("figure-4.14", "Figure 4.13 to 4.15", caption, figure)
+
+
+def _bars(results: Mapping[str, Result]) -> Drawing:
+    figure, axes = sheet(1, 2, height=3.4)
+    names = ("none", "one-step 4", "two-step 4", "calibrated one-step", "calibrated two-step", "observer")
+    for axis, loop in zip(axes[0], ("nominal", "fitted"), strict=True):
+        for number, name in enumerate(names):
+            found = errors_of(results, loop, name)
+            tracking, numerical = (float(np.median(found[key])) for key in ("tracking", "numerical"))
+            axis.barh(number, tracking, color=SENSED, label="tracking e2" if number == 0 else None)
+            axis.barh(number, numerical, left=tracking, color=ASKED, label="numerical e1" if number == 0 else None)
+        axis.set(title=f"{loop} force loop", xlabel="rms error, N", yticks=range(len(names)), yticklabels=names)
+        axis.invert_yaxis()
+        axis.legend(fontsize=8)
+    return Drawing("table-4.2", "Table 4.1 and 4.2", "Median over the seeds; `4`: with the thesis' parameters.", figure)

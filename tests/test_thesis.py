@@ -1,0 +1,204 @@
+"""How figures of the thesis are compared, which of them are covered, and that finished work is never lost or done twice."""
+
+from __future__ import annotations
+
+import json
+import threading
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from experiments.thesis import quarter_car_tests, validation
+from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, STUDIES, TABLES, asked, matching
+from experiments.thesis.entry import band, digits, factor, last_digit, number, share, statement
+from experiments.thesis.identification import ELECTRIC, FITTED, electric, fitted, hydraulic
+from experiments.thesis.reproduction import Chapter, document, page, shares, text
+from experiments.thesis.study import Conclusion, Drawing, Study, sheet
+from experiments.thesis.work import done, keep, kept
+from rigtwin.cli import main
+from rigtwin.errors import RigtwinError
+
+
+@pytest.mark.parametrize(
+    ("printed", "value", "agrees"),
+    [
+        ("-98.06", -98.0642, True),
+        ("-98.06", -98.07, False),
+        ("50", 50.4, True),
+        ("50", 51.0, False),
+        ("-1.7e-5", -1.72e-5, True),
+        ("-1.7e-5", -1.72e-3, False),
+        ("0.072", 0.0721, True),
+        ("0", 0.6, False),
+    ],
+)
+def test_printed_digits(printed, value, agrees):
+    assert digits("Table 1.1", "x", printed, value).agrees is agrees
+
+
+def test_what_a_printed_number_is():
+    assert number("−0.5") == -0.5
+    assert last_digit("4.716e4") == pytest.approx(10.0)
+    assert last_digit("0.00850") == pytest.approx(1e-5)
+
+
+def test_factor_and_band():
+    values = np.linspace(0.9, 1.3, 41)
+    assert factor("T", "x", "1.5", values, "m", 1.4).agrees
+    assert not factor("T", "x", "1.7", values, "m", 1.4).agrees
+    assert not factor("T", "x", "0.7", values, "m", 1.4).agrees
+    assert "in 5-95 %" in band("T", "x", "1.25", values, "m", 2.0).rule
+    assert "outside 5-95 %" in band("T", "x", "1.40", values, "m", 2.0).rule
+    assert share([statement("T", "x", "says", True, ""), statement("T", "x", "says", False, "")]) == "1 of 2"
+
+
+def test_every_numbered_table_is_covered():
+    covered = {place for study in STUDIES.values() for place in study.covers}
+    assert [table for table in TABLES if table not in covered and table not in NOTHING_TO_COMPUTE] == []
+    assert len(TABLES) == 51
+
+
+def test_studies_can_be_asked_for():
+    assert len(asked(None).studies) == len(STUDIES)
+    assert [study.name for study in asked("skyhook").studies] == ["skyhook"]
+    assert [study.name for study in asked("chapter 7").studies] == ["skyhook", "beams"]
+    assert asked("B").studies == asked("7").studies
+    for study in STUDIES.values():
+        for place in study.covers:
+            found = asked(place.replace(" ", "-").lower())
+            assert found.where == place
+            assert study in found.studies or place in found.studies[0].covers
+    with pytest.raises(RigtwinError, match=r"nothing to reproduce under 'table 9\.9'"):
+        asked("table 9.9")
+
+
+def test_which_drawing_is_of_a_figure():
+    assert matching("Figure 3.11 to 3.14", "Figure 3.12")
+    assert not matching("Figure 3.11 to 3.14", "Figure 3.15")
+    assert matching("Figure 7.7 to 7.9, B1.1 to B2.6", "Figure B1.1")
+    assert matching("Table 4.1 and 4.2", "Table 4.2")
+    assert not matching("Table 4.1 and 4.2", "Figure 4.2")
+
+
+def counting(fails: set[str]) -> tuple[Study, list[str]]:
+    ran: list[str] = []
+    lock = threading.Lock()
+
+    def job(key: str):
+        def work():
+            with lock:
+                ran.append(key)
+            if key in fails:
+                raise RigtwinError(f"{key} failed")
+            return {"value": float(len(key)), "curve": np.arange(3.0)}
+
+        return work
+
+    def conclude(results):
+        figure, _ = sheet(1, 1)
+        drawing = Drawing("d", "Figure 1.1", "a caption", figure)
+        total = sum(result["value"] for result in results.values())
+        return Conclusion([digits("Table 3.1", "total", "15", total, "m", "a note")], [drawing], ["a remark"])
+
+    return Study(
+        "counted", "Counted", "9", ("Table 3.1",), conclude, lambda seeds: {f"job/{n}": job(f"job/{n}") for n in range(seeds)}
+    ), ran
+
+
+def test_finished_jobs_are_not_done_again(tmp_path):
+    study, ran = counting(set())
+    steps: list[tuple[int, int]] = []
+    first = done([study], 3, tmp_path, 2, lambda count, total: steps.append((count, total)))
+    assert sorted(ran) == ["job/0", "job/1", "job/2"]
+    assert steps[0] == (0, 3)
+    assert steps[-1] == (3, 3)
+    again = done([study], 4, tmp_path, 2)
+    assert sorted(ran) == ["job/0", "job/1", "job/2", "job/3"]
+    assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
+
+
+def test_a_broken_run_goes_on_where_it_was(tmp_path):
+    study, ran = counting({"job/2"})
+    with pytest.raises(RigtwinError, match="job/2 failed"):
+        done([study], 3, tmp_path, 1)
+    assert ran == ["job/0", "job/1", "job/2"]
+    whole, ran = counting(set())
+    assert len(done([whole], 3, tmp_path, 1)["counted"]) == 3
+    assert ran == ["job/2"]
+
+
+def test_a_damaged_result_is_done_again(tmp_path):
+    path = tmp_path / "r.npz"
+    keep(path, {"a": 1.5, "b": np.ones(4)})
+    found = kept(path)
+    assert found is not None
+    assert found["a"] == 1.5
+    path.write_bytes(path.read_bytes()[:60])
+    assert kept(path) is None
+    path.write_bytes(b"")
+    assert kept(path) is None
+    assert kept(tmp_path / "absent.npz") is None
+
+
+def test_text_document_and_page_say_the_same(tmp_path):
+    study, _ = counting(set())
+    chapters = [Chapter(study, study.conclude(done([study], 3, tmp_path, 1)["counted"]))]
+    plain = text(chapters, every=True)
+    assert "1 of 1 entries agree" in plain
+    assert "[1] a note" in plain
+    assert "Table 2.1" in plain
+    found = json.loads(json.dumps(document(chapters, every=False)))
+    assert found["studies"][0]["entries"][0]["agrees"] is True
+    assert [one["table"] for one in found["tables"]] == ["Table 3.1"]
+    html = page(chapters, every=False)
+    assert "a caption" in html
+    assert "data:image/png;base64," in html
+    assert "http" not in html.replace("http-equiv", "")
+    assert [one.agree for one in shares(chapters[0].conclusion.entries, every=False)] == ["1 of 1"]
+
+
+def test_a_transfer_function_is_found_again():
+    frequencies = np.arange(1.0, FITTED + 1.0)
+    above, below = fitted(frequencies, hydraulic(frequencies) * 6.243e5 / 6.281e5, 2, 4)
+    assert above == pytest.approx([1817, 7.719e4, 6.243e5], rel=1e-6)
+    assert below == pytest.approx([1, 165.9, 6674, 8.598e4, 6.281e5], rel=1e-6)
+    above, below = fitted(frequencies, electric(frequencies), 2, 2)
+    assert above == pytest.approx([float(one) for one in ELECTRIC[0]], rel=1e-6)
+
+
+def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    out = ["--html", str(tmp_path / "p.html"), "--json", str(tmp_path / "p.json"), "--draw", str(tmp_path / "figures")]
+    assert main(["reproduce", "table-3.5", "--seeds", "1", "--folder", str(tmp_path / "kept"), *out]) == 0
+    printed = capsys.readouterr().out
+    assert "Table 3.5" in printed
+    assert "12 of 12" in printed
+    assert "Table 3.4" not in printed
+    assert json.loads((tmp_path / "p.json").read_text())["tables"][0]["agree"] == "12 of 12"
+    assert (
+        main(["reproduce", "figure-3.18", "--seeds", "1", "--folder", str(tmp_path / "kept"), "--draw", str(tmp_path / "f")])
+        == 0
+    )
+    (picture,) = (tmp_path / "f").iterdir()
+    assert imread(picture).std() > 0.05
+
+
+def test_what_the_thesis_sees_in_the_drop():
+    """Statements of section 6.3 that the twin shows, of one run each."""
+    results = {key: job() for key, job in quarter_car_tests.jobs(1).items()}
+    entries = {(entry.where, entry.what): entry for entry in quarter_car_tests.conclude(results).entries}
+    for where, what in (
+        ("Figure 6.25", "first swing of the sprung mass"),
+        ("Figure 6.25", "body frequency"),
+        ("Figure 6.26", "lag of 20 ms on force, or on position"),
+        ("Figure 6.26", "lag of 50 ms on the damping force alone"),
+        ("Figure 6.30", "force at rest"),
+        ("Figure 6.29", "wheel hop after the drop"),
+        ("Figure 6.33", "1000 Ns/m at the wheel"),
+        ("Figure 6.47", "wheel on the 10 Hz road"),
+    ):
+        assert entries[where, what].agrees, (where, what, entries[where, what].ours)
+    assert entries["Table 6.3", "force e1 + e2"].agrees
+    assert not entries["Table 6.3", "position e1 + e2"].agrees or "offset" in entries["Table 6.3", "position e1 + e2"].note
+    assert validation.WITHIN == 2.0
