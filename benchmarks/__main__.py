@@ -15,9 +15,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from controllers import Compensator, Structure
+from controllers.beam import AT_REST, Modes, Six, beam, modes
 from experiments import EXPERIMENTS
 from rigtwin.compiling import kernel, step
-from rigtwin.configuration import Configuration, Timing
+from rigtwin.configuration import Configuration, Safety, Timing
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.effects import applied
@@ -66,6 +68,30 @@ def _long(recorded: bool) -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         record(Path(folder) / "r.mcap", "single-mass", configuration, demands, 0)
+
+
+@kernel
+def _beam_ticks(model: Modes, start: Six, ticks: int) -> float:
+    at, rates = start, start
+    for tick in range(ticks):
+        at, rates = beam(model, at, rates, float(tick % 7))
+    return at[0]
+
+
+def _beams() -> None:
+    """One tick of the reduced structure, compiled."""
+    model, ticks = modes(CONFIGURATION.controller, 1e-3), 200_000
+    _beam_ticks(model, AT_REST, 10)
+    took = statistics.median(_seconds(lambda: _beam_ticks(model, AT_REST, ticks)) for _ in range(5)) / ticks
+    print(f"one tick of the cross of beams {1e6 * took:.3f} us; goal < 5 us", flush=True)
+
+
+def _loaded_loop() -> None:
+    """The closed loop with every optional part of the controller at work."""
+    settings = CONFIGURATION.controller._replace(structure=Structure.BEAM, compensator=Compensator.TWO_STEP, beam_sag=1.0)
+    configuration = CONFIGURATION._replace(controller=settings, safety=Safety(1e9, 1e9, 1e9))
+    for _ in run_compiled(Twin(configuration, 0.0, 0), configuration, DEMANDS):
+        pass
 
 
 def _help() -> None:
@@ -127,6 +153,8 @@ def _diagnosis() -> None:
 def main() -> None:
     print(f"mujoco {mujoco.__version__}, numpy {np.__version__}, alternating rounds")
     _side_by_side("closed loop with all controllers / bare mj_step", "<= 1.5", _closed_loop, _bare)
+    _side_by_side("closed loop with beams and compensator / without", "<= 1.2", _loaded_loop, _closed_loop)
+    _beams()
     _side_by_side("16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3)
     _side_by_side("45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False))
     _side_by_side("rigtwin --help / starting Python", "< 0.5 s", _help, _python)

@@ -186,7 +186,9 @@ def _parser() -> argparse.ArgumentParser:
     reproduce.add_argument("--folder", type=Path, default=Path("reproduction"), help="of the results (default reproduction)")
     reproduce.add_argument("--json", type=Path, metavar="F.json", help="also write everything for other programs")
     reproduce.add_argument("--html", type=Path, metavar="F.html", help="also write a page to look at, one file")
-    reproduce.add_argument("--draw", type=Path, metavar="FOLDER", help="also draw the figures as PNG files")
+    reproduce.add_argument(
+        "--draw", type=Path, metavar="FOLDER", help="where to draw the figures (default: figures in --folder)"
+    )
     reproduce.add_argument("--gallery", type=Path, metavar="FOLDER", help="also write gallery.md with its pictures")
 
     calibrate = command(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 
 from rigtwin import __version__
 from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration, flattened
+from rigtwin.configuration import Configuration, Safety, flattened
 from rigtwin.effects import applied
 from rigtwin.loop import run_compiled
 from rigtwin.recording import Writer
@@ -45,6 +46,11 @@ def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
     truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
     commands, measured = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("commands", "measurements"))
     return Ran(commands, measured, truth, blocks[-1].trip)
+
+
+def unlimited(configuration: Configuration) -> Configuration:
+    """The same without trips, to see what a twin would do wherever it goes."""
+    return configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
 
 
 def record(

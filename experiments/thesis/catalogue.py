@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from experiments.thesis import (
@@ -87,11 +86,13 @@ def asked(name: str | None) -> Asked:
 def matching(drawn: str, where: str) -> bool:
     """Whether a drawing that covers `Figure 3.11 to 3.14, B1.1` is of `Figure 3.12`."""
     kind, _, number = where.partition(" ")
+    of = ""
     for part in drawn.replace(" and ", ", ").split(", "):
-        first, _, last = part.removeprefix("Figure ").removeprefix("Table ").partition(" to ")
-        if part.startswith(("Figure ", "Table ")) and not part.startswith(kind):
-            continue
-        if number == first or (last and _between(number, first, last)):
+        named, _, rest = part.partition(" ")
+        # A part without a kind is of the kind named last.
+        of, places = (named, rest) if named in ("Figure", "Table") else (of, part)
+        first, _, last = places.partition(" to ")
+        if of == kind and (number == first or (last and _between(number, first, last))):
             return True
     return False
 
@@ -101,8 +102,3 @@ def _between(number: str, first: str, last: str) -> bool:
     return (
         group == start_group and place.isdigit() and start.isdigit() and end.isdigit() and int(start) <= int(place) <= int(end)
     )
-
-
-def unknown_tables(covered: Sequence[str]) -> list[str]:
-    """Tables of the thesis that no entry is of and that are not known to have nothing to compute."""
-    return [table for table in TABLES if table not in covered and table not in NOTHING_TO_COMPUTE]

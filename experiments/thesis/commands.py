@@ -30,8 +30,9 @@ def reproduce(parsed: Namespace) -> int:
     for out in (parsed.json, parsed.html):
         if out is not None:
             writable(out)
-    if parsed.draw is not None and parsed.draw.exists() and not parsed.draw.is_dir():
-        raise RigtwinError(f"cannot draw into {parsed.draw}: it is a file")
+    pictures = parsed.draw or parsed.folder / "figures"
+    if pictures.exists() and not pictures.is_dir():
+        raise RigtwinError(f"cannot draw into {pictures}: it is a file")
     with tqdm(disable=None, desc="reproduce", unit="job", leave=False, file=sys.stderr) as bar:
 
         def progress(count: int, total: int) -> None:
@@ -50,14 +51,19 @@ def reproduce(parsed: Namespace) -> int:
         except OSError as error:
             raise RigtwinError(f"cannot write {parsed.html}: {error.strerror}") from None
         print(f"\nlook at {parsed.html}")
-    if parsed.draw is not None:
-        _draw(chapters, parsed.draw)
+    drawn = _draw(chapters, pictures)
+    if len(drawn) == 1:
+        print(f"\n{drawn[0][0]} drawn in {drawn[0][1]}")
+    elif drawn:
+        print(f"\n{len(drawn)} figures drawn in {pictures}")
     if parsed.gallery is not None:
         print(f"\ngallery in {gallery(chapters, parsed.gallery, every)}")
     return 0
 
 
-def _draw(chapters: list[Chapter], folder: Path) -> None:
+def _draw(chapters: list[Chapter], folder: Path) -> list[tuple[str, Path]]:
+    """Draws every figure; what each covers, and its file."""
+    drawn: list[tuple[str, Path]] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -67,4 +73,5 @@ def _draw(chapters: list[Chapter], folder: Path) -> None:
             out = folder / f"{chapter.study.name}-{drawing.name}.png"
             checked_ending(out)
             save(drawing.figure, out)
-            print(f"{drawing.covers} drawn in {out}")
+            drawn.append((drawing.covers, out))
+    return drawn

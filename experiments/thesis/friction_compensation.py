@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -173,13 +174,14 @@ def _timing(results: Mapping[str, Result]) -> list[Entry]:
     good = all(found[o] < 0.85 * none for o in (-0.005, 0.0, 0.005))
     bad = all(found[o] > 0.95 * none for o in (-0.015, 0.015))
     entries = [
-        statement("Figure 4.6", "steps within 5 ms of the reversal", "reduce the error", good, text),
+        statement("Figure 4.6", "steps within 5 ms of the reversal", "reduce the error", good, text, "" if good else NOISE),
         statement("Figure 4.6", "steps 15 ms early or late", "no improvement", bad, text),
     ]
     for figure, label in (("Figure 4.8", "1 Hz"), ("Figure 4.9", "5 Hz")):
         tuned = {key: results["calibrated-fitted"][f"{label} {key}"] for key in ("reversals", "seen", "false", "delay")}
         for words, one in (("threshold 2 N", results[f"detection/{label}"]), ("calibrated", tuned)):
-            late = f"{1e3 * float(one['delay']):.0f} ms late"
+            delay = float(one["delay"])
+            late = "none in time" if math.isnan(delay) else f"{1e3 * delay:.0f} ms late"
             text = f"{one['seen']:.0f} of {one['reversals']:.0f}, {one['false']:.0f} false, {late}"
             all_seen = one["seen"] == one["reversals"] and one["false"] == 0
             note = "" if all_seen else NOISE

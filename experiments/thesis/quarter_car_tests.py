@@ -175,6 +175,7 @@ def _statements(results: Mapping[str, Result]) -> list[Entry]:
             "sprung mass drifts",
             bool(np.std(drift) > 1e-4),
             f"{1e3 * np.median(np.abs(drift)):.1f} mm off",
+            "the nominal load cell has no offset for the double integration to add up",
         ),
         statement(
             "Figure 6.47",

@@ -72,13 +72,13 @@ def text(chapters: Sequence[Chapter], every: bool) -> str:
     for chapter in chapters:
         blocks.append(f"{chapter.study.title} (chapter {chapter.study.chapter})")
         for where, entries in chapter.groups().items():
-            rows: list[tuple[str, ...]] = [(where, "thesis", "ours", "difference", "unit", share(entries))]
+            rows: list[tuple[str, ...]] = [(where, "thesis", "ours", "difference", "unit", share(entries), "by")]
             notes: dict[str, int] = {}
             for entry in entries:
                 mark = "agrees" if entry.agrees else "differs"
                 if entry.note:
                     mark += f" [{notes.setdefault(entry.note, len(notes) + 1)}]"
-                rows.append((f"  {entry.what}", entry.thesis, entry.ours, entry.difference, entry.unit, mark))
+                rows.append((f"  {entry.what}", entry.thesis, entry.ours, entry.difference, entry.unit, mark, entry.rule))
             blocks.append("\n".join([table(rows), *(f"  [{number}] {note}" for note, number in notes.items())]))
         if chapter.conclusion.remarks:
             blocks.append("\n".join(f"* {remark}" for remark in chapter.conclusion.remarks))
@@ -129,7 +129,7 @@ def page(chapters: Sequence[Chapter], every: bool) -> str:
     )
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     pictures = {
-        drawing.name: base64.b64encode(_png(drawing, 90)).decode()
+        drawing.name: base64.b64encode(_png(drawing, 75)).decode()
         for chapter in chapters
         for drawing in chapter.conclusion.drawings
     }

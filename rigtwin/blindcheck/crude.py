@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 
 from controllers import Measurements
 from rigtwin.channels import SUSPENSION_RIG
-from rigtwin.configuration import Configuration, Safety
+from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.trial import swings
 from rigtwin.diagnosis.trials import TRIALS, trials
 from rigtwin.effects import candidates
-from rigtwin.loop import run_compiled
 from rigtwin.machine.library import find
 from rigtwin.noise import white_noise
 from rigtwin.parameters import Plant
 from rigtwin.recording import load
-from rigtwin.twin import Twin
+from rigtwin.runner import simulated, unlimited
 
 TRIED = 24
 """Cases that it is tried on: it runs the twin some two hundred times for each."""
@@ -35,16 +33,13 @@ def black_box(path: Path) -> str:
     recording = load(path)
     configuration = configuration_of(recording, Configuration())
     ticks = min(recording.ticks, round(SECONDS / recording.period))
-    free = configuration._replace(
-        safety=Safety(math.inf, math.inf, math.inf), timing=configuration.timing._replace(timestep=0.5 * recording.period)
-    )
+    free = unlimited(configuration._replace(timing=configuration.timing._replace(timestep=0.5 * recording.period)))
     demands = np.column_stack([recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")])
     measured = np.stack([recording.column("/sensor", name)[:ticks] for name in Measurements._fields])
     noise = np.array([white_noise(row) for row in measured])
 
     def misfit(plant: Plant) -> float:
-        twin = Twin(free._replace(plant=plant), float(demands[0, 0]), 0)
-        truth = np.concatenate([block.truth for block in run_compiled(twin, free, demands) if block.truth is not None]).T
+        truth = simulated(free._replace(plant=plant), demands, 0).truth.T
         return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
 
     best, name = BETTER * misfit(configuration.plant), "none"

@@ -11,15 +11,14 @@ import numpy as np
 
 from controllers import Measurements
 from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration, Safety
+from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
-from rigtwin.loop import run_compiled
 from rigtwin.noise import rms, spectrum
 from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
-from rigtwin.twin import Twin
+from rigtwin.runner import simulated, unlimited
 
 COMPONENTS = ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder")
 """Replays whose levels are reported."""
@@ -91,9 +90,7 @@ def _with_noise_of(noisy: Plant, plant: Plant) -> Plant:
 
 
 def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
-    free = configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
-    twin = Twin(free, float(demands[0, 0]), seed)
-    return np.concatenate([block.measurements for block in run_compiled(twin, free, demands)]).T
+    return simulated(unlimited(configuration), demands, seed).measurements.T
 
 
 def _bands(signals: Array, period: float) -> Array:

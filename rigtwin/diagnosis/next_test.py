@@ -9,14 +9,13 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.channels import SUSPENSION_RIG
-from rigtwin.configuration import Configuration, Safety, flattened
+from rigtwin.configuration import Configuration, flattened
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit, Space
-from rigtwin.loop import run_compiled
 from rigtwin.machine.machine import Machine
 from rigtwin.recording import Recording
-from rigtwin.twin import Twin
+from rigtwin.runner import simulated, unlimited
 
 SEED = 1
 """Of the tests that are tried on the twin, and of the one proposed."""
@@ -31,17 +30,14 @@ Test = tuple[str, Configuration, Callable[[Configuration, int], np.ndarray]]
 
 def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recording:
     """The recording that a test would make on a rig of that configuration."""
-    free = configuration._replace(safety=Safety(1.0, 1e5, 1.0))
-    twin = Twin(free, float(demands[0, 0]), SEED)
-    found = list(run_compiled(twin, free, demands))
-    commands, sensed = (np.concatenate([getattr(block, part) for block in found]) for part in ("commands", "measurements"))
+    ran = simulated(unlimited(configuration), demands, SEED)
     columns = {
-        "/command": dict(zip(Commands._fields, commands.T.copy(), strict=True)),
-        "/sensor": dict(zip(Measurements._fields, sensed.T.copy(), strict=True)),
+        "/command": dict(zip(Commands._fields, ran.commands.T.copy(), strict=True)),
+        "/sensor": dict(zip(Measurements._fields, ran.measurements.T.copy(), strict=True)),
     }
     period = configuration.timing.period
     controller = flattened(configuration)["controller"]
-    return Recording(Path(name), SUSPENSION_RIG, name, period, np.arange(len(commands)) * period, columns, controller)
+    return Recording(Path(name), SUSPENSION_RIG, name, period, np.arange(len(ran.commands)) * period, columns, controller)
 
 
 def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:

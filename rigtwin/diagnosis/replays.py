@@ -10,19 +10,19 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration, Safety
+from rigtwin.configuration import Configuration
 from rigtwin.converters import seen, unseen
 from rigtwin.diagnosis.checks import check
 from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
 from rigtwin.errors import RigtwinError
 from rigtwin.gas_spring import spring_force
-from rigtwin.loop import run, run_compiled
+from rigtwin.loop import run
 from rigtwin.noise import Motion, band, motion, rms, white_noise, without_mains
 from rigtwin.plant import deflected
 from rigtwin.recording import Recording
 from rigtwin.replay import Replay
-from rigtwin.twin import Twin
+from rigtwin.runner import simulated, unlimited
 
 RESOLVED_OVER = 0.03
 """s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""
@@ -184,9 +184,8 @@ class Replays:
         return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
 
     def controller(self) -> Residual:
-        unlimited = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
         replay = Replay(self.recording)
-        for _ in run(replay, unlimited, self._demands()):
+        for _ in run(replay, unlimited(self.configuration), self._demands()):
             pass
         outputs: dict[str, Residual] = {}
         differences: dict[str, Array] = {}
@@ -198,10 +197,7 @@ class Replays:
 
     def closed_loop(self) -> Residual:
         """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
-        quiet = self.configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
-        demands = self._demands()
-        twin = Twin(quiet, float(demands[0, 0]), CLOSED_LOOP_SEED)
-        truth = np.concatenate([block.truth for block in run_compiled(twin, quiet, demands) if block.truth is not None])
+        truth = simulated(unlimited(self.configuration), self._demands(), CLOSED_LOOP_SEED).truth
         units = ("m", "m", "m", "N")
         pairs = {
             name: self._residual(self._sensor(name), self._seen(name, truth[:, number]), unit)
