@@ -147,9 +147,9 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     """Writes gallery.md and its pictures into a folder. Raises RigtwinError if it cannot."""
     lines = ["# The thesis reproduced", ""]
     lines += [
-        "Made by `make gallery`. Every figure is of the nominal twin or in closed form. Nothing is tuned to the thesis but the gains",
-        "of the force loop of Tables 4.1 and 4.2, which are found from the first row alone.",
+        "Made by `make gallery`. Every figure is of the nominal twin or in closed form. Nothing is tuned to the thesis but"
     ]
+    lines += ["the gains of the force loop of Tables 4.1 and 4.2, which are found from the first row alone."]
     lines += ["", "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).", ""]
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
