@@ -76,6 +76,9 @@ def asked(name: str | None) -> Asked:
         for covered in study.covers:
             if covered.lower() == wanted:
                 return Asked((study,), covered)
+    for table, reason in NOTHING_TO_COMPUTE.items():
+        if table.lower() == wanted:
+            raise RigtwinError(f"{table} {reason}")
     chapters = sorted({part for study in STUDIES.values() for part in study.chapter.split()})
     raise RigtwinError(
         f"nothing to reproduce under {name!r}; there are chapters {', '.join(chapters)}, studies {', '.join(STUDIES)}, "

@@ -24,7 +24,7 @@ def reproduce(parsed: Namespace) -> int:
     wanted = asked(" ".join(parsed.what) or None)
     if not 1 <= parsed.seeds <= MOST_SEEDS:
         raise RigtwinError(f"--seeds {parsed.seeds}: expected 1 to {MOST_SEEDS}")
-    workers = parsed.workers or os.cpu_count() or 1
+    workers = os.cpu_count() or 1 if parsed.workers is None else parsed.workers
     if workers < 1:
         raise RigtwinError(f"--workers {parsed.workers}: expected 1 or more")
     for out in (parsed.json, parsed.html):

@@ -44,6 +44,8 @@ def stability(parsed: argparse.Namespace) -> int:
     if parsed.map:
         checked_ending(out)
         checked_model(parsed.model)
+        if parsed.map[0] == parsed.map[1]:
+            raise RigtwinError(f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters")
     axes = [around(name, car, tau) for name in parsed.map or ()]
     rows = _rows(car, tau, parsed.delay)
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
