@@ -183,9 +183,7 @@ def calibrate(parsed: Namespace) -> int:
         f"{1e3 * found.delay:.0f} ms after the reversal"
     )
     if found.detected < 0.8 * found.reversals or found.false > 0.1 * found.reversals:
-        print(
-            "that is too few, or too many: the compensator would do harm; record a test that reverses often, such as friction-road"
-        )
+        print("this compensator would do harm; record a test that reverses often, such as friction-road")
     values = {name: float(getattr(found.settings, name)) for name in ("friction_step", *BOUNDS)}
     lines = [
         "[controller]",
