@@ -159,6 +159,9 @@ class ControllerReplay:
             return self.misfit(self.commands(self._with(name, value)))
 
         values = [left(value) for value in grid]
+        if min(values) == max(values):
+            # It changes nothing: a part of the controller that is off.
+            return values[0], told
         place = int(np.argmin(values))
         near = np.append(grid, told)
         low = near[near < grid[place]].max(initial=meaning.low)
