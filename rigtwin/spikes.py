@@ -32,6 +32,9 @@ SMOOTHING = 0.008
 """s; of the velocity that tells where the motor reverses, forwards and backwards, so without a lag."""
 FEWEST = 8
 """Reversals needed."""
+LEAST_FRICTION, MOST_FRICTION = 0.5, 500.0
+"""N; a jump outside these is noise or a fault."""
+USED = (("/command", "force"), ("/command", "voltage"), ("/sensor", "suspension_lvdt"), ("/sensor", "load_cell"))
 BOUNDS = {
     "spike_threshold": (1.0, 12.0),
     "spike_gradient": (50.0, 4000.0),
@@ -141,11 +144,15 @@ def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np
 def calibrated(recording: Recording, settings: Settings, seed: int = 0) -> Calibration:
     """Finds the compensator's settings from a recording made without compensation. settings: those that it was made with.
 
-    Raises RigtwinError if it was made with compensation or has too few reversals.
+    Raises RigtwinError if it was made with compensation, has values that are no numbers or too few reversals, or its force does
+    not jump at them.
     """
     if settings.compensator != Compensator.NONE:
         raise RigtwinError(f"{recording.path}: recorded with compensator {settings.compensator.label!r}; expected 'none'")
     period, time = recording.period, recording.time
+    for topic, name in USED:
+        if not np.isfinite(recording.column(topic, name)).all():
+            raise RigtwinError(f"{recording.path}: {topic}.{name} has values that are no numbers")
     turns, directions, others = reversals(recording)
     beside = round(BESIDE / period)
     inside = (turns > beside) & (turns < recording.ticks - 3 * beside)
@@ -159,6 +166,10 @@ def calibrated(recording: Recording, settings: Settings, seed: int = 0) -> Calib
     jumps = [_jump(friction, tick, way, beside) for tick, way in zip(turns, directions, strict=True)]
     ticks = np.array([tick for tick, _ in jumps])
     coulomb = 0.5 * float(np.median([size for _, size in jumps]))
+    if not LEAST_FRICTION < coulomb < MOST_FRICTION:
+        raise RigtwinError(
+            f"{recording.path}: at its reversals the force jumps by {2 * coulomb:.3g} N, which is no dry friction"
+        )
     errors = recording.column("/command", "force") - lagged(cell, settings.filter_force, period)
     steady = directions * np.array([np.mean(errors[tick - beside : tick - beside // 4]) for tick in ticks])
     rises = np.array([way * errors[tick : tick + 2 * beside] for tick, way in zip(ticks, directions, strict=True)])

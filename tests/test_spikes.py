@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from controllers import Compensator
+from controllers.friction import MOTOR_LAG
 from experiments import find
 from experiments.thesis.friction_tests import compensated, errors
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.runner import record
-from rigtwin.spikes import BOUNDS, calibrated, reversals
+from rigtwin.spikes import BOUNDS, calibrated, lagged, reversals
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +77,14 @@ def test_refuses_what_it_cannot_use(recording, example):
     with pytest.raises(RigtwinError, match="compensator 'observer'; expected 'none'"):
         calibrated(recording, settings._replace(compensator=Compensator.OBSERVER))
     with pytest.raises(RigtwinError, match="reverses"):
-        calibrated(example.__class__(**{**vars(example), "columns": _still(example)}), settings)
+        calibrated(dataclasses.replace(example, columns=_still(example)), settings)
+    columns = {topic: {name: values.copy() for name, values in channels.items()} for topic, channels in example.columns.items()}
+    columns["/sensor"]["load_cell"][7] = np.nan
+    with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are no numbers"):
+        calibrated(dataclasses.replace(example, columns=columns), settings)
+    columns["/sensor"]["load_cell"] = lagged(186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period)
+    with pytest.raises(RigtwinError, match="no dry friction"):
+        calibrated(dataclasses.replace(example, columns=columns), settings)
 
 
 def _still(recording):
