@@ -26,6 +26,8 @@ QUICK = {ratio: of_natural_frequency(ratio, 0.01, 1e6) for ratio in (1.0, 1.5, 0
 RATIOS = {lag: of_damping_ratio(lag) for lag in (0.2, 0.01, 0.001)}
 TYRES = {lag: of_tyre_stiffness(lag) for lag in (PRINTED_LAG, MEANT_LAG, FILTER_LAG)}
 WHEELS = {lag: of_wheel_mass(lag) for lag in (PRINTED_LAG, MEANT_LAG, FILTER_LAG)}
+OF_STIFFNESS = ((1, 1.0, 0.2, 3), (2, 1.5, 0.2, 4), (3, 0.5, 0.2, 5), (4, 1.0, 0.01, 6), (5, 1.5, 0.01, 7), (6, 0.5, 0.01, 8))
+"""Case, damping ratio, lag in s and figure, of Tables A2.2 and A3.2."""
 View = tuple[float, float, float] | None
 STIFF = (-4.5, 0.8, 50.0)
 """Without the poles of the filters, which are far to the left."""

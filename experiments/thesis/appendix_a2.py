@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from experiments.thesis import judges, resemblance, shapes
-from experiments.thesis.appendix_a import LAGS, QUICK, RATIOS, SLOW, STIFF, TYRES, WHEELS, case, instead, misprint, says
+from experiments.thesis.appendix_a import (
+    LAGS,
+    OF_STIFFNESS,
+    QUICK,
+    RATIOS,
+    SLOW,
+    STIFF,
+    TYRES,
+    WHEELS,
+    case,
+    instead,
+    misprint,
+    says,
+)
 from experiments.thesis.loci import Case, locus
 from rigtwin.stability.locus import BODY, WHEEL
 
@@ -32,14 +45,7 @@ def _a2_1() -> tuple[Case, ...]:
 
 def _a2_2() -> tuple[Case, ...]:
     cases = []
-    for number, ratio, lag, figure in (
-        (1, 1.0, 0.2, 3),
-        (2, 1.5, 0.2, 4),
-        (3, 0.5, 0.2, 5),
-        (4, 1.0, 0.01, 6),
-        (5, 1.5, 0.01, 7),
-        (6, 0.5, 0.01, 8),
-    ):
+    for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A2.{figure}", SLOW if lag == 0.2 else QUICK
         beside = locus("suspension", variations[ratio])
         note = "the caption of Figure A2.8 says ζ = 1.5, Table A2.2 0.5: the table is right" if figure == 8 else ""

@@ -5,7 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from experiments.thesis import judges, shapes
-from experiments.thesis.appendix_a import LAGS, LIGHT, QUICK, RATIOS, SLOW, STIFF, TYRES, WHEELS, case, instead, misprint, says
+from experiments.thesis.appendix_a import (
+    LAGS,
+    LIGHT,
+    OF_STIFFNESS,
+    QUICK,
+    RATIOS,
+    SLOW,
+    STIFF,
+    TYRES,
+    WHEELS,
+    case,
+    instead,
+    misprint,
+    says,
+)
 from experiments.thesis.loci import Case, locus
 from rigtwin.stability.locus import BODY, WHEEL
 
@@ -26,14 +40,7 @@ def _a3_1() -> tuple[Case, ...]:
 
 def _a3_2() -> tuple[Case, ...]:
     cases = []
-    for number, ratio, lag, figure in (
-        (1, 1.0, 0.2, 3),
-        (2, 1.5, 0.2, 4),
-        (3, 0.5, 0.2, 5),
-        (4, 1.0, 0.01, 6),
-        (5, 1.5, 0.01, 7),
-        (6, 0.5, 0.01, 8),
-    ):
+    for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A3.{figure}", SLOW if lag == 0.2 else QUICK
         note = "the caption of Figure A3.8 says ζ = 1.5, Table A3.2 0.5: the table is right" if figure == 8 else ""
         earlier = judges.earlier_than(locus("suspension", variations[ratio]), "suspension MIL")

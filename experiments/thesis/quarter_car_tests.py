@@ -12,9 +12,9 @@ from scipy.signal import butter, sosfiltfilt, welch
 
 from experiments import find
 from experiments.quarter_car import ROAD_CHAPTER_7
-from experiments.thesis.entry import Entry, digits, factor, statement
+from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
-from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial
+from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial, vehicle
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
 from rigtwin.emulated import ideal
@@ -102,16 +102,7 @@ def jobs(seeds: int) -> Mapping[str, Job]:
 
 
 def _entries(results: Mapping[str, Result]) -> list[Entry]:
-    configuration = find("drop").configuration
-    settings, plant = configuration.controller, configuration.plant
-    entries = [
-        digits("Table 6.2", "sprung mass", "25", settings.sprung_mass, "kg"),
-        digits("Table 6.2", "suspension stiffness", "1000", settings.suspension_stiffness, "N/m"),
-        digits("Table 6.2", "suspension damping", "50", settings.suspension_damping, "Ns/m"),
-        digits("Table 6.2", "unsprung mass", "34", plant.carriage.mass, "kg"),
-        digits("Table 6.2", "tyre stiffness", "50000", plant.tyre.stiffness, "N/m"),
-        digits("Table 6.2", "tyre damping", "0", plant.tyre.damping, "Ns/m"),
-    ]
+    entries = vehicle("Table 6.2", find("drop").configuration)
     for name, (table, force, force_share, position, position_share) in TESTS.items():
         found = over_seeds(results, name, "force_total")
         share = 100 * found / over_seeds(results, name, "ideal_force")

@@ -11,7 +11,7 @@ from experiments.thesis import ride
 from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
-from experiments.thesis.trial import over_seeds, seeded, trial
+from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
 from rigtwin.plot import ASKED, COLOURS, SENSED
 
 WITHIN = 1.5
@@ -36,17 +36,12 @@ def jobs(seeds: int) -> Mapping[str, Job]:
 
 def _entries(results: dict[str, Result]) -> list[Entry]:
     configuration = find("semi-active").configuration
-    settings, plant = configuration.controller, configuration.plant
+    settings = configuration.controller
     entries = [
-        digits("Table 7.1", "sprung mass", "25", settings.sprung_mass, "kg"),
-        digits("Table 7.1", "suspension stiffness", "1000", settings.suspension_stiffness, "N/m"),
-        digits("Table 7.1", "suspension damping", "50", settings.suspension_damping, "Ns/m"),
+        *vehicle("Table 7.1", configuration),
         digits("Table 7.1", "skyhook damping", "200", settings.skyhook_damping, "Ns/m"),
         digits("Table 7.1", "highest damping", "500", settings.damping_max, "Ns/m"),
         digits("Table 7.1", "lowest damping", "10", settings.damping_min, "Ns/m"),
-        digits("Table 7.1", "unsprung mass", "34", plant.carriage.mass, "kg"),
-        digits("Table 7.1", "tyre stiffness", "50000", plant.tyre.stiffness, "N/m"),
-        digits("Table 7.1", "tyre damping", "0", plant.tyre.damping, "Ns/m"),
     ]
     for table, printed in (("Table 7.2", TABLE_7_2), ("Table 7.3", TABLE_7_3)):
         for name, text in printed.items():

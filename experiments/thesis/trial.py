@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from experiments import find
+from experiments.thesis.entry import Entry, digits
 from experiments.thesis.study import Job, Result
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
@@ -79,6 +80,19 @@ def body_acceleration(position: Array, period: float) -> float:
     """rms acceleration of the body up to BODY Hz, m/s², of its position (m)."""
     smooth = sosfiltfilt(butter(2, BODY, fs=1.0 / period, output="sos"), position)
     return rms(np.diff(smooth, 2) / period**2)
+
+
+def vehicle(where: str, configuration: Configuration) -> list[Entry]:
+    """The quarter car of Tables 6.2 and 7.1 as a test has it."""
+    settings, plant = configuration.controller, configuration.plant
+    return [
+        digits(where, "sprung mass", "25", settings.sprung_mass, "kg"),
+        digits(where, "suspension stiffness", "1000", settings.suspension_stiffness, "N/m"),
+        digits(where, "suspension damping", "50", settings.suspension_damping, "Ns/m"),
+        digits(where, "unsprung mass", "34", plant.carriage.mass, "kg"),
+        digits(where, "tyre stiffness", "50000", plant.tyre.stiffness, "N/m"),
+        digits(where, "tyre damping", "0", plant.tyre.damping, "Ns/m"),
+    ]
 
 
 def curves(test: Trial) -> dict[str, Array]:
