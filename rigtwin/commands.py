@@ -167,6 +167,7 @@ def calibrate(parsed: Namespace) -> int:
     from controllers import Compensator, Settings
     from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.configuration import Configuration, overridden
+    from rigtwin.diagnosis.checks import check
     from rigtwin.recording import load
     from rigtwin.spikes import BOUNDS, calibrated
 
@@ -176,6 +177,12 @@ def calibrate(parsed: Namespace) -> int:
     if parsed.out is not None:
         writable(apart(parsed.out, parsed.recording))
     told: Settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    for fault in check(recording, overridden(Configuration(), {"controller": recording.controller})):
+        if fault.fatal:
+            raise RigtwinError(f"{recording.path}: {fault.message}")
+        print(f"note: {fault.message}")
+    for note in recording.notes:
+        print(f"note: {note}")
     found = calibrated(recording, told)
     print(f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, from {found.reversals} reversals")
     print(
@@ -183,7 +190,10 @@ def calibrate(parsed: Namespace) -> int:
         f"{1e3 * found.delay:.0f} ms after the reversal"
     )
     if found.detected < 0.8 * found.reversals or found.false > 0.1 * found.reversals:
-        print("this compensator would do harm; record a test that reverses often, such as friction-road")
+        raise RigtwinError(
+            f"{recording.path}: a compensator found from it would do harm; record a test that reverses often, such as "
+            "friction-road, without compensation"
+        )
     values = {name: float(getattr(found.settings, name)) for name in ("friction_step", *BOUNDS)}
     lines = [
         "[controller]",
@@ -193,7 +203,10 @@ def calibrate(parsed: Namespace) -> int:
     if parsed.out is None:
         print("\n".join(lines))
     else:
-        parsed.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        try:
+            parsed.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise RigtwinError(f"cannot write {parsed.out}: {error.strerror}") from None
         print(f"settings in {parsed.out}, for --config")
     return 0
 

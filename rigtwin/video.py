@@ -62,6 +62,9 @@ def film(
         raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
     if recording.machine != SUSPENSION_RIG:
         raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; only {SUSPENSION_RIG} can be filmed")
+    for name in ("structure_lvdt", "suspension_lvdt", "ground_lvdt"):
+        if recording.has("/sensor", name) and not np.isfinite(recording.column("/sensor", name)).all():
+            raise RigtwinError(f"{recording.path}: /sensor.{name} has values that are no numbers; nothing can be drawn of it")
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}

@@ -44,6 +44,8 @@ def stability(parsed: argparse.Namespace) -> int:
     if parsed.map:
         checked_ending(out)
         checked_model(parsed.model)
+        if parsed.delay:
+            raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
         if parsed.map[0] == parsed.map[1]:
             raise RigtwinError(f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters")
     axes = [around(name, car, tau) for name in parsed.map or ()]

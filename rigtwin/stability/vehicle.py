@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeVar
 
 from rigtwin.errors import RigtwinError
 
-SMALLEST, LARGEST = 1e-9, 1e12
-"""kg, N/m and Ns/m: beyond these rounding decides."""
+SMALLEST, LARGEST = {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6}, {"mass": 1e6, "stiffness": 1e9, "damping": 1e9}
+"""kg, N/m and Ns/m: beyond these rounding decides which pole is stable."""
 SHORTEST, LONGEST = 1e-9, 1e6
 """s."""
 
@@ -58,9 +58,10 @@ Vehicle = TypeVar("Vehicle", SingleMass, QuarterCar)
 def checked(vehicle: Vehicle) -> Vehicle:
     """The vehicle. Raises RigtwinError unless masses and stiffnesses are above 0 and dampings 0 or more."""
     for name, value in vehicle._asdict().items():
-        damping = name.endswith("damping")
-        if not (SMALLEST <= value <= LARGEST or (damping and value == 0.0)):
-            expected = f"{'0, or ' if damping else ''}{SMALLEST:g} to {LARGEST:g}"
+        kind = name.rpartition("_")[2]
+        low, high, damping = SMALLEST[kind], LARGEST[kind], kind == "damping"
+        if not (low <= value <= high or (damping and value == 0.0)):
+            expected = f"{'0, or ' if damping else ''}{low:g} to {high:g}"
             raise RigtwinError(f"{name} {value:g}: expected {expected}")
     return vehicle
 
