@@ -329,8 +329,10 @@ class TestCommand:
 
     def test_settings_delay_and_map(self, capsys, tmp_path):
         out = tmp_path / "map.png"
-        words = ("--set", "suspension_damping=100", "--tau", "0.02", "--delay", "--model", "suspension")
-        assert self.run(*words, "--map", "sprung_mass", "suspension_stiffness", "-o", str(out)) == 0
+        words = ("--set", "suspension_damping=100", "--tau", "0.02")
+        assert self.run(*words, "--model", "suspension", "--map", "sprung_mass", "suspension_stiffness", "-o", str(out)) == 0
+        assert "drawn in" in capsys.readouterr().out
+        assert self.run(*words, "--delay") == 0
         printed = capsys.readouterr().out
         assert "suspension damping 100," in printed
         assert "delays of 20 ms" in printed
@@ -348,6 +350,7 @@ class TestCommand:
             (["--tau", "0"], "--tau 0: expected 1e-09 to"),
             (["-o", "x.png"], "expected --map X Y"),
             (["--map", "tau", "sprung_mass", "-o", "x.doc"], "cannot draw 'x.doc'"),
+            (["--map", "tau", "sprung_mass", "--delay"], "a map is of lags"),
             (["--map", "tau", "weight"], "unknown parameter 'weight'"),
             (["--map", "tau", "sprung_mass", "--model", "x"], "unknown model 'x'"),
             (["--json", "/nowhere/s.json"], "its folder does not exist"),
