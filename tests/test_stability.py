@@ -289,10 +289,10 @@ class TestInput:
     @pytest.mark.parametrize(
         ("change", "line"),
         [
-            ({"sprung_mass": 0.0}, "sprung_mass 0: expected 0.001 to 1e\\+06"),
-            ({"tyre_stiffness": -1.0}, "tyre_stiffness -1: expected 0.001 to"),
-            ({"tyre_damping": -1.0}, "tyre_damping -1: expected 0, or 1e-06 to"),
-            ({"suspension_stiffness": float("nan")}, "suspension_stiffness nan: expected 0.001 to"),
+            ({"sprung_mass": 0.0}, "sprung_mass 0: expected 1e-09 to 1e\\+12"),
+            ({"tyre_stiffness": -1.0}, "tyre_stiffness -1: expected 1e-09 to"),
+            ({"tyre_damping": -1.0}, "tyre_damping -1: expected 0, or 1e-09 to"),
+            ({"suspension_stiffness": float("nan")}, "suspension_stiffness nan: expected 1e-09 to"),
         ],
     )
     def test_vehicles(self, change, line):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.stability.vehicle import QuarterCar, checked, checked_time
+from rigtwin.stability.vehicle import QuarterCar, believable, checked_time
 
 RIG_LAG = 0.01
 """s, of the four filters (thesis §6.2)."""
@@ -95,7 +95,7 @@ def _changed(car: QuarterCar, assignments: list[str]) -> QuarterCar:
             car = car._replace(**{name: float(text)})
         except ValueError:
             raise RigtwinError(f"--set {assignment}: expected a number after {name}=") from None
-    return checked(car)
+    return believable(car)
 
 
 def _rows(car: QuarterCar, tau: float, delay: bool) -> dict[str, dict[str, float | bool | None]]:

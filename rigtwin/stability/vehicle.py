@@ -7,8 +7,10 @@ from typing import NamedTuple, TypeVar
 
 from rigtwin.errors import RigtwinError
 
-SMALLEST, LARGEST = {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6}, {"mass": 1e6, "stiffness": 1e9, "damping": 1e9}
-"""kg, N/m and Ns/m: beyond these rounding decides which pole is stable."""
+SMALLEST, LARGEST = 1e-9, 1e12
+"""kg, N/m and Ns/m: what can be computed at all."""
+LEAST, MOST = {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6}, {"mass": 1e6, "stiffness": 1e9, "damping": 1e9}
+"""kg, N/m and Ns/m: beyond these rounding may decide which pole is stable."""
 SHORTEST, LONGEST = 1e-9, 1e6
 """s."""
 
@@ -58,12 +60,22 @@ Vehicle = TypeVar("Vehicle", SingleMass, QuarterCar)
 def checked(vehicle: Vehicle) -> Vehicle:
     """The vehicle. Raises RigtwinError unless masses and stiffnesses are above 0 and dampings 0 or more."""
     for name, value in vehicle._asdict().items():
-        kind = name.rpartition("_")[2]
-        low, high, damping = SMALLEST[kind], LARGEST[kind], kind == "damping"
-        if not (low <= value <= high or (damping and value == 0.0)):
-            expected = f"{'0, or ' if damping else ''}{low:g} to {high:g}"
-            raise RigtwinError(f"{name} {value:g}: expected {expected}")
+        _within(name, value, SMALLEST, LARGEST)
     return vehicle
+
+
+def believable(vehicle: Vehicle) -> Vehicle:
+    """The vehicle. Raises RigtwinError unless it is of a size at which its poles can be told from rounding."""
+    for name, value in vehicle._asdict().items():
+        kind = name.rpartition("_")[2]
+        _within(name, value, LEAST[kind], MOST[kind])
+    return vehicle
+
+
+def _within(name: str, value: float, low: float, high: float) -> None:
+    damping = name.endswith("damping")
+    if not (low <= value <= high or (damping and value == 0.0)):
+        raise RigtwinError(f"{name} {value:g}: expected {'0, or ' if damping else ''}{low:g} to {high:g}")
 
 
 def checked_time(name: str, value: float) -> float:
