@@ -35,6 +35,22 @@ CHANNELS = (
     Channel("/truth", "load_cell", "N", "force in the load cell, without noise"),
 )
 
+SESSION = (
+    Channel("/session", "time", "s", "since the start of the test; negative before it"),
+    Channel("/session", "phase", "1", "0 idle, 1 armed, 2 ramping, 3 running, 4 stopping, 5 stopped, 6 faulted"),
+    Channel("/session", "ground", "m", "ground cylinder position written to the rig"),
+    Channel("/session", "structure", "m", "structure cylinder position written to the rig"),
+    Channel("/session", "voltage", "V", "written to the motor amplifier"),
+    Channel("/session", "pressure", "1", "whether the hydraulics have pressure"),
+    Channel("/session", "ground_lvdt", "m", "ground cylinder position"),
+    Channel("/session", "structure_lvdt", "m", "structure cylinder (plate) position"),
+    Channel("/session", "suspension_lvdt", "m", "suspension travel: plate minus carriage"),
+    Channel("/session", "load_cell", "N", "suspension force, positive in compression"),
+    Channel("/session", "late", "s", "by which the tick began after it was due"),
+    Channel("/session", "missed", "tick", "that passed unread before this one"),
+)
+"""Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis reads it."""
+
 
 def channels_of(machine: str, columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
     """The channels that a recording of a machine holds: those of the table, with unit and meaning, if it is of the machine that
@@ -47,7 +63,7 @@ def channels_of(machine: str, columns: Mapping[str, Mapping[str, object]]) -> li
 
 def topic_fields(topic: str) -> tuple[str, ...]:
     """Field names of a topic, in order."""
-    return tuple(channel.name for channel in CHANNELS if channel.topic == topic)
+    return tuple(channel.name for channel in (*CHANNELS, *SESSION) if channel.topic == topic)
 
 
 assert topic_fields("/command") == Commands._fields

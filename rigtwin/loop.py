@@ -20,7 +20,7 @@ from rigtwin.configuration import Configuration, Safety
 from rigtwin.converters import Sensing, sampled
 from rigtwin.plant import Machine, advance, sense
 from rigtwin.rig import Rig
-from rigtwin.safety import Trip, tripped
+from rigtwin.safety import Trip, Watch, judged, watching
 from rigtwin.twin import Twin
 
 BLOCK = 250
@@ -30,25 +30,27 @@ BLOCK = 250
 @dataclass(frozen=True)
 class Block:
     """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape (ticks, 4), truth None for
-    a rig that does not know it; trip: why the test ends with this block's last tick, or Trip.NONE."""
+    a rig that does not know it; trip: why the test ends with this block's last tick, or Trip.NONE; column: that tripped, of
+    Measurements or, from 4 on, of Commands."""
 
     first: int
     commands: Array
     measurements: Array
     truth: Array | None
     trip: Trip
+    column: int = 0
 
 
 def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Block]:
     """Runs a test tick by tick. demands: shape (ticks, 3), columns of controllers.Demand."""
     controlling = controller(configuration.controller, configuration.timing.period)
-    state = initial_state(controlling)
+    state, watch = initial_state(controlling), watching()
     rig.start()
     try:
         for first in range(0, len(demands), BLOCK):
             rows: list[tuple[Commands, Measurements]] = []
             truth: list[Measurements] = []
-            trip = Trip.NONE
+            trip, column = Trip.NONE, 0
             for demand in demands[first : first + BLOCK]:
                 measured = rig.read()
                 if isinstance(rig, Twin):
@@ -58,7 +60,8 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
                 else:
                     state, commands = update(controlling, state, measured, Demand(*demand.tolist()))
                 rows.append((commands, measured))
-                trip = tripped(configuration.safety, measured, commands)
+                number, column = judged(configuration.safety, configuration.timing.period, watch, measured, commands)
+                trip = Trip(number)
                 if trip != Trip.NONE:
                     break
                 rig.write(commands)
@@ -68,6 +71,7 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
                 np.array([measured for _, measured in rows]),
                 np.array(truth) if truth else None,
                 trip,
+                column,
             )
             if trip != Trip.NONE:
                 return
@@ -80,6 +84,7 @@ def _ticks(
     machine: Machine,
     controlling: Controller,
     limits: Safety,
+    watch: Watch,
     sensing: Sensing,
     memory: Array,
     held: Commands,
@@ -89,11 +94,11 @@ def _ticks(
     commands_out: Array,
     measured_out: Array,
     truth_out: Array,
-) -> tuple[int, int]:
-    """Ticks done and the number of a Trip. Gives back plain numbers and arrays only: making any other Python object can run
+) -> tuple[int, int, int]:
+    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object can run
     into a pending Ctrl-C, which compiled code does not survive."""
     state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
-    done, trip = 0, Trip.NONE
+    done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
         true = sense(machine)
         measured = sampled(sensing, true, disturbance[tick])
@@ -101,33 +106,34 @@ def _ticks(
         commands = held
         if not missed[tick]:
             state, commands = update(controlling, state, measured, demand)
-        for column in range(4):
-            commands_out[tick, column] = commands[column]
-            measured_out[tick, column] = measured[column]
-            truth_out[tick, column] = true[column]
+        for signal in range(4):
+            commands_out[tick, signal] = commands[signal]
+            measured_out[tick, signal] = measured[signal]
+            truth_out[tick, signal] = true[signal]
         done = tick + 1
-        trip = tripped(limits, measured, commands)
-        if trip != Trip.NONE:
+        trip, column = judged(limits, controlling.period, watch, measured, commands)
+        if trip != Trip.NONE.value:
             break
         advance(machine, commands.ground, commands.structure, commands.voltage)
         held = commands
     numbers = packed(state)
     for number in range(SIZE):
         memory[number] = numbers[number]
-    return done, trip.value
+    return done, trip, column
 
 
 def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
     controlling = controller(configuration.controller, configuration.timing.period)
-    memory = np.array(packed(initial_state(controlling)))
+    memory, watch = np.array(packed(initial_state(controlling))), watching()
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
-        done, number = _ticks(
+        done, number, column = _ticks(
             twin.simulation.machine,
             controlling,
             configuration.safety,
+            watch,
             twin.sensing,
             memory,
             twin.held,
@@ -139,7 +145,7 @@ def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block
             truth,
         )
         trip = Trip(number)
-        yield Block(first, commands[:done], measured[:done], truth[:done], trip)
+        yield Block(first, commands[:done], measured[:done], truth[:done], trip, column)
         if trip != Trip.NONE:
             return
         twin.held = Commands(*commands[-1].tolist())

@@ -15,13 +15,26 @@ class Rig(Protocol):
         ...
 
     def read(self) -> Measurements:
-        """Samples all sensors now."""
+        """Samples all sensors; waits for the next tick if the rig has a clock."""
         ...
 
     def write(self, commands: Commands) -> None:
-        """Sets the outputs, which hold until the next write; returns when the next tick is due."""
+        """Sets the outputs, which hold until the next write."""
         ...
 
     def stop(self) -> None:
         """Brings the rig to rest."""
+        ...
+
+
+class DrivenRig(Rig, Protocol):
+    """A rig that is ramped in and out, as the real one must be: it also has hydraulic pressure, and may be late.
+
+    missed: ticks that passed unread before the last `read`.
+    """
+
+    missed: int
+
+    def pressure(self, on: bool) -> None:
+        """Lets the hydraulics have pressure, or takes it off."""
         ...

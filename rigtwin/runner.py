@@ -50,7 +50,7 @@ def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
 
 def unlimited(configuration: Configuration) -> Configuration:
     """The same without trips, to see what a twin would do wherever it goes."""
-    return configuration._replace(safety=Safety(math.inf, math.inf, math.inf))
+    return configuration._replace(safety=Safety(*(math.inf for _ in Safety._fields)))
 
 
 def record(
@@ -72,13 +72,13 @@ def record(
     actual = applied(configuration, list(effects))
     twin = Twin(actual, float(demands[0, 0]), seed)
     settings = flattened(configuration)
-    ticks, trip = 0, Trip.NONE
+    ticks, trip, column = 0, Trip.NONE, 0
     with Writer(path, experiment, configuration.timing.period, settings["controller"]) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
         for block in run_compiled(twin, actual, demands):
             writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
-            ticks, trip = ticks + len(block.commands), block.trip
+            ticks, trip, column = ticks + len(block.commands), block.trip, block.column
             progress(len(block.commands))
-        reason = explained(trip, configuration.safety)
+        reason = explained(trip, configuration.safety, column)
         writer.finish(reason)
     return Outcome(path, ticks, reason, trip != Trip.NONE)

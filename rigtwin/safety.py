@@ -1,13 +1,25 @@
-"""Trips: what ends a test at once. Looks at raw measurements, before any filter, on twin and rig alike."""
+"""Limits: what ends a test at once. Looks at raw measurements and at commands before they are written, on twin and rig
+alike.
+
+A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled loop and the rig's loop
+call the same one.
+"""
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
 
 from controllers import Commands, Measurements
 from controllers.compiled import compilable
+from rigtwin.arrays import Array
 from rigtwin.configuration import Safety
+
+VELOCITY_SPAN = 10
+"""Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
 
 
 class Trip(IntEnum):
@@ -18,30 +30,131 @@ class Trip(IntEnum):
     FORCE = 2
     TRAVEL = 3
     NOT_A_NUMBER = 4
+    GROUND = 5
+    VELOCITY = 6
+    JUMP = 7
+    STUCK = 8
+    FOLLOWING = 9
+    COMMAND = 10
+    COMMAND_RATE = 11
+
+
+class Watch(NamedTuple):
+    """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
+    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
+    (VELOCITY_SPAN + 1,). Changed in place."""
+
+    measured: Array
+    repeats: Array
+    commands: Array
+    travel: Array
+
+
+def watching() -> Watch:
+    """Before the first tick."""
+    return Watch(np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan))
 
 
 @compilable
-def tripped(limits: Safety, measured: Measurements, commands: Commands) -> Trip:
-    """The first limit violated at this tick."""
-    total = measured.ground_lvdt + measured.structure_lvdt + measured.suspension_lvdt + measured.load_cell
-    total += commands.ground + commands.structure + commands.force + commands.voltage
-    if not math.isfinite(total):
-        return Trip.NOT_A_NUMBER
+def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements) -> tuple[int, int]:
+    """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
+    for column in range(4):
+        if not math.isfinite(measured[column]):
+            return Trip.NOT_A_NUMBER.value, column
+    trip, at = Trip.NONE.value, 0
+    for column in range(4):
+        change = abs(measured[column] - watch.measured[column])
+        rate = limits.force_rate if column == 3 else limits.lvdt_rate
+        if change > rate * period and trip == Trip.NONE.value:
+            trip, at = Trip.JUMP.value, column
+        watch.repeats[column] = watch.repeats[column] + 1.0 if change == 0.0 else 1.0
+        if watch.repeats[column] >= limits.stuck and trip == Trip.NONE.value:
+            trip, at = Trip.STUCK.value, column
+        watch.measured[column] = measured[column]
+    place = int(watch.travel[VELOCITY_SPAN]) if watch.travel[VELOCITY_SPAN] >= 0.0 else 0
+    moved = abs(measured.suspension_lvdt - watch.travel[place])
+    watch.travel[place] = measured.suspension_lvdt
+    watch.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
+    if trip != Trip.NONE.value:
+        return trip, at
     if abs(measured.structure_lvdt) > limits.structure:
-        return Trip.STRUCTURE
+        return Trip.STRUCTURE.value, 1
     if abs(measured.load_cell) > limits.force:
-        return Trip.FORCE
+        return Trip.FORCE.value, 3
     if abs(measured.suspension_lvdt) > limits.travel:
-        return Trip.TRAVEL
-    return Trip.NONE
+        return Trip.TRAVEL.value, 2
+    if abs(measured.ground_lvdt) > limits.ground:
+        return Trip.GROUND.value, 0
+    if moved > limits.velocity * VELOCITY_SPAN * period:
+        return Trip.VELOCITY.value, 2
+    return Trip.NONE.value, 0
 
 
-def explained(trip: Trip, limits: Safety) -> str:
-    """One line for the operator."""
+@compilable
+def commanded_wrong(
+    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+) -> tuple[int, int]:
+    """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
+    are remembered as written."""
+    for column in range(4):
+        if not math.isfinite(commands[column]):
+            return Trip.NOT_A_NUMBER.value, 4 + column
+    if abs(commands.ground) > limits.ground:
+        return Trip.COMMAND.value, 4
+    if abs(commands.structure) > limits.structure:
+        return Trip.COMMAND.value, 5
+    for column in (0, 1, 3):
+        rate = limits.voltage_rate if column == 3 else limits.command_rate
+        if abs(commands[column] - watch.commands[column]) > rate * period:
+            return Trip.COMMAND_RATE.value, 4 + column
+    if abs(commands.ground - measured.ground_lvdt) > limits.following:
+        return Trip.FOLLOWING.value, 0
+    if abs(commands.structure - measured.structure_lvdt) > limits.following:
+        return Trip.FOLLOWING.value, 1
+    if abs(commands.force - measured.load_cell) > limits.following_force:
+        return Trip.FOLLOWING.value, 3
+    for column in range(4):
+        watch.commands[column] = commands[column]
+    return Trip.NONE.value, 0
+
+
+@compilable
+def judged(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
+    """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
+    trip, column = sensed_wrong(limits, period, watch, measured)
+    if trip == Trip.NONE.value:
+        trip, column = commanded_wrong(limits, period, watch, measured, commands)
+    return trip, column
+
+
+def within(limits: Safety, measured: Measurements) -> str | None:
+    """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
+    hysteresis."""
+    share = 1.0 - limits.hysteresis
+    for name, limit in zip(Measurements._fields, (limits.ground, limits.structure, limits.travel, limits.force), strict=True):
+        value = getattr(measured, name)
+        if not abs(value) <= share * limit:
+            return f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, {100 * share:.0f} % of its limit"
+    return None
+
+
+def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
+    """One line for the operator. column: of Measurements, from 4 on of Commands."""
+    name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
+    lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)
+    command, change = ("m", limits.command_rate) if column != 7 else ("V", limits.voltage_rate)
+    error, following = ("m", limits.following) if column != 3 else ("N", limits.following_force)
     return {
         Trip.NONE: "completed",
         Trip.STRUCTURE: f"trip: |structure_lvdt| above {limits.structure:g} m",
         Trip.FORCE: f"trip: |load_cell| above {limits.force:g} N",
         Trip.TRAVEL: f"trip: |suspension_lvdt| above {limits.travel:g} m, the motor's stroke",
-        Trip.NOT_A_NUMBER: "trip: a measurement or command is not a finite number",
+        Trip.NOT_A_NUMBER: f"trip: {name} is not a finite number",
+        Trip.GROUND: f"trip: |ground_lvdt| above {limits.ground:g} m",
+        Trip.VELOCITY: f"trip: suspension_lvdt moves faster than {limits.velocity:g} m/s",
+        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: sensor or cable",
+        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
+        Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
+        Trip.COMMAND: f"trip: {name} is beyond its limit",
+        Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
     }[trip]

@@ -9,13 +9,13 @@ import pytest
 
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Configuration, Safety, Timing, from_assignments
+from rigtwin.configuration import Configuration, Timing, from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.excitation import schroeder
 from rigtwin.loop import Block, run, run_compiled
 from rigtwin.recording import load
 from rigtwin.runner import record
-from rigtwin.safety import Trip, tripped
+from rigtwin.safety import Trip
 from rigtwin.twin import Twin
 
 SHORT = Timing(duration=1.0)
@@ -57,22 +57,6 @@ def test_same_seed_same_bytes(tmp_path):
         data.append(path.read_bytes())
     assert data[0] == data[1]
     assert data[0] != data[2]
-
-
-@pytest.mark.parametrize(
-    ("measured", "trip"),
-    [
-        (Measurements(0, 0.151, 0, 0), Trip.STRUCTURE),
-        (Measurements(0, -0.151, 0, 0), Trip.STRUCTURE),
-        (Measurements(0, 0, 0, 1501.0), Trip.FORCE),
-        (Measurements(0, 0, -0.22, 0), Trip.TRAVEL),
-        (Measurements(0, 0, 0, math.nan), Trip.NOT_A_NUMBER),
-        (Measurements(math.inf, 0, 0, 0), Trip.NOT_A_NUMBER),
-        (Measurements(0, 0.149, 0.2, -1499.0), Trip.NONE),
-    ],
-)
-def test_trips(measured, trip):
-    assert tripped(Safety(), measured, Commands(0, 0, 0, 0)) == trip
 
 
 def test_a_trip_ends_the_test_and_keeps_the_recording(tmp_path):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from rigtwin.arrays import Array
 from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
+from rigtwin.recording.schema import END_RECORD, FIELD, LATENESS_RECORD, RECORD, TRANSITION_RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
 
 _DAMAGE = (
     McapError,
@@ -43,6 +43,7 @@ class Recording:
 
     columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since the start, shape (ticks,).
     controller: the operator's settings, empty if the recording does not say. notes: what is wrong or missing, for people.
+    transitions: of a supervised session, in order; lateness: of a loop in real time.
     """
 
     path: Path
@@ -55,6 +56,8 @@ class Recording:
     twin: Mapping[str, str] = field(default_factory=dict)
     end: str = ""
     notes: tuple[str, ...] = ()
+    transitions: tuple[Mapping[str, str], ...] = ()
+    lateness: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def ticks(self) -> int:
@@ -79,6 +82,7 @@ def load(path: Path) -> Recording:
     channels: dict[int, Channel] = {}
     raw: dict[int, tuple[list[int], list[bytes]]] = {}
     notes: list[str] = []
+    transitions: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
             if not file.read(1):
@@ -92,6 +96,8 @@ def load(path: Path) -> Recording:
                         data.append(record.data)
                     elif isinstance(record, Metadata):
                         metadata[record.name] = record.metadata
+                        if record.name == TRANSITION_RECORD:
+                            transitions.append(record.metadata)
                     elif isinstance(record, Schema):
                         schemas[record.id] = record
                     elif isinstance(record, Channel):
@@ -140,6 +146,8 @@ def load(path: Path) -> Recording:
         twin=metadata.get(TWIN_RECORD, {}),
         end=metadata.get(END_RECORD, {}).get("reason", ""),
         notes=tuple(notes),
+        transitions=tuple(transitions),
+        lateness=metadata.get(LATENESS_RECORD, {}),
     )
 
 

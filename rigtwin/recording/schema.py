@@ -19,6 +19,12 @@ TWIN_RECORD = "rigtwin.twin"
 """Name of the metadata record that says how a twin made the recording."""
 END_RECORD = "rigtwin.end"
 """Name of the metadata record that says why the test ended."""
+TRANSITION_RECORD = "rigtwin.transition"
+"""Name of the metadata records that say when and why a session went from one state to the next, one for each."""
+CARD_RECORD = "rigtwin.card"
+"""Name of the metadata record that holds the channel table."""
+LATENESS_RECORD = "rigtwin.lateness"
+"""Name of the metadata record that says how late the ticks of a loop in real time were."""
 
 _DOUBLE_WIRE_TYPE = 1
 

@@ -80,7 +80,8 @@ class Writer:
         except OSError as error:
             raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
         self._path = path
-        self._ticks = 0
+        self._ticks = self._next = 0
+        self._counts: dict[str, int] = {}
         self._nanoseconds = period * 1e9
         self._offset = 0
         self._topics: dict[str, int] = {}
@@ -114,8 +115,9 @@ class Writer:
         self._metadata.append(MetadataIndex(offset=self._offset, length=len(record), name=name))
         self._put(record)
 
-    def append(self, **topics: Array | None) -> None:
-        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields). None is left out."""
+    def append(self, at: NDArray[np.int64] | None = None, **topics: Array | None) -> None:
+        """Adds ticks: topic name without its slash → values, shape (ticks, fields). None is left out. at: the ticks' numbers,
+        rising, shape (ticks,); by default those that follow on the last."""
         columns = {f"/{name}": values for name, values in topics.items() if values is not None}
         for topic in columns:
             if topic not in self._topics:
@@ -123,9 +125,24 @@ class Writer:
         ticks = len(next(iter(columns.values())))
         if ticks == 0:
             return
-        sequence = np.arange(self._ticks, self._ticks + ticks)
-        times = np.round(sequence * self._nanoseconds).astype(np.uint64)
+        sequence = np.arange(self._next, self._next + ticks) if at is None else at
+        self._next = int(sequence[-1]) + 1
         self._ticks += ticks
+        self._put_messages(columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence)
+
+    def append_beside(self, topic: str, values: Array, times: Array) -> None:
+        """Adds messages on a topic that has ticks of its own, such as those before the test begins. values: shape (messages,
+        fields); times: s since the start of the test, rising, shape (messages,); what was before it is put at its start."""
+        if topic not in self._topics:
+            self._register(topic)
+        if len(values):
+            stamps = np.round(np.maximum(times, 0.0) * 1e9).astype(np.uint64)
+            self._put_messages({topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0))
+
+    def _put_messages(self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]) -> None:
+        ticks = len(times)
+        for topic in columns:
+            self._counts[topic] = self._counts.get(topic, 0) + ticks
         layout = np.dtype([(topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])]) for topic, values in columns.items()])
         messages = np.zeros(ticks, layout)
         for topic, values in columns.items():
@@ -217,11 +234,11 @@ class Writer:
         return Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
-            channel_message_counts={number: self._ticks for number in self._topics.values()},
+            channel_message_counts={number: self._counts.get(topic, 0) for topic, number in self._topics.items()},
             chunk_count=len(self._chunks),
-            message_count=self._ticks * len(self._topics),
+            message_count=sum(self._counts.values()),
             message_start_time=0,
-            message_end_time=self._chunks[-1].message_end_time if self._chunks else 0,
+            message_end_time=max((chunk.message_end_time for chunk in self._chunks), default=0),
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )

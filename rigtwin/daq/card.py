@@ -1,0 +1,204 @@
+"""A rig behind an NI card, through the nidaqmx package: the driver of this computer, or a gRPC device server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from rigtwin.daq.conversion import conversion, to_values, to_volts
+from rigtwin.daq.table import ChannelTable
+from rigtwin.errors import RigtwinError
+from rigtwin.realtime import Pacer, monotonic
+
+if TYPE_CHECKING:
+    import grpc
+
+TIMEOUT = 0.1
+"""s that a sample may be awaited: a card that stays silent so long is not there."""
+DRIVER = "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
+PACKAGE = "the nidaqmx package is missing; pip install 'rigtwin[daq]'"
+INPUTS, OUTPUTS, PRESSURE = "rigtwin-inputs", "rigtwin-outputs", "rigtwin-pressure"
+"""Names of the tasks, by which a guardian finds the outputs when their owner is dead."""
+
+
+class CardFault(RigtwinError):
+    """The card, its driver or the way to it does not do what it was asked."""
+
+
+@contextmanager
+def translated(doing: str) -> Iterator[None]:
+    """Gives what nidaqmx raises as a CardFault of one line."""
+    from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
+
+    try:
+        yield
+    except (DaqNotFoundError, DaqNotSupportedError):
+        raise CardFault(f"the NI-DAQmx driver is missing on this computer; {DRIVER}") from None
+    except RpcError as error:
+        raise CardFault(f"{doing}: {str(error).splitlines()[0]}") from None
+    except Error as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        raise CardFault(f"{doing}: {' '.join(lines[:4])}") from None
+
+
+def connected(address: str) -> grpc.Channel | None:
+    """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
+    try:
+        import nidaqmx  # noqa: F401
+    except ImportError:
+        raise CardFault(PACKAGE) from None
+    if not address:
+        return None
+    try:
+        import grpc
+    except ImportError:
+        raise CardFault(PACKAGE) from None
+    return grpc.insecure_channel(address)
+
+
+class Card:
+    """A `DrivenRig` on a card. Inputs are clocked by the card where the table says so, else by this computer; outputs act at
+    once. Nothing moves before `write` or `pressure`.
+
+    missed: ticks whose samples came too late to be answered. late: s by which the last sample was read after it was due.
+    """
+
+    def __init__(self, table: ChannelTable, period: float, channel: grpc.Channel | None, paced: bool = True) -> None:
+        """period in s; channel: to a gRPC device server; paced: whether a card without a clock of its own is to be read in real
+        time, False for a virtual one whose time stands still between reads."""
+        self._table, self._period, self._channel = table, period, channel
+        self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
+        self._volts, self._values = np.zeros(4), np.empty(4)
+        self._asked, self._commands = np.zeros(3), np.empty(3)
+        self._pacer = Pacer(period) if paced and table.timing == "software" else None
+        self._clocked = paced and table.timing == "hardware"
+        self._due, self.missed, self.late = 0.0, 0, 0.0
+        self._tasks: list[Any] = []
+
+    def inspect(self) -> None:
+        """Looks whether the card is there and has what the table asks of it. Raises CardFault; moves nothing."""
+        from nidaqmx.system import System
+
+        table = self._table
+        with translated(f"card {table.device}"):
+            options = self._options("")
+            system = System.local() if options is None else System.remote(options)
+            names = [device.name for device in system.devices]
+            if table.device not in names:
+                raise CardFault(f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}")
+            device = system.devices[table.device]
+            there = {
+                "inputs": [channel.name for channel in device.ai_physical_chans],
+                "outputs": [channel.name for channel in device.ao_physical_chans],
+            }
+            ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
+            for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
+                for line in lines:
+                    if table.physical(line.line) not in there[group]:
+                        raise CardFault(f"{group}.{line.name}: {device.product_type} has no line {line.line}")
+                    if line.scaling.range not in ranges[group]:
+                        known = ", ".join(f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]}))
+                        raise CardFault(
+                            f"{group}.{line.name}.range = {line.scaling.range:g} V: {device.product_type} has {known} V"
+                        )
+
+    def start(self) -> None:
+        from nidaqmx import Task
+        from nidaqmx.constants import AcquisitionType
+        from nidaqmx.stream_readers import AnalogMultiChannelReader
+        from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
+
+        table = self._table
+        with translated(f"card {table.device}"):
+            inputs, outputs, pressure = (self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE))
+            for line in table.inputs:
+                volts = line.scaling.range
+                inputs.ai_channels.add_ai_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+            for line in table.outputs:
+                volts = line.scaling.range
+                outputs.ao_channels.add_ao_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+            pressure.do_channels.add_do_chan(table.physical(table.pressure))
+            if table.timing == "hardware":
+                inputs.timing.cfg_samp_clk_timing(
+                    1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
+                )
+            self._reader, self._writer = AnalogMultiChannelReader(inputs.in_stream), AnalogMultiChannelWriter(outputs.out_stream)
+            self._reader.verify_array_shape = self._writer.verify_array_shape = False
+            self._writer.auto_start = False
+            for task in (outputs, pressure, inputs):
+                task.start()
+            self._stream, self._pressure = inputs.in_stream, DigitalSingleChannelWriter(pressure.out_stream)
+            self._pressure.auto_start = False
+
+    def read(self) -> Measurements:
+        self.missed = 0
+        if self._pacer is not None:
+            self.missed, self.late = self._pacer.wait(), self._pacer.late
+        try:
+            self._reader.read_one_sample(self._volts, TIMEOUT)
+            if self._clocked:
+                self._drop_what_is_old()
+        except Exception as error:
+            with translated(f"card {self._table.device} gives no sample"):
+                raise error
+        to_values(self._inputs, self._volts, self._values)
+        return Measurements(*self._values.tolist())
+
+    def _drop_what_is_old(self) -> None:
+        """A loop that was late finds samples waiting: only the last is worth an answer."""
+        now = monotonic()
+        if self._due == 0.0:
+            self._due = now
+        self.late = now - self._due
+        if self.late > 0.5 * self._period:
+            for _ in range(self._stream.avail_samp_per_chan):
+                self._reader.read_one_sample(self._volts, TIMEOUT)
+                self.missed += 1
+                self._due += self._period
+        elif self.late < 0.0:
+            self._due = now
+        self._due += self._period
+
+    def write(self, commands: Commands) -> None:
+        self._commands[:] = commands.ground, commands.structure, commands.voltage
+        to_volts(self._outputs, self._commands, self._asked)
+        try:
+            self._writer.write_one_sample(self._asked)
+        except Exception as error:
+            with translated(f"card {self._table.device} takes no output"):
+                raise error
+
+    def pressure(self, on: bool) -> None:
+        with translated(f"card {self._table.device}: pressure line {self._table.pressure}"):
+            self._pressure.write_one_sample_one_line(on)
+
+    def stop(self) -> None:
+        """Motor to zero, pressure off, the card's lines given back. Never raises: there is nobody left to hear it."""
+        if len(self._tasks) == 3:
+            self._commands[:] = 0.0, 0.0, 0.0
+            to_volts(self._outputs, self._commands, self._commands)
+            self._asked[2] = self._commands[2]
+            with suppress(Exception):
+                self._writer.write_one_sample(self._asked)
+            with suppress(Exception):
+                self._pressure.write_one_sample_one_line(False)
+        for task in self._tasks:
+            with suppress(Exception):
+                task.close()
+        self._tasks = []
+
+    def _options(self, name: str) -> Any:
+        if self._channel is None:
+            return None
+        from nidaqmx.grpc_session_options import GrpcSessionOptions
+
+        return GrpcSessionOptions(self._channel, name)
+
+    def _task(self, kind: Any, name: str) -> Any:
+        task = kind(name, grpc_options=self._options(name)) if self._channel is not None else kind(name)
+        self._tasks.append(task)
+        return task

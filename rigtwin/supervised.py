@@ -1,0 +1,345 @@
+"""A test on a rig that is ramped in and out under supervision: the same for the real rig, its virtual card and the twin.
+
+Between controller and rig stand the limits of `rigtwin.safety` and the states of `rigtwin.supervisor`. Whatever goes wrong,
+the outputs go to the stop state at that tick: motor to zero force, cylinders hold, and after a while their pressure is taken
+off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers import Commands, Controller, Demand, Measurements, Mode, State, controller, initial_state, update
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration
+from rigtwin.errors import RigtwinError
+from rigtwin.loop import BLOCK
+from rigtwin.realtime import Lateness, monotonic
+from rigtwin.rig import DrivenRig
+from rigtwin.safety import Trip, commanded_wrong, explained, sensed_wrong, watching, within
+from rigtwin.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
+
+LOOKING = 0.1
+"""s for which an armed rig is looked at before it is moved."""
+SETTLING = 0.3
+"""s at the start position between the ramp and the test."""
+
+Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Commands]]
+
+
+class Recorder(Protocol):
+    """Keeps what a session does. `fault`: why it cannot any more, or None; looked at in every tick."""
+
+    @property
+    def fault(self) -> str | None: ...
+
+    def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
+        """Consecutive ticks of the test: their numbers, shape (ticks,), and values, shape (ticks, 4)."""
+        ...
+
+    def session(self, rows: Array) -> None:
+        """Ticks of the whole session, shape (ticks, fields of /session)."""
+        ...
+
+    def transition(self, transition: Transition) -> None: ...
+
+    def beat(self) -> None:
+        """Called once a tick: the loop is alive."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a session ended. ticks: of the test that were recorded; transitions: all of them, in order; peaks: greatest magnitude
+    of each measurement, and of the commands' voltage."""
+
+    cause: Cause
+    ticks: int
+    transitions: tuple[Transition, ...]
+    peaks: dict[str, float]
+
+
+def supervise(
+    rig: DrivenRig,
+    configuration: Configuration,
+    demands: Array,
+    recorder: Recorder,
+    stop: Callable[[], str | None] = lambda: None,
+    lateness: Lateness | None = None,
+    updating: Update = update,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Ended:
+    """Runs a test, demands of shape (ticks, 3). stop: looked at in every tick; a text stops the session and is its reason.
+    lateness: is filled, if the rig runs in real time. Raises RigtwinError only before anything has moved."""
+    return _Session(rig, configuration, demands, recorder, stop, lateness, updating, progress).run()
+
+
+class _Session:
+    def __init__(
+        self,
+        rig: DrivenRig,
+        configuration: Configuration,
+        demands: Array,
+        recorder: Recorder,
+        stop: Callable[[], str | None],
+        lateness: Lateness | None,
+        updating: Update,
+        progress: Callable[[int], object],
+    ) -> None:
+        self._rig, self._limits, self._demands = rig, configuration.safety, demands
+        self._period = configuration.timing.period
+        self._recorder, self._stop, self._lateness = recorder, stop, lateness
+        self._updating, self._progress = updating, progress
+        self._controller = controller(configuration.controller, self._period)
+        self._state = initial_state(self._controller)
+        self._watch = watching()
+        self._supervisor = Supervisor(recorder.transition)
+        self._target = self._start_of(configuration, demands)
+        self._before = (LOOKING, self._limits.ramp, SETTLING)
+        self._clock = -round(sum(self._before) / self._period)
+        self._held, self._pressure = Commands(0.0, 0.0, 0.0, 0.0), False
+        self._rows: list[tuple[float, ...]] = []
+        self._tested: list[tuple[int, Commands, Measurements]] = []
+        self._done, self._peaks = 0, [0.0] * 5
+
+    @staticmethod
+    def _start_of(configuration: Configuration, demands: Array) -> Commands:
+        settings = configuration.controller
+        ground, structure, force = demands[0].tolist()
+        if settings.mode != Mode.IMPOSED:
+            structure, force = settings.start, settings.preload
+        return Commands(ground, structure, force, force / MOTOR_CONSTANT)
+
+    @property
+    def _time(self) -> float:
+        return self._clock * self._period
+
+    def run(self) -> Ended:
+        """The way through all states; every step of it ends in `_come_to_rest`."""
+        rig = self._rig
+        rig.start()
+        try:
+            measured = rig.read()
+            refused = within(self._limits, measured)
+            if refused is not None:
+                raise RigtwinError(f"not armed: {refused}")
+            rest = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
+            rig.write(rest)
+            rig.pressure(True)
+        except BaseException as error:
+            rig.stop()
+            self._supervisor.go(Phase.FAULTED, _cause_of(error), self._time)
+            raise
+        self._held, self._pressure = rest, True
+        try:
+            cause = self._move(rest)
+        except BaseException as error:
+            cause = self._halt(_cause_of(error), None)
+        try:
+            self._come_to_rest(cause, rest)
+        finally:
+            rig.stop()
+            self._flush()
+        names = (*Measurements._fields, "voltage")
+        transitions = tuple(self._supervisor.transitions)
+        return Ended(transitions[-1].cause, self._done, transitions, dict(zip(names, self._peaks, strict=True)))
+
+    def _move(self, rest: Commands) -> Cause:
+        """Armed, ramping, running. Returns why it ended."""
+        self._supervisor.go(Phase.ARMED, Cause("operator", "armed: signals within their limits", fault=False), self._time)
+        for _ in range(round(LOOKING / self._period)):
+            cause = self._tick(lambda _: rest)
+            if cause is not None:
+                return cause
+        self._supervisor.go(Phase.RAMPING, Cause("ramp", "every sensor lives; ramping to the start", fault=False), self._time)
+        for share in _cosine(self._limits.ramp, self._period):
+            between = Commands(*(a + share * (b - a) for a, b in zip(rest, self._target, strict=True)))
+            cause = self._tick(lambda _, between=between: between)
+            if cause is not None:
+                return cause
+        while self._clock < 0:
+            cause = self._tick(lambda _: self._target)
+            if cause is not None:
+                return cause
+        self._supervisor.go(Phase.RUNNING, Cause("test", "at the start; the test begins", fault=False), self._time)
+        while self._clock < len(self._demands):
+            cause = self._tick(self._control)
+            if cause is not None:
+                return cause
+        return COMPLETED
+
+    def _control(self, measured: Measurements) -> Commands:
+        demand = Demand(*self._demands[self._clock].tolist())
+        self._state, commands = self._updating(self._controller, self._state, measured, demand)
+        return commands
+
+    def _tick(self, command: Callable[[Measurements], Commands]) -> Cause | None:
+        """One tick: read, look, command, look, write. Returns why the session must stop, after the outputs are at the stop
+        state, or None."""
+        running = self._supervisor.phase == Phase.RUNNING
+        try:
+            measured = self._rig.read()
+        except Exception as error:
+            return self._halt(_cause_of(error), None)
+        begun = monotonic()
+        self._clock += self._rig.missed
+        cause = self._faulty(measured)
+        if cause is None and running and self._clock >= len(self._demands):
+            return COMPLETED
+        commands = self._held
+        if cause is None:
+            try:
+                commands = command(measured)
+            except Exception as error:
+                cause = Cause("controller", f"the controller failed: {type(error).__name__}: {_line(error)}")
+        if cause is None:
+            number, column = commanded_wrong(self._limits, self._period, self._watch, measured, commands)
+            if number != Trip.NONE:
+                cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+        if cause is not None:
+            self._note(measured, commands, running)
+            return self._halt(cause, measured)
+        try:
+            self._rig.write(commands)
+        except Exception as error:
+            return self._halt(_cause_of(error), measured)
+        self._held = commands
+        self._note(measured, commands, running)
+        self._clock += 1
+        if self._lateness is not None:
+            self._lateness.add(getattr(self._rig, "late", 0.0), monotonic() - begun)
+        return None
+
+    def _faulty(self, measured: Measurements) -> Cause | None:
+        """What is wrong besides the commands."""
+        self._recorder.beat()
+        number, column = sensed_wrong(self._limits, self._period, self._watch, measured)
+        if number != Trip.NONE:
+            return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+        missed = self._rig.missed
+        if self._lateness is not None:
+            self._lateness.missed += missed
+        if missed > self._limits.missed:
+            return Cause("late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be")
+        fault = self._recorder.fault
+        if fault is not None:
+            return Cause("recording", fault)
+        asked = self._stop()
+        return Cause("operator", asked, fault=False) if asked is not None else None
+
+    def _halt(self, cause: Cause, measured: Measurements | None) -> Cause:
+        """Outputs to the stop state, now: no force, cylinders where they were last told to be."""
+        self._held = self._held._replace(force=0.0, voltage=0.0)
+        try:
+            self._rig.write(self._held)
+        except Exception:
+            self._pressure = False
+            self._rig.stop()
+        self._row(measured if measured is not None else Measurements(*[math.nan] * 4))
+        self._clock += 1
+        return cause
+
+    def _come_to_rest(self, cause: Cause, rest: Commands) -> None:
+        """Back to where it stood, if all is well; else hold. Then take the pressure off."""
+        self._supervisor.go(Phase.STOPPING, cause, self._time)
+        if cause == COMPLETED:
+            later = self._ramp_out(rest)
+            cause = later or cause
+        for _ in range(round(self._limits.hold / self._period)):
+            if not self._pressure or not self._holding():
+                break
+        self._pressure = False
+        self._rig.stop()
+        self._supervisor.go(Phase.FAULTED if cause.fault else Phase.STOPPED, cause, self._time)
+
+    def _ramp_out(self, rest: Commands) -> Cause | None:
+        begin = self._held
+        for share in _cosine(self._limits.ramp, self._period):
+            between = Commands(*(a + share * (b - a) for a, b in zip(begin, rest, strict=True)))
+            cause = self._tick(lambda _, between=between: between)
+            if cause is not None:
+                return cause
+        self._held = self._held._replace(force=0.0, voltage=0.0)
+        return None
+
+    def _holding(self) -> bool:
+        """A tick of holding; whatever the sensors say now, the outputs stay. False if the card is gone."""
+        try:
+            measured = self._rig.read()
+            self._rig.write(self._held)
+        except Exception:
+            return False
+        self._recorder.beat()
+        self._clock += self._rig.missed
+        self._row(measured)
+        self._clock += 1
+        return True
+
+    def _note(self, measured: Measurements, commands: Commands, running: bool) -> None:
+        self._row(measured)
+        for place, value in enumerate((*measured, commands.voltage)):
+            if abs(value) > self._peaks[place]:
+                self._peaks[place] = abs(value)
+        if running:
+            self._tested.append((self._clock, commands, measured))
+            self._done += 1
+
+    def _row(self, measured: Measurements) -> None:
+        held, rig = self._held, self._rig
+        written = (held.ground, held.structure, held.voltage, float(self._pressure))
+        late = getattr(rig, "late", 0.0)
+        self._rows.append((self._time, float(self._supervisor.phase), *written, *measured, late, float(rig.missed)))
+        if len(self._rows) >= BLOCK:
+            self._flush()
+
+    def _flush(self) -> None:
+        rows, tested = self._rows, self._tested
+        self._rows, self._tested = [], []
+        if tested:
+            self._recorder.ticks(
+                np.array([at for at, _, _ in tested]),
+                np.array([commands for _, commands, _ in tested]),
+                np.array([measured for _, _, measured in tested]),
+            )
+            self._progress(len(tested))
+        if rows:
+            self._recorder.session(np.array(rows))
+
+
+def _cosine(duration: float, period: float) -> Iterator[float]:
+    """From 0 to 1 without a jump in velocity."""
+    ticks = max(1, round(duration / period))
+    for tick in range(1, ticks + 1):
+        yield 0.5 - 0.5 * math.cos(math.pi * tick / ticks)
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or "no message"
+
+
+def _cause_of(error: BaseException) -> Cause:
+    if isinstance(error, KeyboardInterrupt):
+        return Cause("operator", "stopped by the operator: interrupted", fault=False)
+    if isinstance(error, RigtwinError):
+        return Cause("card", _line(error))
+    return Cause("rig", f"{type(error).__name__}: {_line(error)}")
+
+
+def stopped_by(sources: Sequence[Callable[[], str | None]]) -> Callable[[], str | None]:
+    """The first of several ways to stop that has something to say."""
+
+    def look() -> str | None:
+        for source in sources:
+            said = source()
+            if said is not None:
+                return said
+        return None
+
+    return look
