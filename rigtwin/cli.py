@@ -68,6 +68,16 @@ def _parser() -> argparse.ArgumentParser:
     )
     _effect(run, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
     settings(run)
+    _supervised(run)
+
+    card = command("card", "a virtual card on a port, or the check of a channel table", "docs/rig.md")
+    deeds = card.add_subparsers(dest="deed", metavar="deed", required=True)
+    serving = deeds.add_parser("serve", help="let the twin be the card of any NI-DAQmx gRPC client on this computer")
+    serving.add_argument("card", type=Path, metavar="CARD.toml", help="channel table: how the twin is wired to the card")
+    serving.add_argument("--port", type=int, default=31763, help="default 31763; 0 takes a free one")
+    serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
+    _effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
+    settings(serving)
 
     effects = command(
         "effects",
@@ -217,6 +227,20 @@ def _effect(parser: argparse.ArgumentParser, summary: str) -> None:
 def _stretch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="start", type=float, default=0.0, metavar="S", help="start at this time (default 0)")
     parser.add_argument("--until", type=float, metavar="S", help="stop at this time (default: the end)")
+
+
+def _supervised(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("on the rig (docs/rig.md)")
+    group.add_argument("--target", choices=("twin", "daq"), default="twin", help="what to run on (default twin)")
+    group.add_argument("--card", type=Path, metavar="CARD.toml", help="channel table; with the twin: its converters, ramps, limits")
+    group.add_argument("--dry-run", action="store_true", help="with daq: the exact session on the virtual card first")
+    group.add_argument("--real-time", action="store_true", help="the twin at the pace of the clock")
+    group.add_argument("--arm", action="store_true", help="do not ask before the rig is armed: everybody is clear of it")
+    group.add_argument("--without-dry-run", metavar="NAME", help="arm without a dry run; NAME answers for it, and is recorded")
+    group.add_argument("--stop-file", type=Path, metavar="F", help="stop when this file appears; signals and keys stop anyway")
+    group.add_argument(
+        "--live", type=int, nargs="?", const=8765, default=0, metavar="PORT", help="live view for Foxglove (default port 8765)"
+    )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -44,14 +44,34 @@ def run(parsed: Namespace) -> int:
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
     experiment = find(parsed.name)
+    path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
+    if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
+        return _run_supervised(parsed, path)
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)
-    path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     with tqdm(total=len(demands), unit="tick", unit_scale=True, disable=None, desc=experiment.name, leave=False) as bar:
         outcome = record(path, experiment.name, configuration, demands, parsed.seed, bar.update, parsed.effect)
     seconds = outcome.ticks * configuration.timing.period
     print(f"{experiment.name}: {seconds:.3f} s recorded in {outcome.path}; {outcome.reason}")
     return 3 if outcome.tripped else 0
+
+
+def _run_supervised(parsed: Namespace, path: Path) -> int:
+    from rigtwin.session.commands import run as work
+    from rigtwin.session.commands import test_of
+
+    if parsed.target == "daq" and parsed.card is None:
+        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
+    if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
+        raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
+    writable(path)
+    return work(parsed, test_of(parsed, parsed.name), path)
+
+
+def card(parsed: Namespace) -> int:
+    from rigtwin.daq.commands import serve
+
+    return {"serve": serve}[parsed.deed](parsed)
 
 
 def effects(parsed: Namespace) -> int:
@@ -224,6 +244,7 @@ def import_(parsed: Namespace) -> int:
 COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "list": list_experiments,
     "run": run,
+    "card": card,
     "effects": effects,
     "info": info,
     "plot": plot,

@@ -15,9 +15,13 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from controllers.compiled import compilable
+from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
 from rigtwin.configuration import Safety
+from rigtwin.parameters import Plant
 
+MOTOR_LAG = Plant().motor.time_constant
+"""s, of the motor's force behind its voltage."""
 VELOCITY_SPAN = 10
 """Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
 
@@ -37,22 +41,25 @@ class Trip(IntEnum):
     FOLLOWING = 9
     COMMAND = 10
     COMMAND_RATE = 11
+    WHEEL = 12
+    MOTOR = 13
 
 
 class Watch(NamedTuple):
     """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
     were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
-    (VELOCITY_SPAN + 1,). Changed in place."""
+    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place."""
 
     measured: Array
     repeats: Array
     commands: Array
     travel: Array
+    motor: Array
 
 
 def watching() -> Watch:
     """Before the first tick."""
-    return Watch(np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan))
+    return Watch(np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan), np.full(1, math.nan))
 
 
 @compilable
@@ -87,6 +94,11 @@ def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurem
         return Trip.GROUND.value, 0
     if moved > limits.velocity * VELOCITY_SPAN * period:
         return Trip.VELOCITY.value, 2
+    # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
+    if abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt) > limits.wheel:
+        return Trip.WHEEL.value, 2
+    if abs(measured.load_cell - watch.motor[0]) > limits.motor:
+        return Trip.MOTOR.value, 3
     return Trip.NONE.value, 0
 
 
@@ -115,6 +127,9 @@ def commanded_wrong(
         return Trip.FOLLOWING.value, 3
     for column in range(4):
         watch.commands[column] = commands[column]
+    share = 1.0 - math.exp(-period / MOTOR_LAG)
+    force = watch.motor[0] if math.isfinite(watch.motor[0]) else measured.load_cell
+    watch.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
     return Trip.NONE.value, 0
 
 
@@ -156,5 +171,7 @@ def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
         Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
         Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
         Trip.COMMAND: f"trip: {name} is beyond its limit",
+        Trip.WHEEL: f"trip: the three LVDTs put the wheel more than {limits.wheel:g} m off the ground plate: one of them is wrong",
+        Trip.MOTOR: f"trip: load_cell is more than {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
         Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
     }[trip]

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from controllers import Commands, Controller, Demand, Measurements, Mode, State, controller, initial_state, update
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
+from rigtwin.channels import topic_fields
 from rigtwin.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.loop import BLOCK
@@ -26,8 +27,11 @@ from rigtwin.rig import DrivenRig
 from rigtwin.safety import Trip, commanded_wrong, explained, sensed_wrong, watching, within
 from rigtwin.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
 
-LOOKING = 0.1
-"""s for which an armed rig is looked at before it is moved."""
+LOOKING = 0.3
+"""s for which the sensors are looked at before the rig is armed; it also warms up everything that a tick needs."""
+ARMED = 0.1
+"""s of pressure before anything is moved."""
+ROW = len(topic_fields("/session"))
 SETTLING = 0.3
 """s at the start position between the ramp and the test."""
 
@@ -50,8 +54,8 @@ class Recorder(Protocol):
 
     def transition(self, transition: Transition) -> None: ...
 
-    def beat(self) -> None:
-        """Called once a tick: the loop is alive."""
+    def beat(self, ground: float, structure: float) -> None:
+        """Called once a tick: the loop is alive, and holds the cylinders there, m."""
         ...
 
 
@@ -102,11 +106,12 @@ class _Session:
         self._watch = watching()
         self._supervisor = Supervisor(recorder.transition)
         self._target = self._start_of(configuration, demands)
-        self._before = (LOOKING, self._limits.ramp, SETTLING)
+        self._before = (LOOKING, ARMED, self._limits.ramp, SETTLING)
         self._clock = -round(sum(self._before) / self._period)
         self._held, self._pressure = Commands(0.0, 0.0, 0.0, 0.0), False
-        self._rows: list[tuple[float, ...]] = []
-        self._tested: list[tuple[int, Commands, Measurements]] = []
+        self._rows, self._commands, self._measured = np.empty((BLOCK, ROW)), np.empty((BLOCK, 4)), np.empty((BLOCK, 4))
+        self._at = np.empty(BLOCK, np.int64)
+        self._kept = self._tested = 0
         self._done, self._peaks = 0, [0.0] * 5
 
     @staticmethod
@@ -126,18 +131,13 @@ class _Session:
         rig = self._rig
         rig.start()
         try:
-            measured = rig.read()
-            refused = within(self._limits, measured)
-            if refused is not None:
-                raise RigtwinError(f"not armed: {refused}")
-            rest = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
-            rig.write(rest)
+            rest = self._look()
             rig.pressure(True)
         except BaseException as error:
             rig.stop()
             self._supervisor.go(Phase.FAULTED, _cause_of(error), self._time)
             raise
-        self._held, self._pressure = rest, True
+        self._pressure = True
         try:
             cause = self._move(rest)
         except BaseException as error:
@@ -151,14 +151,38 @@ class _Session:
         transitions = tuple(self._supervisor.transitions)
         return Ended(transitions[-1].cause, self._done, transitions, dict(zip(names, self._peaks, strict=True)))
 
+    def _look(self) -> Commands:
+        """Idle: whether every sensor lives and lies within its limit. Returns the commands at which nothing moves. Raises
+        RigtwinError if the rig must not be armed."""
+        measured = self._rig.read()
+        refused = within(self._limits, measured)
+        if refused is not None:
+            raise RigtwinError(f"not armed: {refused}")
+        rest = self._held = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
+        self._updating(self._controller, self._state, measured, Demand(*self._demands[0].tolist()))
+        for _ in range(round(LOOKING / self._period)):
+            self._rig.write(rest)
+            cause = self._faulty(measured)
+            number, column = commanded_wrong(self._limits, self._period, self._watch, measured, rest)
+            if number != Trip.NONE:
+                cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+            if cause is not None and cause.name != "late":
+                raise RigtwinError(f"not armed: {cause.reason}")
+            self._row(measured)
+            self._clock += 1
+            measured = self._rig.read()
+        self._flush()
+        self._row(measured)
+        return rest
+
     def _move(self, rest: Commands) -> Cause:
         """Armed, ramping, running. Returns why it ended."""
-        self._supervisor.go(Phase.ARMED, Cause("operator", "armed: signals within their limits", fault=False), self._time)
-        for _ in range(round(LOOKING / self._period)):
+        self._supervisor.go(Phase.ARMED, Cause("operator", "every sensor lives and is within its limit", fault=False), self._time)
+        for _ in range(round(ARMED / self._period)):
             cause = self._tick(lambda _: rest)
             if cause is not None:
                 return cause
-        self._supervisor.go(Phase.RAMPING, Cause("ramp", "every sensor lives; ramping to the start", fault=False), self._time)
+        self._supervisor.go(Phase.RAMPING, Cause("ramp", "ramping to the start", fault=False), self._time)
         for share in _cosine(self._limits.ramp, self._period):
             between = Commands(*(a + share * (b - a) for a, b in zip(rest, self._target, strict=True)))
             cause = self._tick(lambda _, between=between: between)
@@ -190,6 +214,8 @@ class _Session:
             return self._halt(_cause_of(error), None)
         begun = monotonic()
         self._clock += self._rig.missed
+        if self._lateness is not None:
+            self._lateness.missed += self._rig.missed
         cause = self._faulty(measured)
         if cause is None and running and self._clock >= len(self._demands):
             return COMPLETED
@@ -219,13 +245,11 @@ class _Session:
 
     def _faulty(self, measured: Measurements) -> Cause | None:
         """What is wrong besides the commands."""
-        self._recorder.beat()
+        self._recorder.beat(self._held.ground, self._held.structure)
         number, column = sensed_wrong(self._limits, self._period, self._watch, measured)
         if number != Trip.NONE:
             return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
         missed = self._rig.missed
-        if self._lateness is not None:
-            self._lateness.missed += missed
         if missed > self._limits.missed:
             return Cause("late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be")
         fault = self._recorder.fault
@@ -276,7 +300,7 @@ class _Session:
             self._rig.write(self._held)
         except Exception:
             return False
-        self._recorder.beat()
+        self._recorder.beat(self._held.ground, self._held.structure)
         self._clock += self._rig.missed
         self._row(measured)
         self._clock += 1
@@ -288,29 +312,28 @@ class _Session:
             if abs(value) > self._peaks[place]:
                 self._peaks[place] = abs(value)
         if running:
-            self._tested.append((self._clock, commands, measured))
+            place = self._tested
+            self._at[place], self._commands[place], self._measured[place] = self._clock, commands, measured
+            self._tested += 1
             self._done += 1
 
     def _row(self, measured: Measurements) -> None:
+        if self._kept == BLOCK:
+            self._flush()
         held, rig = self._held, self._rig
         written = (held.ground, held.structure, held.voltage, float(self._pressure))
         late = getattr(rig, "late", 0.0)
-        self._rows.append((self._time, float(self._supervisor.phase), *written, *measured, late, float(rig.missed)))
-        if len(self._rows) >= BLOCK:
-            self._flush()
+        self._rows[self._kept] = (self._time, float(self._supervisor.phase), *written, *measured, late, float(rig.missed))
+        self._kept += 1
 
     def _flush(self) -> None:
-        rows, tested = self._rows, self._tested
-        self._rows, self._tested = [], []
+        kept, tested = self._kept, self._tested
+        self._kept = self._tested = 0
         if tested:
-            self._recorder.ticks(
-                np.array([at for at, _, _ in tested]),
-                np.array([commands for _, commands, _ in tested]),
-                np.array([measured for _, _, measured in tested]),
-            )
-            self._progress(len(tested))
-        if rows:
-            self._recorder.session(np.array(rows))
+            self._recorder.ticks(self._at[:tested].copy(), self._commands[:tested].copy(), self._measured[:tested].copy())
+        if kept:
+            self._recorder.session(self._rows[:kept].copy())
+            self._progress(tested)
 
 
 def _cosine(duration: float, period: float) -> Iterator[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,9 @@ def translated(doing: str) -> Iterator[None]:
     except Error as error:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         raise CardFault(f"{doing}: {' '.join(lines[:4])}") from None
+    except (AssertionError, ValueError, TypeError) as error:
+        # The client's own checks of what a card has answered.
+        raise CardFault(f"{doing}: it answered what the driver's client does not take: {error or type(error).__name__}") from None
 
 
 def connected(address: str) -> grpc.Channel | None:
@@ -67,17 +70,26 @@ class Card:
     missed: ticks whose samples came too late to be answered. late: s by which the last sample was read after it was due.
     """
 
-    def __init__(self, table: ChannelTable, period: float, channel: grpc.Channel | None, paced: bool = True) -> None:
-        """period in s; channel: to a gRPC device server; paced: whether a card without a clock of its own is to be read in real
-        time, False for a virtual one whose time stands still between reads."""
+    def __init__(
+        self,
+        table: ChannelTable,
+        period: float,
+        channel: grpc.Channel | None,
+        clock: Callable[[], float] = monotonic,
+        pacer: Pacer | None = None,
+    ) -> None:
+        """period in s; channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer: waits for the ticks of
+        a card that has no clock of its own."""
         self._table, self._period, self._channel = table, period, channel
         self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
         self._volts, self._values = np.zeros(4), np.empty(4)
-        self._asked, self._commands = np.zeros(3), np.empty(3)
-        self._pacer = Pacer(period) if paced and table.timing == "software" else None
-        self._clocked = paced and table.timing == "hardware"
-        self._due, self.missed, self.late = 0.0, 0, 0.0
+        self._asked, self._commands = np.zeros(3), np.zeros(3)
+        self._pacer, self._clock = pacer, clock
+        self._start, self._count, self.missed, self.late = -1.0, 0, 0, 0.0
         self._tasks: list[Any] = []
+        to_values(self._inputs, self._volts, self._values)  # compiled before anybody waits for it
+        to_volts(self._outputs, self._commands, self._asked)
+        self._asked[:] = 0.0
 
     def inspect(self) -> None:
         """Looks whether the card is there and has what the table asks of it. Raises CardFault; moves nothing."""
@@ -140,7 +152,7 @@ class Card:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
         try:
             self._reader.read_one_sample(self._volts, TIMEOUT)
-            if self._clocked:
+            if self._pacer is None:
                 self._drop_what_is_old()
         except Exception as error:
             with translated(f"card {self._table.device} gives no sample"):
@@ -150,18 +162,21 @@ class Card:
 
     def _drop_what_is_old(self) -> None:
         """A loop that was late finds samples waiting: only the last is worth an answer."""
-        now = monotonic()
-        if self._due == 0.0:
-            self._due = now
-        self.late = now - self._due
+        now = self._clock()
+        if self._start < 0.0:
+            self._start = now
+        self.late = now - (self._start + self._count * self._period)
         if self.late > 0.5 * self._period:
-            for _ in range(self._stream.avail_samp_per_chan):
-                self._reader.read_one_sample(self._volts, TIMEOUT)
-                self.missed += 1
-                self._due += self._period
+            self.missed = self._stream.avail_samp_per_chan
+            if self.missed:
+                waiting = np.empty((4, self.missed))
+                self._reader.read_many_sample(waiting, self.missed, TIMEOUT)
+                self._volts[:] = waiting[:, -1]
+            self._count += self.missed
         elif self.late < 0.0:
-            self._due = now
-        self._due += self._period
+            # The card's clock is ahead of the computer's, or the first tick was late: its ticks are the measure.
+            self._start, self.late = now - self._count * self._period, 0.0
+        self._count += 1
 
     def write(self, commands: Commands) -> None:
         self._commands[:] = commands.ground, commands.structure, commands.voltage
@@ -194,11 +209,34 @@ class Card:
     def _options(self, name: str) -> Any:
         if self._channel is None:
             return None
-        from nidaqmx.grpc_session_options import GrpcSessionOptions
+        from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
-        return GrpcSessionOptions(self._channel, name)
+        new = SessionInitializationBehavior.INITIALIZE_SERVER_SESSION
+        return GrpcSessionOptions(self._channel, name, initialization_behavior=new)
 
     def _task(self, kind: Any, name: str) -> Any:
-        task = kind(name, grpc_options=self._options(name)) if self._channel is not None else kind(name)
+        try:
+            task = kind(name, grpc_options=self._options(name)) if self._channel is not None else kind(name)
+        except Exception as error:
+            with translated(f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"):
+                raise error
         self._tasks.append(task)
         return task
+
+
+def release(table: ChannelTable, channel: grpc.Channel) -> int:
+    """Ends the tasks that a program which died has left on a gRPC device server, after taking the pressure off; returns how many there were. Raises CardFault."""
+    from nidaqmx import Task
+    from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
+    from nidaqmx.stream_writers import DigitalSingleChannelWriter
+
+    attach, ended = SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION, 0
+    for name in (PRESSURE, OUTPUTS, INPUTS):
+        with suppress(CardFault), translated(f"card {table.device}"):
+            task = Task(name, grpc_options=GrpcSessionOptions(channel, name, initialization_behavior=attach))
+            if name == PRESSURE:
+                DigitalSingleChannelWriter(task.out_stream).write_one_sample_one_line(False)
+            task.stop()
+            task.close()
+            ended += 1
+    return ended

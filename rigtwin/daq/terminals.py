@@ -13,6 +13,7 @@ from rigtwin.daq.conversion import Conversion, conversion, digitised, to_values,
 from rigtwin.daq.table import ChannelTable
 from rigtwin.parameters import Plant
 from rigtwin.plant import Machine, advance, sense
+from rigtwin.realtime import Pacer
 from rigtwin.twin import Twin
 
 AHEAD = 256
@@ -134,3 +135,28 @@ class WiredTwin:
         self._commands[:] = 0.0, 0.0, 0.0
         to_volts(self._outputs, self._commands, self._commands)
         self._held[2], self._pressure = self._commands[2], False
+
+
+class InRealTime:
+    """A twin that is read in real time: a `DrivenRig` around another."""
+
+    def __init__(self, rig: WiredTwin, period: float) -> None:
+        self._rig, self._pacer, self.missed, self.late = rig, Pacer(period), 0, 0.0
+
+    def start(self) -> None:
+        self._rig.start()
+
+    def read(self) -> Measurements:
+        self.missed, self.late = self._pacer.wait(), self._pacer.late
+        for _ in range(self.missed):
+            self._rig.read()
+        return self._rig.read()
+
+    def write(self, commands: Commands) -> None:
+        self._rig.write(commands)
+
+    def pressure(self, on: bool) -> None:
+        self._rig.pressure(on)
+
+    def stop(self) -> None:
+        self._rig.stop()

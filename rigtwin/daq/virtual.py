@@ -26,6 +26,8 @@ INPUT_RANGES = (0.2, 1.0, 5.0, 10.0)
 """V, both ways; the outputs have 10 V only (NI 6229 specifications)."""
 BUFFERED = 1000
 """Samples that a clocked acquisition keeps for a client that is late."""
+_INITIALIZE, _ATTACH = 1, 2
+"""Session initialization behaviours of NI's session service."""
 _SUPPORTED = 10_000.0
 """Hz, the fastest sample clock that the twin is worth."""
 
@@ -156,7 +158,7 @@ class VirtualCard:
         """Outside the lock: others may write while a reader waits for its sample."""
         task = self._tasks.get(request.task.name)
         if task is not None and task.running and task.clocked and self._begun:
-            self._time.wait(task.next)
+            self._time.wait(task.next + max(request.num_samps_per_chan, 1) - 1)
 
     # The calls, by their names in the gRPC service.
 
@@ -202,6 +204,10 @@ class VirtualCard:
     def _CreateTask(self, request: Any, response: type) -> Any:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"
         new = name not in self._tasks
+        if new and request.initialization_behavior == _ATTACH:
+            raise DriverError(NO_TASK, f"No session of the name {name} to attach to.")
+        if not new and request.initialization_behavior == _INITIALIZE:
+            raise DriverError(RESERVED, f"A session of the name {name} exists already.")
         if new:
             self._tasks[name] = _Task(name)
         made = response(new_session_initialized=new)
@@ -270,20 +276,22 @@ class VirtualCard:
         task = self._task(request)
         if not task.running:
             task.running, task.next = True, self.tick
+        count = max(request.num_samps_per_chan, 1)
         if task.clocked:
-            if task.next > self.tick:
-                self.run_until(task.next)
+            if task.next + count - 1 > self.tick:
+                self.run_until(task.next + count - 1)
             behind = self.tick - task.next
             if behind >= len(self._samples):
                 raise DriverError(OVERWRITTEN, "Attempted to read samples that are no longer available.")
-            task.next += 1
+            task.next += count
         else:
             if task.next > 0:
                 self.run_until(self._time.passed(self.tick))
-            task.next, behind = 1, 0
-        sample = self._samples[-1 - behind]
-        values = [sample[self._inputs.index(line)] if line in self._inputs else 0.0 for line in task.lines]
-        return response(read_array=values, samps_per_chan_read=1)
+            task.next, behind, count = 1, 0, 1
+        samples = [self._samples[-1 - behind + number] for number in range(count)]
+        places = [self._inputs.index(line) if line in self._inputs else -1 for line in task.lines]
+        values = [sample[place] if place >= 0 else 0.0 for place in places for sample in samples]
+        return response(read_array=values, samps_per_chan_read=count)
 
     def _WriteAnalogF64(self, request: Any, response: type) -> Any:
         task = self._task(request)

@@ -82,7 +82,7 @@ def load(path: Path) -> Recording:
     channels: dict[int, Channel] = {}
     raw: dict[int, tuple[list[int], list[bytes]]] = {}
     notes: list[str] = []
-    transitions: list[Mapping[str, str]] = []
+    states: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
             if not file.read(1):
@@ -97,7 +97,7 @@ def load(path: Path) -> Recording:
                     elif isinstance(record, Metadata):
                         metadata[record.name] = record.metadata
                         if record.name == TRANSITION_RECORD:
-                            transitions.append(record.metadata)
+                            states.append(record.metadata)
                     elif isinstance(record, Schema):
                         schemas[record.id] = record
                     elif isinstance(record, Channel):
@@ -128,7 +128,8 @@ def load(path: Path) -> Recording:
         values = _decoded(path, channel, schemas.get(channel.schema_id), data, machine == SUSPENSION_RIG)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
-        raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}")
+        said = f"; it ended: {metadata[END_RECORD].get('reason', '')}" if END_RECORD in metadata else ""
+        raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}{said}")
     time, columns = _aligned(tables, notes)
     if not len(time):
         raise RigtwinError(f"{path}: {' and '.join(tables)} have no tick in common; expected the same times on each")
@@ -146,9 +147,29 @@ def load(path: Path) -> Recording:
         twin=metadata.get(TWIN_RECORD, {}),
         end=metadata.get(END_RECORD, {}).get("reason", ""),
         notes=tuple(notes),
-        transitions=tuple(transitions),
+        transitions=_in_order(states),
         lateness=metadata.get(LATENESS_RECORD, {}),
     )
+
+
+def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
+    """Those of a supervised session, in order, even of a recording that ended before its test began. Raises RigtwinError."""
+    found: list[Mapping[str, str]] = []
+    try:
+        with path.open("rb") as file:
+            for record in StreamReader(file, validate_crcs=True).records:
+                if isinstance(record, Metadata) and record.name == TRANSITION_RECORD:
+                    found.append(record.metadata)
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    except _DAMAGE:
+        pass
+    return _in_order(found)
+
+
+def _in_order(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
+    """On a full disk the last ones stand where room had been kept for them, near the beginning of the file."""
+    return tuple(sorted(transitions, key=lambda transition: float(transition.get("time", "0"))))
 
 
 def _period(path: Path, about: Mapping[str, str]) -> float:

@@ -60,3 +60,10 @@ def tags(count: int) -> NDArray[np.uint8]:
 def known_topics() -> tuple[str, ...]:
     """Topics of the channel table, in order."""
     return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))
+
+
+def encoded(values: NDArray[np.float64]) -> bytes:
+    """One message of a topic, of its fields' values."""
+    message = np.empty(len(values), FIELD)
+    message["tag"], message["value"] = tags(len(values)), values
+    return message.tobytes()

@@ -6,9 +6,12 @@ messages are laid out at once by numpy; every record around them is the mcap pac
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO
@@ -47,6 +50,8 @@ _MESSAGE = [
     ("log_time", "<u8"),
     ("publish_time", "<u8"),
 ]
+_RESERVE, _RESERVED = "rigtwin.reserve", 4096
+"""Name of the metadata record that keeps room, and its size in bytes."""
 _PREFIX = 9
 """Bytes of a record's opcode and length."""
 
@@ -82,6 +87,8 @@ class Writer:
         self._path = path
         self._ticks = self._next = 0
         self._counts: dict[str, int] = {}
+        self._full = False
+        self._room: tuple[int, int] | None = None
         self._nanoseconds = period * 1e9
         self._offset = 0
         self._topics: dict[str, int] = {}
@@ -109,9 +116,18 @@ class Writer:
             {"seed": str(seed), "parameters": json.dumps(parameters), "effects": json.dumps(effects), "version": version},
         )
 
+    def reserve(self) -> None:
+        """Keeps room in the file for what has to be said when the disk is full: metadata that still fits is put there."""
+        place = self._offset
+        self.add_metadata(_RESERVE, {"": " " * _RESERVED})
+        self._room = (place, self._offset)
+
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record now."""
         record = _encoded(Metadata(name=name, metadata=dict(values)))
+        if self._full:
+            self._put_into_room(record)
+            return
         self._metadata.append(MetadataIndex(offset=self._offset, length=len(record), name=name))
         self._put(record)
 
@@ -159,6 +175,10 @@ class Writer:
     def finish(self, reason: str) -> None:
         """Says why the test ended, writes the index, closes the file. Does nothing the second time."""
         if self._file.closed:
+            return
+        if self._full:
+            self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
+            self._file.close()
             return
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
         self._put(_encoded(DataEnd(data_section_crc=0)))
@@ -246,13 +266,34 @@ class Writer:
     def _put(self, data: bytes) -> None:
         try:
             written = self._file.write(data)
+            if written != len(data):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
-            self._file.close()
+            self._give_up()
             raise RigtwinError(f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks") from None
-        if written != len(data):
-            self._file.close()
-            raise RigtwinError(f"cannot write {self._path}: no space left")
         self._offset += len(data)
+
+    def _give_up(self) -> None:
+        """Nothing more can be added; what is whole stays."""
+        if self._room is None:
+            self._file.close()
+            return
+        self._full = True
+        with suppress(OSError):
+            self._file.truncate(self._offset)
+
+    def _put_into_room(self, record: bytes) -> None:
+        """Writes over the room kept, which needs no space, and over the rest of it a smaller one."""
+        assert self._room is not None
+        place, end = self._room
+        rest = end - place - len(record) - len(_encoded(Metadata(name=_RESERVE, metadata={"": ""})))
+        if rest < 0:
+            return
+        filling = _encoded(Metadata(name=_RESERVE, metadata={"": " " * rest}))
+        with suppress(OSError):
+            self._file.seek(place)
+            self._file.write(record + filling)
+        self._room = (place + len(record), end)
 
     def __enter__(self) -> Writer:
         return self

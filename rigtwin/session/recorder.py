@@ -33,14 +33,14 @@ class Keeper:
             self._try(lambda: self._writer.append_beside(SESSION, rows, rows[:, 0]))
 
     def transition(self, transition: Transition) -> None:
-        if self.fault is None:
-            self._try(lambda: self._writer.add_metadata(TRANSITION_RECORD, transition.record()))
+        """Also when nothing else can be written any more: the writer has kept room for it."""
+        self._try(lambda: self._writer.add_metadata(TRANSITION_RECORD, transition.record()))
 
-    def beat(self) -> None:
+    def beat(self, ground: float, structure: float) -> None:
         """Nobody watches this process."""
 
     def _try(self, write: Callable[[], None]) -> None:
         try:
             write()
         except RigtwinError as error:
-            self.fault = str(error)
+            self.fault = self.fault or str(error)

@@ -1,0 +1,84 @@
+"""Makes a card's outputs safe when the process that owned them is dead or hangs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from rigtwin.daq.card import INPUTS, OUTPUTS, PRESSURE, connected, translated
+from rigtwin.daq.conversion import conversion, to_volts
+from rigtwin.daq.table import ChannelTable
+
+
+class LastResort:
+    """On a gRPC device server the owner's outputs are found by their name, which can be done beforehand. A driver on this
+    computer gives them back when it sees that their owner is dead; then they are taken anew."""
+
+    def __init__(self, table: ChannelTable) -> None:
+        self._table, self._conversion = table, conversion(table.outputs)
+        self._outputs: Any = None
+        self._pressure: Any = None
+        self._tasks: list[Any] = []
+
+    def prepare(self) -> None:
+        """Called once the owner has its outputs. Raises CardFault."""
+        with translated(f"card {self._table.device}: watching it"):
+            if self._table.address:
+                self._attach()
+            else:
+                import nidaqmx.stream_writers  # noqa: F401 - loading it later would cost the time that counts
+
+    def force_off(self, positions: Sequence[float]) -> None:
+        """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
+        values, volts = np.array([*positions, 0.0]), np.empty(3)
+        to_volts(self._conversion, values, volts)
+        with translated(f"card {self._table.device}: stopping it"):
+            if self._outputs is None:
+                self._take()
+            self._outputs.write_one_sample(volts)
+
+    def pressure_off(self) -> None:
+        """Raises CardFault."""
+        with translated(f"card {self._table.device}: taking its pressure off"):
+            self._pressure.write_one_sample_one_line(False)
+
+    def close(self) -> None:
+        """Gives the lines back."""
+        for task in self._tasks:
+            with suppress(Exception):
+                task.stop()
+            with suppress(Exception):
+                task.close()
+
+    def _attach(self) -> None:
+        from nidaqmx import Task
+        from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
+
+        channel, attach = connected(self._table.address), SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
+        assert channel is not None
+        for name in (OUTPUTS, PRESSURE, INPUTS):
+            options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
+            self._tasks.append(Task(name, grpc_options=options))
+        self._writers(started=True)
+
+    def _take(self) -> None:
+        from nidaqmx import Task
+
+        outputs, pressure = Task(f"{OUTPUTS}-again"), Task(f"{PRESSURE}-again")
+        self._tasks = [outputs, pressure]
+        for line in self._table.outputs:
+            volts = line.scaling.range
+            outputs.ao_channels.add_ao_voltage_chan(self._table.physical(line.line), min_val=-volts, max_val=volts)
+        pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
+        self._writers(started=False)
+
+    def _writers(self, started: bool) -> None:
+        from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
+
+        self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)
+        self._pressure = DigitalSingleChannelWriter(self._tasks[1].out_stream)
+        self._outputs.verify_array_shape = self._pressure.verify_array_shape = False
+        self._outputs.auto_start = self._pressure.auto_start = not started

@@ -1,0 +1,271 @@
+"""A second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the rig and says so in
+the recording."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import select
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rigtwin.arrays import Array
+from rigtwin.daq.table import ChannelTable
+from rigtwin.errors import RigtwinError
+from rigtwin.realtime import PRIORITY, monotonic
+from rigtwin.session.recorder import Keeper
+from rigtwin.supervisor import Cause, Phase, Transition
+
+LOOK = 2.5e-4
+"""s between two looks at the loop."""
+STARTED = 30.0
+"""s within which the guardian must be there."""
+_BEAT, _GROUND, _STRUCTURE, _WATCHED = range(4)
+"""Numbers in the shared memory: time of the last tick, positions held, and whether there is anything to watch."""
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What the guardian has to know. recording: arguments of rigtwin.recording.Writer; metadata: records added at once;
+    table: of the card, None for a rig that needs no stopping; patience: s without a tick before it acts; hold: s before it
+    takes the pressure off; live: port of a live view on this computer, 0 for none."""
+
+    recording: dict[str, Any]
+    metadata: dict[str, dict[str, str]]
+    table: ChannelTable | None
+    patience: float
+    hold: float
+    live: int = 0
+    phases: tuple[Phase, ...] = field(default=(Phase.ARMED, Phase.RAMPING, Phase.RUNNING, Phase.STOPPING))
+
+
+class Guardian:
+    """The loop's side: a `rigtwin.supervised.Recorder` whose work another process does."""
+
+    def __init__(self, watched: Watched) -> None:
+        """Raises RigtwinError if the recording cannot be written or the other process does not come."""
+        self._watched = watched
+        self.fault: str | None = None
+        context = multiprocessing.get_context("spawn")
+        memory = context.RawArray("d", 4)
+        self._shared = np.frombuffer(memory)
+        self._pipe, theirs = context.Pipe()
+        arguments = (watched, theirs, memory, os.getpid())
+        self._process = context.Process(target=_guard, args=arguments, name="rigtwin guardian")
+        try:
+            self._process.start()
+            theirs.close()
+            if not self._pipe.poll(STARTED):
+                raise RigtwinError("the guardian process does not start")
+            said = self._answer()
+            if said != "ready":
+                raise RigtwinError(str(said))
+        except BaseException:
+            self._release()
+            raise
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def beat(self, ground: float, structure: float) -> None:
+        shared = self._shared
+        shared[_GROUND], shared[_STRUCTURE], shared[_BEAT] = ground, structure, time.monotonic()
+
+    def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
+        self._send("ticks", at, commands, measured)
+
+    def session(self, rows: Array) -> None:
+        self._send("session", rows)
+
+    def transition(self, transition: Transition) -> None:
+        if transition.after in self._watched.phases and self._shared[_WATCHED] == 0.0:
+            self._shared[_BEAT] = time.monotonic()
+            self._send("prepare")
+            self._shared[_WATCHED] = 1.0
+        self._send("transition", transition)
+        if transition.after not in self._watched.phases:
+            self._shared[_WATCHED] = 0.0
+
+    def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        self._send("metadata", name, values)
+
+    def finish(self, reason: str) -> None:
+        """Ends the recording and the other process."""
+        self._shared[_WATCHED] = 0.0
+        self._send("finish", reason)
+        self._process.join(STARTED)
+        self._release()
+
+    def _send(self, *message: Any) -> None:
+        try:
+            self._pipe.send(message)
+        except (OSError, ValueError):
+            self.fault = self.fault or "the guardian process is gone, and the recording with it"
+
+    def _answer(self) -> Any:
+        try:
+            return self._pipe.recv()
+        except (EOFError, OSError):
+            return None
+
+    def _listen(self) -> None:
+        while (said := self._answer()) is not None:
+            self.fault = str(said)
+        if self.fault is None and self._process.exitcode not in (None, 0):
+            self.fault = "the guardian process is gone, and the recording with it"
+
+    def _release(self) -> None:
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
+    """The other process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the operator's Ctrl-C is the loop's to answer
+    shared = np.frombuffer(memory)
+    from rigtwin.recording import Writer
+
+    try:
+        writer = Writer(**watched.recording)
+        writer.reserve()
+        for name, values in watched.metadata.items():
+            writer.add_metadata(name, values)
+        view = _live(watched)
+    except RigtwinError as error:
+        pipe.send(str(error))
+        return
+    keeping = _Keeping(writer, pipe, watched, view)
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+    pipe.send("ready")
+    thread = threading.Thread(target=keeping.work, daemon=True)
+    thread.start()
+    died = _died_or_hung(owner, shared, watched, keeping)
+    if died is not None:
+        keeping.stop_rig(died, shared)
+    thread.join(1.0)
+    keeping.finish(died)
+
+
+def _live(watched: Watched) -> Callable[[str, Array], None] | None:
+    if watched.live == 0:
+        return None
+    from rigtwin.session.live import live_view
+
+    return live_view(watched.live)
+
+
+def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping) -> Cause | None:
+    """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
+    handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
+    try:
+        while not keeping.done.is_set():
+            if handle is not None:
+                dead = bool(select.select([handle], [], [], LOOK)[0])
+            else:
+                time.sleep(LOOK)
+                dead = os.getppid() != owner
+            if dead:
+                return Cause("process", "the controller process died") if shared[_WATCHED] else None
+            if shared[_WATCHED] and monotonic() - shared[_BEAT] > watched.patience:
+                os.kill(owner, signal.SIGKILL)
+                waited = f"{1e3 * watched.patience:.3g} ms"
+                return Cause("process", f"the controller process hung: no tick for {waited}; it was killed")
+        return None
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+class _Keeping:
+    """Writes what the loop sends, on a thread of its own."""
+
+    def __init__(self, writer: Any, pipe: Connection, watched: Watched, view: Callable[[str, Array], None] | None) -> None:
+        self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
+        self._last: Transition | None = None
+        self._reason: str | None = None
+        self._resort: Any = None
+        self._cause = Cause("process", "")
+        self._time = 0.0
+        self.done = threading.Event()
+
+    def work(self) -> None:
+        try:
+            while self._reason is None:
+                kind, *content = self._pipe.recv()
+                getattr(self, f"_{kind}")(*content)
+                if self._keeper.fault is not None:
+                    self._pipe.send(self._keeper.fault)
+                    self._keeper.fault = None
+                    self._reason = "recording failed"
+        except (EOFError, OSError):
+            pass
+        if self._reason is not None:
+            self.done.set()
+
+    def _prepare(self) -> None:
+        if self._watched.table is None:
+            return
+        from rigtwin.daq.last_resort import LastResort
+
+        resort = LastResort(self._watched.table)
+        try:
+            resort.prepare()
+        except RigtwinError as error:
+            self._pipe.send(str(error))
+        self._resort = resort
+
+    def _ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
+        self._keeper.ticks(at, commands, measured)
+
+    def _session(self, rows: Array) -> None:
+        self._keeper.session(rows)
+        self._time = float(rows[-1, 0])
+        if self._view is not None:
+            self._view("/session", rows)
+
+    def _transition(self, transition: Transition) -> None:
+        self._last = transition
+        self._keeper.transition(transition)
+
+    def _metadata(self, name: str, values: dict[str, str]) -> None:
+        with suppress(RigtwinError):
+            self._writer.add_metadata(name, values)
+
+    def _finish(self, reason: str) -> None:
+        self._reason = reason
+
+    def stop_rig(self, cause: Cause, shared: Array) -> None:
+        """Force off now, pressure off after the hold."""
+        said = cause.reason
+        if self._resort is not None:
+            try:
+                self._resort.force_off((shared[_GROUND], shared[_STRUCTURE]))
+                time.sleep(self._watched.hold)
+                self._resort.pressure_off()
+            except RigtwinError as error:
+                said = f"{said}; and {error}: stop the rig by hand"
+            self._resort.close()
+        self._cause = Cause(cause.name, said)
+
+    def finish(self, died: Cause | None) -> None:
+        """Closes the recording with what it has to say."""
+        if died is None:
+            self._writer.finish(self._reason or "the loop ended without a word")
+            return
+        before = self._last.after if self._last is not None else Phase.IDLE
+        cause = self._cause
+        if before != Phase.STOPPING:
+            self._keeper.transition(Transition(self._time, before, Phase.STOPPING, cause))
+        self._keeper.transition(Transition(self._time, Phase.STOPPING, Phase.FAULTED, cause))
+        with suppress(RigtwinError):
+            self._writer.finish(cause.reason)
+

@@ -1,0 +1,155 @@
+"""Records a supervised session: on the card, on its virtual copy, or on the twin behind the card's converters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from controllers import update
+from rigtwin import __version__
+from rigtwin.arrays import Array
+from rigtwin.configuration import Configuration, flattened
+from rigtwin.daq.card import Card, connected
+from rigtwin.daq.table import ChannelTable, fit, written
+from rigtwin.daq.terminals import Terminals, WiredTwin
+from rigtwin.daq.virtual import OnDemand, VirtualCard, Wired
+from rigtwin.effects import applied
+from rigtwin.realtime import Lateness, Pacer, described, in_real_time
+from rigtwin.recording import Writer
+from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
+from rigtwin.rig import DrivenRig
+from rigtwin.session.guardian import Guardian, Watched
+from rigtwin.session.recorder import Keeper
+from rigtwin.supervised import Ended, Update, supervise
+
+
+@dataclass(frozen=True)
+class Test:
+    """What is to be done. demands: shape (ticks, 3); effects: of the twin, as `--effect` takes them; none on a real rig."""
+
+    __test__ = False  # not one of pytest's
+
+    experiment: str
+    configuration: Configuration
+    demands: Array
+    seed: int
+    table: ChannelTable
+    effects: Sequence[str] = ()
+
+    @property
+    def limited(self) -> Configuration:
+        """With the limits that the card's table adds. Raises RigtwinError where a limit does not fit the card's lines."""
+        fit(self.table, self.configuration.safety)
+        return self.configuration._replace(safety=self.table.of(self.configuration.safety))
+
+    def terminals(self) -> Terminals:
+        """The twin at the card's terminals, wired as the table says."""
+        return Terminals(applied(self.configuration, list(self.effects)), self.table, self.seed)
+
+
+def wired(table: ChannelTable, terminals: Wired, **more: Any) -> VirtualCard:
+    """A virtual card whose time passes as it is read, with a rig at the lines of a table. more: of VirtualCard."""
+    return VirtualCard(
+        terminals, [line.line for line in table.inputs], [line.line for line in table.outputs], table.pressure, **more
+    )
+
+
+def on_virtual_card(test: Test, terminals: Wired | None = None, **more: Any) -> tuple[Card, VirtualCard]:
+    """The card backend on a virtual card in this process: the unmodified nidaqmx client, volts both ways."""
+    from rigtwin.daq.transport import InProcess
+
+    period = test.configuration.timing.period
+    virtual = wired(test.table, terminals or test.terminals(), time=OnDemand(), device=test.table.device, **more)
+    card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    card.inspect()
+    return card, virtual
+
+
+def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
+    """What a recording says beyond the test: the channel table, and how a twin made it."""
+    import json
+
+    told = {CARD_RECORD: {"table": written(test.table)}}
+    if virtual:
+        told[TWIN_RECORD] = {
+            "seed": str(test.seed),
+            "parameters": json.dumps(flattened(test.configuration)),
+            "effects": json.dumps(tuple(test.effects)),
+            "version": __version__,
+        }
+    return told
+
+
+def _writing(path: Path, test: Test) -> dict[str, Any]:
+    return {
+        "path": path,
+        "experiment": test.experiment,
+        "period": test.configuration.timing.period,
+        "controller": flattened(test.configuration)["controller"],
+    }
+
+
+def record_at_leisure(
+    rig: DrivenRig,
+    test: Test,
+    path: Path,
+    stop: Callable[[], str | None] = lambda: None,
+    progress: Callable[[int], object] = lambda _: None,
+    updating: Update = update,
+) -> Ended:
+    """On a twin whose time waits for the loop, as fast as it goes. Raises RigtwinError before anything is recorded."""
+    limited = test.limited
+    with Writer(**_writing(path, test)) as writer:
+        writer.reserve()
+        for name, values in metadata(test, virtual=True).items():
+            writer.add_metadata(name, values)
+        ended = supervise(rig, limited, test.demands, Keeper(writer), stop, updating=updating, progress=progress)
+        writer.finish(ended.cause.reason)
+    return ended
+
+
+def record_in_real_time(
+    rig: DrivenRig,
+    test: Test,
+    path: Path,
+    stop: Callable[[], str | None],
+    guarded: bool,
+    notes: Sequence[tuple[str, dict[str, str]]] = (),
+    live: int = 0,
+    progress: Callable[[int], object] = lambda _: None,
+    fifo: bool = True,
+) -> Ended:
+    """In real time, with a guardian process. guarded: whether the rig is a card that the guardian has to stop if this process
+    dies; notes: more metadata records. Raises RigtwinError before anything moves."""
+    limited = test.limited
+    safety, period = limited.safety, limited.timing.period
+    told = metadata(test, virtual=not guarded) | dict(notes)
+    # A tick missed more than may be is seen by the loop at the next; the guardian acts if that next never comes.
+    patience = (safety.missed + 1.0) * period
+    watched = Watched(_writing(path, test), told, test.table if guarded else None, patience, safety.hold, live)
+    whole = len(test.demands) + round(2.0 * (safety.ramp + safety.hold + 1.0) / period)
+    lateness = Lateness(whole)
+    guardian = Guardian(watched)
+    with ExitStack() as stack:
+        grants = stack.enter_context(in_real_time(fifo))
+        try:
+            ended = supervise(rig, limited, test.demands, guardian, stop, lateness, progress=progress)
+        except BaseException as error:
+            guardian.finish(f"not run: {' '.join(str(error).split())}")
+            raise
+    guardian.add_metadata(LATENESS_RECORD, lateness.record(described(grants)))
+    guardian.finish(ended.cause.reason)
+    return ended
+
+
+def on_card(test: Test) -> Card:
+    """The card itself, inspected. Raises CardFault; moves nothing."""
+    period = test.configuration.timing.period
+    channel = connected(test.table.address)
+    pacer = Pacer(period) if test.table.timing == "software" else None
+    card = Card(test.table, period, channel, pacer=pacer)
+    card.inspect()
+    return card
