@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
 from rigtwin.stability.commands import arguments as stability_arguments
 
+CARD = Path(__file__).parents[1] / "machines" / "cards" / "pci-6229.toml"
+"""The packaged channel table."""
 OVERVIEW = """\
 The digital twin of a hybrid suspension rig, and the tool that says why the twin and the rig disagree.
 
@@ -23,6 +25,7 @@ a first session:
   rigtwin compare rig.mcap                      where a recording of the rig and the twin disagree
   rigtwin diagnose rig.mcap --html why.html     why
 
+on the real rig: docs/rig.md
 your own machine: docs/tutorial.md
 """
 
@@ -70,14 +73,9 @@ def _parser() -> argparse.ArgumentParser:
     settings(run)
     _supervised(run)
 
-    card = command("card", "a virtual card on a port, or the check of a channel table", "docs/rig.md")
-    deeds = card.add_subparsers(dest="deed", metavar="deed", required=True)
-    serving = deeds.add_parser("serve", help="let the twin be the card of any NI-DAQmx gRPC client on this computer")
-    serving.add_argument("card", type=Path, metavar="CARD.toml", help="channel table: how the twin is wired to the card")
-    serving.add_argument("--port", type=int, default=31763, help="default 31763; 0 takes a free one")
-    serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
-    _effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
-    settings(serving)
+    _card(command("card", "a virtual card on a port, or the check of a channel table", "docs/rig.md"), settings)
+    _session(command("session", "run a list of tests on the rig, one recording each", SESSION), settings)
+    _faults(command("faults", "put faults into sessions on the virtual card; see that each is stopped", "docs/faults.md"))
 
     effects = command(
         "effects",
@@ -229,10 +227,64 @@ def _stretch(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", type=float, metavar="S", help="stop at this time (default: the end)")
 
 
+SESSION = """\
+The list is a TOML file: [[test]] tables with experiment, and if wanted seed, pause (s before it), name, set (a table of settings).
+After each test its recording is compared with the twin. After a fault the session ends; --resume goes on with what is missing."""
+
+
+def _card(parser: argparse.ArgumentParser, settings: Callable[[argparse.ArgumentParser], None]) -> None:
+    deeds = parser.add_subparsers(dest="deed", metavar="deed", required=True)
+    serving = deeds.add_parser("serve", help="let the twin be the card of any NI-DAQmx gRPC client on this computer")
+    serving.add_argument("card", type=Path, metavar="CARD.toml", help="channel table: how the twin is wired to the card")
+    serving.add_argument("--port", type=int, default=31763, help="default 31763; 0 takes a free one")
+    serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
+    _effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
+    settings(serving)
+    checking = deeds.add_parser("check", help="find zero, span and signs; write the channel table with date and name")
+    checking.add_argument("card", type=Path, metavar="CARD.toml", help="the channel table to begin with")
+    checking.add_argument("--out", "-o", type=Path, required=True, metavar="NEW.toml", help="where to write what was found")
+    checking.add_argument("--operator", required=True, metavar="NAME", help="who does it")
+    checking.add_argument("--note", default="", help="kept in the table")
+    checking.add_argument(
+        "--signs", action="store_true", help="move each output a little and see which signal follows, and how"
+    )
+    checking.add_argument("--zero", action="store_true", help="as it stands now, every input reads its reference")
+    checking.add_argument("--reference", action="append", default=[], metavar="NAME=VALUE", help="other than zero, with --zero")
+    checking.add_argument("--span", action="append", default=[], metavar="NAME=VALUE", help="as it stands now, it reads this")
+    checking.add_argument(
+        "--stroke", type=float, default=0.005, metavar="M", help="of the plates, with --signs (default 0.005)"
+    )
+    checking.add_argument("--moved", action="append", default=[], metavar="OUTPUT=+|-", help="which way it went, if not asked")
+    checking.add_argument("--arm", action="store_true", help="do not ask: everybody is clear of the rig")
+    checking.add_argument("--virtual", type=Path, metavar="WIRING.toml", help="on a virtual card that is wired like this")
+    freeing = deeds.add_parser("release", help="free what a program that died has left on a gRPC device server")
+    freeing.add_argument("card", type=Path, metavar="CARD.toml")
+
+
+def _session(parser: argparse.ArgumentParser, settings: Callable[[argparse.ArgumentParser], None]) -> None:
+    parser.add_argument("list", type=Path, metavar="LIST.toml", help="the tests")
+    parser.add_argument("--folder", type=Path, default=Path("session"), help="of the recordings (default session)")
+    parser.add_argument("--resume", action="store_true", help="keep the recordings that were completed; run the others")
+    _effect(parser, "give the twin an effect that its settings do not tell")
+    settings(parser)
+    _supervised(parser)
+
+
+def _faults(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--each", type=int, default=11, metavar="N", help="sessions of each kind in one process (default 11)")
+    parser.add_argument("--processes", type=int, default=4, metavar="N", help="of each kind that kills a process (default 4)")
+    parser.add_argument("--seed", type=int, default=0, help="of kinds' times, tests and places (default 0)")
+    parser.add_argument("--card", type=Path, default=CARD, metavar="CARD.toml", help="channel table (default the packaged one)")
+    parser.add_argument("--out", "-o", type=Path, metavar="F.md", help="write the table there")
+    parser.add_argument("--json", type=Path, metavar="J.json", help="write every outcome there")
+
+
 def _supervised(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("on the rig (docs/rig.md)")
     group.add_argument("--target", choices=("twin", "daq"), default="twin", help="what to run on (default twin)")
-    group.add_argument("--card", type=Path, metavar="CARD.toml", help="channel table; with the twin: its converters, ramps, limits")
+    group.add_argument(
+        "--card", type=Path, metavar="CARD.toml", help="channel table; with the twin: its converters, ramps, limits"
+    )
     group.add_argument("--dry-run", action="store_true", help="with daq: the exact session on the virtual card first")
     group.add_argument("--real-time", action="store_true", help="the twin at the pace of the clock")
     group.add_argument("--arm", action="store_true", help="do not ask before the rig is armed: everybody is clear of it")

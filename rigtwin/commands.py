@@ -69,9 +69,21 @@ def _run_supervised(parsed: Namespace, path: Path) -> int:
 
 
 def card(parsed: Namespace) -> int:
-    from rigtwin.daq.commands import serve
+    from rigtwin.daq.commands import DEEDS
 
-    return {"serve": serve}[parsed.deed](parsed)
+    return DEEDS[parsed.deed](parsed)
+
+
+def session(parsed: Namespace) -> int:
+    from rigtwin.session.plan import session as work
+
+    return work(parsed)
+
+
+def faults(parsed: Namespace) -> int:
+    from rigtwin.faults.commands import faults as work
+
+    return work(parsed)
 
 
 def effects(parsed: Namespace) -> int:
@@ -244,7 +256,9 @@ def import_(parsed: Namespace) -> int:
 COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "list": list_experiments,
     "run": run,
+    "session": session,
     "card": card,
+    "faults": faults,
     "effects": effects,
     "info": info,
     "plot": plot,

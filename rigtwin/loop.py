@@ -95,8 +95,8 @@ def _ticks(
     measured_out: Array,
     truth_out: Array,
 ) -> tuple[int, int, int]:
-    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object can run
-    into a pending Ctrl-C, which compiled code does not survive."""
+    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object
+    can run into a pending Ctrl-C, which compiled code does not survive."""
     state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):

@@ -75,8 +75,8 @@ class Lateness:
             self._count += 1
 
     def record(self, scheduling: str) -> dict[str, str]:
-        """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum of
-        both, ticks missed, and what the system granted."""
+        """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum
+        of both, ticks missed, and what the system granted."""
         figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
         for name, values in (("late", self._late[: self._count]), ("work", self._work[: self._count])):
             if len(values):

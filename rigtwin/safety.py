@@ -59,7 +59,9 @@ class Watch(NamedTuple):
 
 def watching() -> Watch:
     """Before the first tick."""
-    return Watch(np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan), np.full(1, math.nan))
+    return Watch(
+        np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan), np.full(1, math.nan)
+    )
 
 
 @compilable
@@ -103,9 +105,7 @@ def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurem
 
 
 @compilable
-def commanded_wrong(
-    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
-) -> tuple[int, int]:
+def commanded_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
     """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
     are remembered as written."""
     for column in range(4):
@@ -171,7 +171,7 @@ def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
         Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
         Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
         Trip.COMMAND: f"trip: {name} is beyond its limit",
-        Trip.WHEEL: f"trip: the three LVDTs put the wheel more than {limits.wheel:g} m off the ground plate: one of them is wrong",
-        Trip.MOTOR: f"trip: load_cell is more than {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
+        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground plate: one of them is wrong",
+        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
         Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
     }[trip]

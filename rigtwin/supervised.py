@@ -177,7 +177,9 @@ class _Session:
 
     def _move(self, rest: Commands) -> Cause:
         """Armed, ramping, running. Returns why it ended."""
-        self._supervisor.go(Phase.ARMED, Cause("operator", "every sensor lives and is within its limit", fault=False), self._time)
+        self._supervisor.go(
+            Phase.ARMED, Cause("operator", "every sensor lives and is within its limit", fault=False), self._time
+        )
         for _ in range(round(ARMED / self._period)):
             cause = self._tick(lambda _: rest)
             if cause is not None:

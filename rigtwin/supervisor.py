@@ -40,8 +40,8 @@ AT_REST = (Phase.IDLE, Phase.STOPPED, Phase.FAULTED)
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a session leaves a state. name: one word, for programs; reason: one line, for the operator; fault: whether it must not
-    go on as if nothing had been."""
+    """Why a session leaves a state. name: one word, for programs; reason: one line, for the operator; fault: whether it must
+    not go on as if nothing had been."""
 
     name: str
     reason: str

@@ -57,7 +57,7 @@ def test_list(capsys):
 def test_a_trip_is_said_and_has_its_exit_code(tmp_path, capsys):
     path = tmp_path / "t.mcap"
     assert main(["run", "motorcycle", "--out", str(path)]) == 3
-    assert "trip: |load_cell| above 1500 N" in capsys.readouterr().out
+    assert "trip: structure_lvdt is more than 0.06 m off its command" in capsys.readouterr().out
     assert load(path).end.startswith("trip")
 
 

@@ -65,21 +65,19 @@ def test_limits_on_what_a_tick_may_change(measured, commands, trip, where):
 def test_travel_that_is_too_fast():
     watch = watching()
     limits = Safety(velocity=1.5)
-    trips = [
-        judged(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0] for tick in range(40)
-    ]
+    trips = [judged(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0] for tick in range(40)]
     assert trips.index(Trip.VELOCITY) == 10
 
 
 def test_stuck_sensor_is_seen_at_the_last_of_the_readings_allowed():
     watch, limits = watching(), Safety(stuck=7.0)
     noise = np.random.default_rng(0).normal(0.0, 1e-5, (30, 4))
-    trips = []
+    trips, last = [], REST
     for tick in range(30):
         measured = Measurements(*(value + error for value, error in zip(REST, noise[tick], strict=True)))
         if tick >= 11:
-            measured = measured._replace(suspension_lvdt=stuck)
-        stuck = measured.suspension_lvdt
+            measured = measured._replace(suspension_lvdt=last.suspension_lvdt)
+        last = measured
         trips.append(judged(limits, PERIOD, watch, measured, STILL))
     assert trips.index((Trip.STUCK, AT["suspension_lvdt"])) == 16
 

@@ -45,7 +45,9 @@ def translated(doing: str) -> Iterator[None]:
         raise CardFault(f"{doing}: {' '.join(lines[:4])}") from None
     except (AssertionError, ValueError, TypeError) as error:
         # The client's own checks of what a card has answered.
-        raise CardFault(f"{doing}: it answered what the driver's client does not take: {error or type(error).__name__}") from None
+        raise CardFault(
+            f"{doing}: it answered what the driver's client does not take: {error or type(error).__name__}"
+        ) from None
 
 
 def connected(address: str) -> grpc.Channel | None:
@@ -78,8 +80,8 @@ class Card:
         clock: Callable[[], float] = monotonic,
         pacer: Pacer | None = None,
     ) -> None:
-        """period in s; channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer: waits for the ticks of
-        a card that has no clock of its own."""
+        """period in s; channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer: waits for the
+        ticks of a card that has no clock of its own."""
         self._table, self._period, self._channel = table, period, channel
         self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
         self._volts, self._values = np.zeros(4), np.empty(4)
@@ -138,7 +140,10 @@ class Card:
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
                 )
-            self._reader, self._writer = AnalogMultiChannelReader(inputs.in_stream), AnalogMultiChannelWriter(outputs.out_stream)
+            self._reader, self._writer = (
+                AnalogMultiChannelReader(inputs.in_stream),
+                AnalogMultiChannelWriter(outputs.out_stream),
+            )
             self._reader.verify_array_shape = self._writer.verify_array_shape = False
             self._writer.auto_start = False
             for task in (outputs, pressure, inputs):
@@ -151,7 +156,7 @@ class Card:
         if self._pacer is not None:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
         try:
-            self._reader.read_one_sample(self._volts, TIMEOUT)
+            self._reader.read_one_sample(self._volts, TIMEOUT)  # type: ignore[arg-type]
             if self._pacer is None:
                 self._drop_what_is_old()
         except Exception as error:
@@ -225,7 +230,8 @@ class Card:
 
 
 def release(table: ChannelTable, channel: grpc.Channel) -> int:
-    """Ends the tasks that a program which died has left on a gRPC device server, after taking the pressure off; returns how many there were. Raises CardFault."""
+    """Ends the tasks that a program which died has left on a gRPC device server, after taking the pressure off; returns how
+    many there were. Raises CardFault."""
     from nidaqmx import Task
     from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
     from nidaqmx.stream_writers import DigitalSingleChannelWriter

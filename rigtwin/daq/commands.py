@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from argparse import Namespace
+from collections.abc import Callable, Sequence
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from rigtwin.configuration import Configuration
-from rigtwin.console import configured
-from rigtwin.daq.table import load_table
+from rigtwin.console import apart, configured, writable
+from rigtwin.console import table as tabulated
+from rigtwin.daq.calibration import FORCE, at_rest, bumps, dated, responses, signed, spanned, zeroed
+from rigtwin.daq.card import Card, connected, release
+from rigtwin.daq.table import OUTPUTS, ChannelTable, fit, load_table, written
 from rigtwin.daq.terminals import Terminals
-from rigtwin.daq.virtual import RealTime, VirtualCard
+from rigtwin.daq.virtual import OnDemand, RealTime, VirtualCard
 from rigtwin.effects import applied
+from rigtwin.errors import RigtwinError
+from rigtwin.realtime import Pacer
+from rigtwin.recording import Writer, load
+from rigtwin.session.recorder import Keeper
 from rigtwin.session.stops import stop_requests
+from rigtwin.supervised import supervise
+from rigtwin.supervisor import COMPLETED
 
 
 def serve(parsed: Namespace) -> int:
@@ -38,3 +54,134 @@ def serve(parsed: Namespace) -> int:
     server.stop(0.5).wait()
     print(f"{card.tick} ticks")
     return 0
+
+
+def free(parsed: Namespace) -> int:
+    """Frees what a program that died has left on a gRPC device server."""
+    table = load_table(parsed.card)
+    channel = connected(table.address)
+    if channel is None:
+        raise RigtwinError("card.address is empty: the driver of this computer frees a dead program's lines by itself")
+    print(f"{release(table, channel)} tasks ended, pressure off")
+    return 0
+
+
+def check(parsed: Namespace) -> int:
+    """Zero, span and signs of a channel table, written with date and name."""
+    table = load_table(parsed.card)
+    apart(parsed.out, parsed.card)
+    writable(parsed.out)
+    if not parsed.operator.strip():
+        raise RigtwinError("--operator is empty: expected who calibrates")
+    spans, references = _named(parsed.span, "--span", table), _named(parsed.reference, "--reference", table)
+    if not (parsed.signs or parsed.zero or spans):
+        raise RigtwinError("nothing to do: --zero, --span NAME=VALUE or --signs")
+    wiring = load_table(parsed.virtual) if parsed.virtual is not None else None
+    if parsed.signs:
+        table = _signs(table, wiring, parsed)
+    if parsed.zero or spans:
+        rig = _rig(table, wiring)
+        rig.start()
+        try:
+            still = at_rest(rig)
+        finally:
+            rig.stop()
+        rows: list[tuple[str, ...]] = [("signal", "mean", "noise", "same in a row")]
+        rows += [(s.name, f"{s.mean:.5g}", f"{s.noise:.3g} rms", str(s.repeats)) for s in still]
+        print(tabulated(rows))
+        for signal in still:
+            if signal.repeats >= table.plausible.stuck:
+                raise RigtwinError(f"{signal.name} gave {signal.repeats} times the same reading: stuck or not connected")
+        table = spanned(table, still, spans) if spans else table
+        table = zeroed(table, still, references) if parsed.zero else table
+    fit(table, Configuration().safety)
+    table = dated(table, parsed.operator, parsed.note, date.today())
+    try:
+        parsed.out.write_text(written(table), encoding="utf-8")
+    except OSError as error:
+        raise RigtwinError(f"cannot write {parsed.out}: {error.strerror}") from None
+    print(f"channel table in {parsed.out}")
+    return 0
+
+
+def _named(texts: Sequence[str], option: str, table: ChannelTable) -> dict[str, float]:
+    """input → value of each NAME=VALUE. Raises RigtwinError."""
+    names, found = [line.name for line in table.inputs], dict[str, float]()
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise RigtwinError(f"{option} {text}: expected NAME=NUMBER, such as structure_lvdt=0.1") from None
+        if name not in names or not np.isfinite(found[name]):
+            raise RigtwinError(f"{option} {text}: expected one of {', '.join(names)} and a number")
+    return found
+
+
+def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
+    """The card, or a virtual one that is wired as `wiring` says."""
+    period = Configuration().timing.period
+    if wiring is None:
+        card = Card(table, period, connected(table.address), pacer=Pacer(period) if table.timing == "software" else None)
+    else:
+        from rigtwin.daq.transport import InProcess
+
+        lines = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]
+        terminals = Terminals(Configuration(), wiring, 0)
+        virtual = VirtualCard(terminals, *lines, wiring.pressure, OnDemand(), wiring.device)
+        card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    card.inspect()
+    return card
+
+
+def _signs(table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace) -> ChannelTable:
+    """Moves every output a little, under supervision, and turns the signs that are wrong."""
+    if wiring is None and not parsed.arm:
+        _ask("the check moves ground, structure and motor a little; everybody clear? type arm to go: ", ("arm",))
+    rig = _rig(table, wiring)
+    configuration, demands = bumps(parsed.stroke, FORCE, Configuration().timing.period)
+    # Signals whose signs are unknown cannot be held against each other; each alone still can.
+    limits = configuration.safety._replace(stuck=table.plausible.stuck)
+    with TemporaryDirectory(prefix="rigtwin-check-") as folder, stop_requests() as stop:
+        path = Path(folder) / "check.mcap"
+        with Writer(path, "sign check", configuration.timing.period, {}) as writer:
+            ended = supervise(rig, configuration._replace(safety=limits), demands, Keeper(writer), stop)
+        if ended.cause != COMPLETED:
+            raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
+        recording = load(path)
+    measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
+    moved = {output: _went(output, table, wiring, parsed.moved) for output in OUTPUTS}
+    checked, said = signed(table, responses(measured, demands), moved)
+    for line in said or ("every sign is right",):
+        print(line)
+    return checked
+
+
+def _went(output: str, table: ChannelTable, wiring: ChannelTable | None, told: Sequence[str]) -> int:
+    """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
+    for text in told:
+        name, _, sign = text.partition("=")
+        if name not in OUTPUTS or sign not in ("+", "-"):
+            raise RigtwinError(f"--moved {text}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+")
+        if name == output:
+            return 1 if sign == "+" else -1
+    place = OUTPUTS.index(output)
+    if wiring is not None:
+        return int(table.outputs[place].scaling.sign * wiring.outputs[place].scaling.sign)
+    what = {"ground": "the ground plate go towards the wheel", "structure": "the structure plate go away from the wheel"}
+    return (
+        1
+        if _ask(f"did {what.get(output, 'the motor push the plate away from the wheel')} first? y/n: ", ("y", "n")) == "y"
+        else -1
+    )
+
+
+def _ask(question: str, answers: tuple[str, ...]) -> str:
+    if not sys.stdin.isatty():
+        raise RigtwinError(f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)")
+    while (said := input(question).strip().lower()) not in answers:
+        pass
+    return said
+
+
+DEEDS: dict[str, Callable[[Namespace], int]] = {"serve": serve, "check": check, "release": free}

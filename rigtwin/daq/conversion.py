@@ -1,4 +1,4 @@
-"""Values to volts and back, and the card's 16 bits in between; the same for the card's client, the twin and the virtual card."""
+"""Values to volts and back, and the card's 16 bits in between; the same for client, twin and virtual card."""
 
 from __future__ import annotations
 

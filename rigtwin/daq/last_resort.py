@@ -22,6 +22,8 @@ class LastResort:
         self._outputs: Any = None
         self._pressure: Any = None
         self._tasks: list[Any] = []
+        self._values, self._volts = np.zeros(3), np.empty(3)
+        to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
 
     def prepare(self) -> None:
         """Called once the owner has its outputs. Raises CardFault."""
@@ -33,12 +35,13 @@ class LastResort:
 
     def force_off(self, positions: Sequence[float]) -> None:
         """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
-        values, volts = np.array([*positions, 0.0]), np.empty(3)
-        to_volts(self._conversion, values, volts)
+        self._values[:2] = positions
+        to_volts(self._conversion, self._values, self._volts)
         with translated(f"card {self._table.device}: stopping it"):
             if self._outputs is None:
                 self._take()
-            self._outputs.write_one_sample(volts)
+            assert self._outputs is not None
+            self._outputs.write_one_sample(self._volts)
 
     def pressure_off(self) -> None:
         """Raises CardFault."""

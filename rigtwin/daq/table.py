@@ -6,7 +6,7 @@ value = sign · scale · volts + offset, in both directions.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -18,7 +18,7 @@ from rigtwin.channels import CHANNELS
 from rigtwin.configuration import Safety, checked, read_toml
 from rigtwin.errors import RigtwinError
 
-Group = TypeVar("Group", bound=NamedTuple)
+Group = TypeVar("Group")
 OUTPUTS = ("ground", "structure", "voltage")
 """Commands that go to the card, in the order of its writes. The force demanded stays inside the controller."""
 UNITS = {(channel.topic, channel.name): channel.unit for channel in CHANNELS}
@@ -40,16 +40,17 @@ class Scaling(NamedTuple):
 
 
 class Plausible(NamedTuple):
-    """What living sensors of one rig cannot do; see rigtwin.safety. stuck: same readings in a row. Greatest seen on the twin in all
-    experiments: 4 readings, 9.5 mm, 34 N."""
+    """What living sensors of one rig cannot do; see rigtwin.safety. stuck: same readings in a row. Greatest seen on the twin
+    in all experiments: 4 readings, 9.5 mm, 34 N."""
 
-    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "repeats by chance once in 10 000 tests")] = 7.0
+    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "repeats by chance once in 20 000 tests of 45 s")] = 7.0
     wheel: Annotated[float, Quantity("m", 1e-4, 1e9, "twice what the tyre gives in the experiments")] = 0.02
     motor: Annotated[float, Quantity("N", 1.0, 1e9, "3 times friction, hum and noise in the experiments")] = 100.0
 
 
 class Line(NamedTuple):
-    """One signal of the rig. line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen the signal move the way that it should."""
+    """One signal of the rig. line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen the
+    signal move the way that it should."""
 
     name: str
     line: str
@@ -65,13 +66,14 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """A card's channel table. inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital line
-    that lets the hydraulics have pressure while high. address: of a gRPC device server, empty for this computer's driver."""
+    """A card's channel table. inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
+    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty for this computer's
+    driver."""
 
     inputs: tuple[Line, ...]
     outputs: tuple[Line, ...]
     pressure: str
-    plausible: Plausible = Plausible()
+    plausible: Plausible
     device: str = "Dev1"
     address: str = ""
     timing: str = "hardware"
@@ -102,7 +104,9 @@ def parsed(tables: Mapping[str, Any]) -> ChannelTable:
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:
         if name not in known:
-            raise RigtwinError(f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], [outputs.NAME]")
+            raise RigtwinError(
+                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], [outputs.NAME]"
+            )
     card = tables.get("card", {})
     if not isinstance(card, Mapping):
         raise RigtwinError("card: expected a table, [card]")
@@ -130,10 +134,10 @@ def parsed(tables: Mapping[str, Any]) -> ChannelTable:
     return ChannelTable(inputs, outputs, pressure, _numbers("plausible", tables.get("plausible", {}), Plausible), **texts)
 
 
-def _numbers(where: str, table: Any, kind: type[Group]) -> Group:
+def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{where} = {table!r}: expected a table")
-    meanings = fields(kind)
+    meanings = fields(kind)  # type: ignore[arg-type]
     for key in table:
         if key not in meanings:
             raise RigtwinError(f"unknown setting {where}.{key}; there are {', '.join(meanings)}")

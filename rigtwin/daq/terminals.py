@@ -23,9 +23,7 @@ AHEAD = 256
 def analogue(plant: Plant) -> Plant:
     """The plant with sensors that have no bits: those are the card's."""
     names = Measurements._fields
-    return plant._replace(
-        **{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)}
-    )
+    return plant._replace(**{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)})
 
 
 @kernel

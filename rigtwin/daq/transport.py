@@ -33,7 +33,7 @@ class CardError(grpc.RpcError):
     def details(self) -> str:
         return self._message
 
-    def trailing_metadata(self) -> list[Any]:
+    def trailing_metadata(self) -> Any:
         return [_Entry("ni-error", str(self._number))] if self._number is not None else []
 
 
@@ -48,7 +48,7 @@ class InProcess(grpc.Channel):
     def __init__(self, card: VirtualCard) -> None:
         self._card = card
 
-    def unary_unary(self, method: str, request_serializer: Any = None, response_deserializer: Any = None, *_: Any, **__: Any) -> Any:
+    def unary_unary(self, method: str, *_: Any, response_deserializer: Any = None, **__: Any) -> Any:  # type: ignore[override]
         call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
 
         def invoke(request: Any, **_: Any) -> Any:
@@ -114,7 +114,7 @@ class _Calls(grpc.GenericRpcHandler):
 def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     """Listens on this computer only; port 0 takes a free one. Returns the server and its port. Raises RigtwinError."""
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
-    server = grpc.server(ThreadPoolExecutor(max_workers=8), handlers=(_Calls(card),), options=(("grpc.so_reuseport", 0),))
+    server = grpc.server(ThreadPoolExecutor(max_workers=8), handlers=[_Calls(card)], options=(("grpc.so_reuseport", 0),))
     try:
         bound = server.add_insecure_port(f"{LOCAL}:{port}")
     except RuntimeError:

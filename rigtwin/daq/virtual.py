@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -46,7 +46,7 @@ class Wired(Protocol):
     @property
     def volts(self) -> Array: ...
 
-    def advance(self, volts: Array, pressure: bool) -> None: ...
+    def advance(self, written: Array, pressure: bool) -> None: ...
 
 
 class OnDemand:
@@ -59,6 +59,7 @@ class OnDemand:
         return done + 1
 
     def now(self, done: int) -> int:
+        """Ticks that have passed by now."""
         return done
 
     def wait(self, tick: int) -> None: ...
@@ -76,8 +77,12 @@ class RealTime:
     def passed(self, done: int) -> int:
         return max(self.now(done), done)
 
-    def now(self, done: int) -> int:
-        return int((monotonic() - self._start) / self._period)
+    def now(self, _: int) -> int:
+        return self.tick_at(monotonic())
+
+    def tick_at(self, moment: float) -> int:
+        """The tick that a moment of `monotonic` lies in."""
+        return int((moment - self._start) / self._period)
 
     def wait(self, tick: int) -> None:
         sleep_until(self._start + tick * self._period, spin=0.0)
@@ -103,10 +108,8 @@ class VirtualCard:
         pressure: str,
         time: OnDemand | RealTime,
         device: str = "Dev1",
-        watch: Callable[[int, Array, bool], None] = lambda tick, volts, pressure: None,
     ) -> None:
-        """watch: called at each tick with its number, the outputs' volts and the pressure that hold over it."""
-        self._terminals, self._time, self._device, self._watch = terminals, time, device, watch
+        self._terminals, self._time, self._device = terminals, time, device
         self._inputs, self._outputs, self._pressure_line = list(inputs), list(outputs), pressure
         self.outputs, self.pressure, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
@@ -125,7 +128,9 @@ class VirtualCard:
             self._await(request)
         with self._lock:
             if not self.connected:
-                raise DriverError(GONE, f"The specified device is not present or is not active in the system. Device: {self._device}")
+                raise DriverError(
+                    GONE, f"The specified device is not present or is not active in the system. Device: {self._device}"
+                )
             self._catch_up()
             return handler(request, response)
 
@@ -141,7 +146,6 @@ class VirtualCard:
                 self._step()
 
     def _step(self) -> None:
-        self._watch(self.tick, self.outputs, self.pressure)
         self._volts[:] = self.outputs[self._places]
         self._terminals.advance(self._volts, self.pressure)
         self.tick += 1
@@ -224,13 +228,17 @@ class VirtualCard:
             self._known_device(device)
             number = re.fullmatch(rf"{kind}(\d+)", name)
             if number is None or int(number[1]) >= count:
-                raise DriverError(NO_CHANNEL, f"Physical channel specified does not exist on this device. Channel: {line.strip()}")
+                raise DriverError(
+                    NO_CHANNEL, f"Physical channel specified does not exist on this device. Channel: {line.strip()}"
+                )
             task.lines.append(name)
         return task
 
     def _voltage(self, request: Any, allowed: tuple[float, ...]) -> None:
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
-            raise DriverError(BAD_VALUE, f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}")
+            raise DriverError(
+                BAD_VALUE, f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}"
+            )
 
     def _CreateAIVoltageChan(self, request: Any, response: type) -> Any:
         self._voltage(request, INPUT_RANGES)

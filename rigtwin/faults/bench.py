@@ -1,4 +1,4 @@
-"""The twin at the card's terminals with a fault in its cables or actuators, and a log of what was put out and what truly moved."""
+"""The twin at the card's terminals with a fault in cable or actuator, and a log of what was put out and what truly moved."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ class FaultyBench:
     shown: first tick at which the fault is there to be seen, or −1. volts: at the inputs, shape (4,).
     """
 
-    def __init__(self, terminals: Terminals, table: ChannelTable, kind: str, at: int, place: int, seed: int, ticks: int) -> None:
+    def __init__(
+        self, terminals: Terminals, table: ChannelTable, kind: str, at: int, place: int, seed: int, ticks: int
+    ) -> None:
         self._terminals, self._kind, self._at, self._place = terminals, kind, at, place
         self._random = np.random.default_rng(seed)
         self._inputs, self._factor = conversion(table.inputs), conversion(table.outputs).factor

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -36,6 +35,8 @@ DURATION = 3.0
 """s of each test; a fault comes at a random time of the ramp or the test."""
 RAMP = 0.6
 """s."""
+BEFORE = round(1000.0 * (LOOKING + ARMED + RAMP + SETTLING))
+"""Ticks of the card before the test."""
 SLOW = 5
 """Ticks that pass during a slow one."""
 
@@ -75,14 +76,13 @@ class Outcome:
 def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
     """So many faults, the kinds in turn, everything else at random."""
     random = np.random.default_rng(seed)
-    moving = 1000.0 * (LOOKING + ARMED)
-    ending = moving + 1000.0 * (RAMP + SETTLING + DURATION)
+    moving, ending = 1000.0 * (LOOKING + ARMED), BEFORE + 1000.0 * DURATION
     faults = []
     for number in range(count):
         kind = kinds[number % len(kinds)]
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]
-        first = ending - 1000.0 * DURATION if kind.place in ("controller", "loop") else moving
+        first = BEFORE if kind.place in ("controller", "loop") or kind.name == "controller hangs" else moving
         at = int(random.uniform(first + 20.0, ending - 50.0))
         faults.append(Fault(kind, experiment, at, place, int(random.integers(2**31))))
     return faults

@@ -22,7 +22,17 @@ from numpy.typing import NDArray
 from rigtwin.arrays import Array
 from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.schema import END_RECORD, FIELD, LATENESS_RECORD, RECORD, TRANSITION_RECORD, TWIN_RECORD, WRITTEN_FORMAT, known_topics, tags
+from rigtwin.recording.schema import (
+    END_RECORD,
+    FIELD,
+    LATENESS_RECORD,
+    RECORD,
+    TRANSITION_RECORD,
+    TWIN_RECORD,
+    WRITTEN_FORMAT,
+    known_topics,
+    tags,
+)
 
 _DAMAGE = (
     McapError,

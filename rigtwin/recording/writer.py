@@ -131,17 +131,20 @@ class Writer:
         self._metadata.append(MetadataIndex(offset=self._offset, length=len(record), name=name))
         self._put(record)
 
-    def append(self, at: NDArray[np.int64] | None = None, **topics: Array | None) -> None:
-        """Adds ticks: topic name without its slash → values, shape (ticks, fields). None is left out. at: the ticks' numbers,
-        rising, shape (ticks,); by default those that follow on the last."""
+    def append(self, **topics: Array | None) -> None:
+        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields). None is left out."""
+        ticks = next((len(values) for values in topics.values() if values is not None), 0)
+        self.append_at(np.arange(self._next, self._next + ticks), topics)
+
+    def append_at(self, sequence: NDArray[np.int64], topics: Mapping[str, Array | None]) -> None:
+        """Adds the ticks of these numbers, rising, shape (ticks,); the rest as `append`."""
         columns = {f"/{name}": values for name, values in topics.items() if values is not None}
         for topic in columns:
             if topic not in self._topics:
                 self._register(topic)
-        ticks = len(next(iter(columns.values())))
+        ticks = len(sequence)
         if ticks == 0:
             return
-        sequence = np.arange(self._next, self._next + ticks) if at is None else at
         self._next = int(sequence[-1]) + 1
         self._ticks += ticks
         self._put_messages(columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from rigtwin.cli import CARD
 from rigtwin.console import table
 from rigtwin.daq.table import load_table, trusted
 from rigtwin.daq.terminals import InRealTime, WiredTwin
@@ -21,9 +22,6 @@ from rigtwin.session.record import Test, on_card, on_virtual_card, record_at_lei
 from rigtwin.session.stops import stop_requests
 from rigtwin.supervised import Ended
 from rigtwin.supervisor import COMPLETED
-
-PACKAGED = Path(__file__).parents[2] / "machines" / "cards" / "pci-6229.toml"
-"""The channel table of a twin in real time that has no card."""
 
 
 def run(parsed: Namespace, test: Test, path: Path) -> int:
@@ -122,10 +120,9 @@ def _said(test: Test, path: Path, ended: Ended) -> int:
     print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {ended.cause.reason}")
     late = load(path).lateness if ended.ticks else {}
     if late:
-        print(
-            f"late by {1e6 * float(late['late_median']):.1f} us in the median, {1e6 * float(late['late_999']):.0f} us in 99.9 %, "
-            f"{1e6 * float(late['late_max']):.0f} us at most; {late['missed']} ticks missed; {late['scheduling']}"
-        )
+        median, high, most = (f"{1e6 * float(late[f'late_{figure}']):.3g} us" for figure in ("median", "999", "max"))
+        print(f"late by {median} in the median, {high} at the 99.9th percentile, {most} at most; {late['missed']} ticks missed")
+        print(late["scheduling"])
     return 0 if ended.cause == COMPLETED else 3
 
 
@@ -137,4 +134,4 @@ def test_of(parsed: Namespace, name: str) -> Test:
     experiment = find(name)
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)
-    return Test(experiment.name, configuration, demands, parsed.seed, load_table(parsed.card or PACKAGED), parsed.effect)
+    return Test(experiment.name, configuration, demands, parsed.seed, load_table(parsed.card or CARD), parsed.effect)

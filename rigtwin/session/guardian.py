@@ -143,11 +143,13 @@ def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
         pipe.send(str(error))
         return
     keeping = _Keeping(writer, pipe, watched, view)
-    with suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
-    pipe.send("ready")
+    keeping.make_ready()
     thread = threading.Thread(target=keeping.work, daemon=True)
     thread.start()
+    with suppress(OSError, AttributeError):
+        # Of this thread alone: writing the recording must never be in the loop's way.
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+    pipe.send("ready")
     died = _died_or_hung(owner, shared, watched, keeping)
     if died is not None:
         keeping.stop_rig(died, shared)
@@ -176,9 +178,10 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
             if dead:
                 return Cause("process", "the controller process died") if shared[_WATCHED] else None
             if shared[_WATCHED] and monotonic() - shared[_BEAT] > watched.patience:
-                os.kill(owner, signal.SIGKILL)
+                with suppress(ProcessLookupError):
+                    os.kill(owner, signal.SIGKILL)
                 waited = f"{1e3 * watched.patience:.3g} ms"
-                return Cause("process", f"the controller process hung: no tick for {waited}; it was killed")
+                return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
         return None
     finally:
         if handle is not None:
@@ -211,17 +214,19 @@ class _Keeping:
         if self._reason is not None:
             self.done.set()
 
-    def _prepare(self) -> None:
-        if self._watched.table is None:
-            return
-        from rigtwin.daq.last_resort import LastResort
+    def make_ready(self) -> None:
+        """Everything that takes time, before there is anything to watch."""
+        if self._watched.table is not None:
+            from rigtwin.daq.last_resort import LastResort
 
-        resort = LastResort(self._watched.table)
-        try:
-            resort.prepare()
-        except RigtwinError as error:
-            self._pipe.send(str(error))
-        self._resort = resort
+            self._resort = LastResort(self._watched.table)
+
+    def _prepare(self) -> None:
+        if self._resort is not None:
+            try:
+                self._resort.prepare()
+            except RigtwinError as error:
+                self._pipe.send(str(error))
 
     def _ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
         self._keeper.ticks(at, commands, measured)
@@ -268,4 +273,3 @@ class _Keeping:
         self._keeper.transition(Transition(self._time, Phase.STOPPING, Phase.FAULTED, cause))
         with suppress(RigtwinError):
             self._writer.finish(cause.reason)
-

@@ -14,7 +14,7 @@ from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, flattened
 from rigtwin.daq.card import Card, connected
 from rigtwin.daq.table import ChannelTable, fit, written
-from rigtwin.daq.terminals import Terminals, WiredTwin
+from rigtwin.daq.terminals import Terminals
 from rigtwin.daq.virtual import OnDemand, VirtualCard, Wired
 from rigtwin.effects import applied
 from rigtwin.realtime import Lateness, Pacer, described, in_real_time
@@ -111,6 +111,15 @@ def record_at_leisure(
     return ended
 
 
+def watched(test: Test, path: Path, guarded: bool, notes: Sequence[tuple[str, dict[str, str]]] = (), live: int = 0) -> Watched:
+    """What a guardian has to know of a test."""
+    safety = test.configuration.safety
+    # A tick missed more than may be is seen by the loop at the next; the guardian acts if that next never comes.
+    patience = (safety.missed + 1.0) * test.configuration.timing.period
+    told = metadata(test, virtual=not guarded) | dict(notes)
+    return Watched(_writing(path, test), told, test.table if guarded else None, patience, safety.hold, live)
+
+
 def record_in_real_time(
     rig: DrivenRig,
     test: Test,
@@ -126,13 +135,9 @@ def record_in_real_time(
     dies; notes: more metadata records. Raises RigtwinError before anything moves."""
     limited = test.limited
     safety, period = limited.safety, limited.timing.period
-    told = metadata(test, virtual=not guarded) | dict(notes)
-    # A tick missed more than may be is seen by the loop at the next; the guardian acts if that next never comes.
-    patience = (safety.missed + 1.0) * period
-    watched = Watched(_writing(path, test), told, test.table if guarded else None, patience, safety.hold, live)
     whole = len(test.demands) + round(2.0 * (safety.ramp + safety.hold + 1.0) / period)
     lateness = Lateness(whole)
-    guardian = Guardian(watched)
+    guardian = Guardian(watched(test, path, guarded, notes, live))
     with ExitStack() as stack:
         grants = stack.enter_context(in_real_time(fifo))
         try:

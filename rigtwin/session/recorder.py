@@ -26,7 +26,7 @@ class Keeper:
 
     def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
         if self.fault is None:
-            self._try(lambda: self._writer.append(at, command=commands, sensor=measured))
+            self._try(lambda: self._writer.append_at(at, {"command": commands, "sensor": measured}))
 
     def session(self, rows: Array) -> None:
         if self.fault is None:
