@@ -228,8 +228,9 @@ def _stretch(parser: argparse.ArgumentParser) -> None:
 
 
 SESSION = """\
-The list is a TOML file: [[test]] tables with experiment, and if wanted seed, pause (s before it), name, set (a table of settings).
-After each test its recording is compared with the twin. After a fault the session ends; --resume goes on with what is missing."""
+The list is a TOML file of [[test]] tables: experiment, and if wanted seed, pause (s before it), name, set (a table of
+settings). After each test its recording is compared with the twin. A session ends at the first test that does not
+complete; --resume goes on with what is missing."""
 
 
 def _card(parser: argparse.ArgumentParser, settings: Callable[[argparse.ArgumentParser], None]) -> None:
@@ -240,7 +241,7 @@ def _card(parser: argparse.ArgumentParser, settings: Callable[[argparse.Argument
     serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
     _effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
     settings(serving)
-    checking = deeds.add_parser("check", help="find zero, span and signs; write the channel table with date and name")
+    checking = deeds.add_parser("check", help="find zero, span and signs; write the channel table")
     checking.add_argument("card", type=Path, metavar="CARD.toml", help="the channel table to begin with")
     checking.add_argument("--out", "-o", type=Path, required=True, metavar="NEW.toml", help="where to write what was found")
     checking.add_argument("--operator", required=True, metavar="NAME", help="who does it")

@@ -20,7 +20,7 @@ from rigtwin.configuration import Configuration, Safety
 from rigtwin.converters import Sensing, sampled
 from rigtwin.plant import Machine, advance, sense
 from rigtwin.rig import Rig
-from rigtwin.safety import Trip, Watch, judged, watching
+from rigtwin.safety import Trip, Watch, judged, watching, watching_compiled
 from rigtwin.twin import Twin
 
 BLOCK = 250
@@ -125,7 +125,7 @@ def _ticks(
 def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
     controlling = controller(configuration.controller, configuration.timing.period)
-    memory, watch = np.array(packed(initial_state(controlling))), watching()
+    memory, watch = np.array(packed(initial_state(controlling))), watching_compiled()
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))

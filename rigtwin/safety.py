@@ -22,6 +22,8 @@ from rigtwin.parameters import Plant
 
 MOTOR_LAG = Plant().motor.time_constant
 """s, of the motor's force behind its voltage."""
+LEADING = 1.5
+"""Times its cylinder's limit that a command may be."""
 VELOCITY_SPAN = 10
 """Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
 
@@ -45,23 +47,47 @@ class Trip(IntEnum):
     MOTOR = 13
 
 
+(
+    _NONE,
+    _STRUCTURE,
+    _FORCE,
+    _TRAVEL,
+    _NOT_A_NUMBER,
+    _GROUND,
+    _VELOCITY,
+    _JUMP,
+    _STUCK,
+    _FOLLOWING,
+    _COMMAND,
+    _COMMAND_RATE,
+    _WHEEL,
+    _MOTOR,
+) = (trip.value for trip in Trip)
+"""Plain numbers: looking up an enumeration's value takes longer than the comparison."""
+
+
 class Watch(NamedTuple):
     """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
     were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
-    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place."""
+    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place. Arrays for
+    compiled loops; lists, which Python reads faster, for others."""
 
-    measured: Array
-    repeats: Array
-    commands: Array
-    travel: Array
-    motor: Array
+    measured: Array | list[float]
+    repeats: Array | list[float]
+    commands: Array | list[float]
+    travel: Array | list[float]
+    motor: Array | list[float]
 
 
 def watching() -> Watch:
-    """Before the first tick."""
-    return Watch(
-        np.full(4, math.nan), np.ones(4), np.full(4, math.nan), np.full(VELOCITY_SPAN + 1, math.nan), np.full(1, math.nan)
-    )
+    """Before the first tick, for a loop in Python."""
+    unknown = [math.nan]
+    return Watch(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
+
+
+def watching_compiled() -> Watch:
+    """Before the first tick, for a compiled loop."""
+    return Watch(*(np.array(values) for values in watching()))
 
 
 @compilable
@@ -69,39 +95,39 @@ def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurem
     """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
     for column in range(4):
         if not math.isfinite(measured[column]):
-            return Trip.NOT_A_NUMBER.value, column
-    trip, at = Trip.NONE.value, 0
+            return _NOT_A_NUMBER, column
+    trip, at = _NONE, 0
     for column in range(4):
         change = abs(measured[column] - watch.measured[column])
         rate = limits.force_rate if column == 3 else limits.lvdt_rate
-        if change > rate * period and trip == Trip.NONE.value:
-            trip, at = Trip.JUMP.value, column
+        if change > rate * period and trip == _NONE:
+            trip, at = _JUMP, column
         watch.repeats[column] = watch.repeats[column] + 1.0 if change == 0.0 else 1.0
-        if watch.repeats[column] >= limits.stuck and trip == Trip.NONE.value:
-            trip, at = Trip.STUCK.value, column
+        if watch.repeats[column] >= limits.stuck and trip == _NONE:
+            trip, at = _STUCK, column
         watch.measured[column] = measured[column]
     place = int(watch.travel[VELOCITY_SPAN]) if watch.travel[VELOCITY_SPAN] >= 0.0 else 0
     moved = abs(measured.suspension_lvdt - watch.travel[place])
     watch.travel[place] = measured.suspension_lvdt
     watch.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
-    if trip != Trip.NONE.value:
+    if trip != _NONE:
         return trip, at
     if abs(measured.structure_lvdt) > limits.structure:
-        return Trip.STRUCTURE.value, 1
+        return _STRUCTURE, 1
     if abs(measured.load_cell) > limits.force:
-        return Trip.FORCE.value, 3
+        return _FORCE, 3
     if abs(measured.suspension_lvdt) > limits.travel:
-        return Trip.TRAVEL.value, 2
+        return _TRAVEL, 2
     if abs(measured.ground_lvdt) > limits.ground:
-        return Trip.GROUND.value, 0
+        return _GROUND, 0
     if moved > limits.velocity * VELOCITY_SPAN * period:
-        return Trip.VELOCITY.value, 2
+        return _VELOCITY, 2
     # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
     if abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt) > limits.wheel:
-        return Trip.WHEEL.value, 2
+        return _WHEEL, 2
     if abs(measured.load_cell - watch.motor[0]) > limits.motor:
-        return Trip.MOTOR.value, 3
-    return Trip.NONE.value, 0
+        return _MOTOR, 3
+    return _NONE, 0
 
 
 @compilable
@@ -110,36 +136,49 @@ def commanded_wrong(limits: Safety, period: float, watch: Watch, measured: Measu
     are remembered as written."""
     for column in range(4):
         if not math.isfinite(commands[column]):
-            return Trip.NOT_A_NUMBER.value, 4 + column
-    if abs(commands.ground) > limits.ground:
-        return Trip.COMMAND.value, 4
-    if abs(commands.structure) > limits.structure:
-        return Trip.COMMAND.value, 5
+            return _NOT_A_NUMBER, 4 + column
+    if abs(commands.ground) > LEADING * limits.ground:
+        return _COMMAND, 4
+    # What leads a cylinder to its limit may be beyond it for as long as the cylinder lags behind.
+    if abs(commands.structure) > LEADING * limits.structure:
+        return _COMMAND, 5
     for column in (0, 1, 3):
         rate = limits.voltage_rate if column == 3 else limits.command_rate
         if abs(commands[column] - watch.commands[column]) > rate * period:
-            return Trip.COMMAND_RATE.value, 4 + column
+            return _COMMAND_RATE, 4 + column
     if abs(commands.ground - measured.ground_lvdt) > limits.following:
-        return Trip.FOLLOWING.value, 0
+        return _FOLLOWING, 0
     if abs(commands.structure - measured.structure_lvdt) > limits.following:
-        return Trip.FOLLOWING.value, 1
+        return _FOLLOWING, 1
     if abs(commands.force - measured.load_cell) > limits.following_force:
-        return Trip.FOLLOWING.value, 3
+        return _FOLLOWING, 3
     for column in range(4):
         watch.commands[column] = commands[column]
     share = 1.0 - math.exp(-period / MOTOR_LAG)
     force = watch.motor[0] if math.isfinite(watch.motor[0]) else measured.load_cell
     watch.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
-    return Trip.NONE.value, 0
+    return _NONE, 0
 
 
 @compilable
 def judged(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
     """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
     trip, column = sensed_wrong(limits, period, watch, measured)
-    if trip == Trip.NONE.value:
+    if trip == _NONE:
         trip, column = commanded_wrong(limits, period, watch, measured, commands)
     return trip, column
+
+
+def held(limits: Safety, commands: Commands) -> Commands:
+    """The stop state after commands: no force, cylinders where they were told to be, but not beyond their limits."""
+    ground = min(max(commands.ground, -limits.ground), limits.ground)
+    structure = min(max(commands.structure, -limits.structure), limits.structure)
+    return Commands(ground, structure, 0.0, 0.0)
+
+
+def beyond(limits: Safety, measured: Measurements) -> bool:
+    """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
+    return not (abs(measured.ground_lvdt) <= limits.ground and abs(measured.structure_lvdt) <= limits.structure)
 
 
 def within(limits: Safety, measured: Measurements) -> str | None:

@@ -12,26 +12,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from controllers import Commands, Controller, Demand, Measurements, Mode, State, controller, initial_state, update
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.arrays import Array
-from rigtwin.channels import topic_fields
 from rigtwin.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.loop import BLOCK
 from rigtwin.realtime import Lateness, monotonic
 from rigtwin.rig import DrivenRig
-from rigtwin.safety import Trip, commanded_wrong, explained, sensed_wrong, watching, within
+from rigtwin.safety import Trip, beyond, commanded_wrong, explained, held, sensed_wrong, watching, within
 from rigtwin.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
 
 LOOKING = 0.3
 """s for which the sensors are looked at before the rig is armed; it also warms up everything that a tick needs."""
 ARMED = 0.1
 """s of pressure before anything is moved."""
-ROW = len(topic_fields("/session"))
 SETTLING = 0.3
 """s at the start position between the ramp and the test."""
 
@@ -44,18 +39,19 @@ class Recorder(Protocol):
     @property
     def fault(self) -> str | None: ...
 
-    def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
-        """Consecutive ticks of the test: their numbers, shape (ticks,), and values, shape (ticks, 4)."""
-        ...
-
-    def session(self, rows: Array) -> None:
-        """Ticks of the whole session, shape (ticks, fields of /session)."""
+    def tick(self, row: tuple[float, ...]) -> None:
+        """One tick of the session: the fields of /session, those of /command, then the tick's number in the test, not a number
+        outside it."""
         ...
 
     def transition(self, transition: Transition) -> None: ...
 
     def beat(self, ground: float, structure: float) -> None:
         """Called once a tick: the loop is alive, and holds the cylinders there, m."""
+        ...
+
+    def flush(self) -> None:
+        """Called when nothing moves any more: what is not written yet is to be."""
         ...
 
 
@@ -109,9 +105,7 @@ class _Session:
         self._before = (LOOKING, ARMED, self._limits.ramp, SETTLING)
         self._clock = -round(sum(self._before) / self._period)
         self._held, self._pressure = Commands(0.0, 0.0, 0.0, 0.0), False
-        self._rows, self._commands, self._measured = np.empty((BLOCK, ROW)), np.empty((BLOCK, 4)), np.empty((BLOCK, 4))
-        self._at = np.empty(BLOCK, np.int64)
-        self._kept = self._tested = 0
+        self._told = self._done_before = 0
         self._done, self._peaks = 0, [0.0] * 5
 
     @staticmethod
@@ -128,7 +122,7 @@ class _Session:
 
     def run(self) -> Ended:
         """The way through all states; every step of it ends in `_come_to_rest`."""
-        rig = self._rig
+        rig, recorder = self._rig, self._recorder
         rig.start()
         try:
             rest = self._look()
@@ -146,7 +140,7 @@ class _Session:
             self._come_to_rest(cause, rest)
         finally:
             rig.stop()
-            self._flush()
+            recorder.flush()
         names = (*Measurements._fields, "voltage")
         transitions = tuple(self._supervisor.transitions)
         return Ended(transitions[-1].cause, self._done, transitions, dict(zip(names, self._peaks, strict=True)))
@@ -168,11 +162,10 @@ class _Session:
                 cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
-            self._row(measured)
+            self._row(measured, rest)
             self._clock += 1
             measured = self._rig.read()
-        self._flush()
-        self._row(measured)
+        self._row(measured, rest)
         return rest
 
     def _move(self, rest: Commands) -> Cause:
@@ -262,13 +255,13 @@ class _Session:
 
     def _halt(self, cause: Cause, measured: Measurements | None) -> Cause:
         """Outputs to the stop state, now: no force, cylinders where they were last told to be."""
-        self._held = self._held._replace(force=0.0, voltage=0.0)
+        self._held = held(self._limits, self._held)
         try:
             self._rig.write(self._held)
         except Exception:
             self._pressure = False
             self._rig.stop()
-        self._row(measured if measured is not None else Measurements(*[math.nan] * 4))
+        self._row(measured if measured is not None else Measurements(*[math.nan] * 4), self._held)
         self._clock += 1
         return cause
 
@@ -292,11 +285,11 @@ class _Session:
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
-        self._held = self._held._replace(force=0.0, voltage=0.0)
+        self._held = held(self._limits, self._held)
         return None
 
     def _holding(self) -> bool:
-        """A tick of holding; whatever the sensors say now, the outputs stay. False if the card is gone."""
+        """A tick of holding. False if there is no use in it: the card is gone, or a cylinder is beyond its limit."""
         try:
             measured = self._rig.read()
             self._rig.write(self._held)
@@ -304,38 +297,26 @@ class _Session:
             return False
         self._recorder.beat(self._held.ground, self._held.structure)
         self._clock += self._rig.missed
-        self._row(measured)
+        self._row(measured, self._held)
         self._clock += 1
-        return True
+        return not beyond(self._limits, measured)
 
     def _note(self, measured: Measurements, commands: Commands, running: bool) -> None:
-        self._row(measured)
+        self._row(measured, commands, float(self._clock) if running else math.nan)
         for place, value in enumerate((*measured, commands.voltage)):
             if abs(value) > self._peaks[place]:
                 self._peaks[place] = abs(value)
-        if running:
-            place = self._tested
-            self._at[place], self._commands[place], self._measured[place] = self._clock, commands, measured
-            self._tested += 1
-            self._done += 1
+        self._done += running
 
-    def _row(self, measured: Measurements) -> None:
-        if self._kept == BLOCK:
-            self._flush()
+    def _row(self, measured: Measurements, commands: Commands, tick: float = math.nan) -> None:
         held, rig = self._held, self._rig
         written = (held.ground, held.structure, held.voltage, float(self._pressure))
-        late = getattr(rig, "late", 0.0)
-        self._rows[self._kept] = (self._time, float(self._supervisor.phase), *written, *measured, late, float(rig.missed))
-        self._kept += 1
-
-    def _flush(self) -> None:
-        kept, tested = self._kept, self._tested
-        self._kept = self._tested = 0
-        if tested:
-            self._recorder.ticks(self._at[:tested].copy(), self._commands[:tested].copy(), self._measured[:tested].copy())
-        if kept:
-            self._recorder.session(self._rows[:kept].copy())
-            self._progress(tested)
+        late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)
+        self._recorder.tick((self._time, phase, *written, *measured, late, float(rig.missed), *commands, tick))
+        self._told += 1
+        if self._told % BLOCK == 0:
+            self._progress(self._done - self._done_before)
+            self._done_before = self._done
 
 
 def _cosine(duration: float, period: float) -> Iterator[float]:

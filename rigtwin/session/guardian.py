@@ -16,21 +16,32 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rigtwin.arrays import Array
 from rigtwin.daq.table import ChannelTable
 from rigtwin.errors import RigtwinError
+from rigtwin.loop import BLOCK
 from rigtwin.realtime import PRIORITY, monotonic
-from rigtwin.session.recorder import Keeper
+from rigtwin.session.recorder import FIELDS, ROW, SESSION, Keeper
 from rigtwin.supervisor import Cause, Phase, Transition
 
+WRITE = 0.1
+"""s between two blocks of the recording."""
 LOOK = 2.5e-4
 """s between two looks at the loop."""
 STARTED = 30.0
 """s within which the guardian must be there."""
-_BEAT, _GROUND, _STRUCTURE, _WATCHED = range(4)
-"""Numbers in the shared memory: time of the last tick, positions held, and whether there is anything to watch."""
+RING = 8192
+"""Ticks that the shared memory holds for the recording: seconds of them."""
+_BEAT, _GROUND, _STRUCTURE, _WATCHED, _WRITTEN, _READ, _NUMBERS = range(7)
+"""Numbers in the shared memory, before the ticks: time of the last tick, positions held, whether there is anything to watch,
+ticks written by the loop and read by the guardian."""
+
+
+def _parts(memory: Any) -> tuple[Array, Array]:
+    """The numbers, and the ring of ticks."""
+    whole = np.frombuffer(memory)
+    return whole[:_NUMBERS], whole[_NUMBERS:].reshape(RING, ROW)
 
 
 @dataclass(frozen=True)
@@ -56,8 +67,8 @@ class Guardian:
         self._watched = watched
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
-        memory = context.RawArray("d", 4)
-        self._shared = np.frombuffer(memory)
+        memory = context.RawArray("d", _NUMBERS + RING * ROW)
+        self._shared, self._ring = _parts(memory)
         self._pipe, theirs = context.Pipe()
         arguments = (watched, theirs, memory, os.getpid())
         self._process = context.Process(target=_guard, args=arguments, name="rigtwin guardian")
@@ -78,11 +89,16 @@ class Guardian:
         shared = self._shared
         shared[_GROUND], shared[_STRUCTURE], shared[_BEAT] = ground, structure, time.monotonic()
 
-    def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
-        self._send("ticks", at, commands, measured)
+    def tick(self, row: tuple[float, ...]) -> None:
+        written = int(self._shared[_WRITTEN])
+        if written - self._shared[_READ] >= RING:
+            self.fault = self.fault or "the recording cannot keep up with the loop"
+            return
+        self._ring[written % RING] = row
+        self._shared[_WRITTEN] = written + 1.0
 
-    def session(self, rows: Array) -> None:
-        self._send("session", rows)
+    def flush(self) -> None:
+        """The other process writes by itself."""
 
     def transition(self, transition: Transition) -> None:
         if transition.after in self._watched.phases and self._shared[_WATCHED] == 0.0:
@@ -130,7 +146,7 @@ class Guardian:
 def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
     """The other process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the operator's Ctrl-C is the loop's to answer
-    shared = np.frombuffer(memory)
+    shared, ring = _parts(memory)
     from rigtwin.recording import Writer
 
     try:
@@ -142,7 +158,7 @@ def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
     except RigtwinError as error:
         pipe.send(str(error))
         return
-    keeping = _Keeping(writer, pipe, watched, view)
+    keeping = _Keeping(writer, pipe, watched, view, shared, ring)
     keeping.make_ready()
     thread = threading.Thread(target=keeping.work, daemon=True)
     thread.start()
@@ -191,28 +207,51 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
 class _Keeping:
     """Writes what the loop sends, on a thread of its own."""
 
-    def __init__(self, writer: Any, pipe: Connection, watched: Watched, view: Callable[[str, Array], None] | None) -> None:
+    def __init__(
+        self,
+        writer: Any,
+        pipe: Connection,
+        watched: Watched,
+        view: Callable[[str, Array], None] | None,
+        shared: Array,
+        ring: Array,
+    ) -> None:
+        self._shared, self._ring = shared, ring
         self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
         self._last: Transition | None = None
         self._reason: str | None = None
         self._resort: Any = None
         self._cause = Cause("process", "")
-        self._time = 0.0
+        self._time, self._said = 0.0, False
         self.done = threading.Event()
 
     def work(self) -> None:
         try:
             while self._reason is None:
-                kind, *content = self._pipe.recv()
-                getattr(self, f"_{kind}")(*content)
-                if self._keeper.fault is not None:
+                if self._pipe.poll(WRITE):
+                    kind, *content = self._pipe.recv()
+                    getattr(self, f"_{kind}")(*content)
+                self._drain()
+                if self._keeper.fault is not None and not self._said:
+                    self._said = True
                     self._pipe.send(self._keeper.fault)
-                    self._keeper.fault = None
-                    self._reason = "recording failed"
         except (EOFError, OSError):
-            pass
+            self._drain()
         if self._reason is not None:
+            self._drain()
             self.done.set()
+
+    def _drain(self) -> None:
+        """Writes what the loop has put into the shared memory."""
+        shared = self._shared
+        while (first := int(shared[_READ])) < (last := int(shared[_WRITTEN])):
+            last = min(last, first + BLOCK, (first // RING + 1) * RING)
+            rows = self._ring[first % RING : first % RING + last - first].copy()
+            shared[_READ] = float(last)
+            self._keeper.block(rows)
+            self._time = float(rows[-1, 0])
+            if self._view is not None:
+                self._view(SESSION, rows[:, : len(FIELDS)])
 
     def make_ready(self) -> None:
         """Everything that takes time, before there is anything to watch."""
@@ -228,17 +267,9 @@ class _Keeping:
             except RigtwinError as error:
                 self._pipe.send(str(error))
 
-    def _ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
-        self._keeper.ticks(at, commands, measured)
-
-    def _session(self, rows: Array) -> None:
-        self._keeper.session(rows)
-        self._time = float(rows[-1, 0])
-        if self._view is not None:
-            self._view("/session", rows)
-
     def _transition(self, transition: Transition) -> None:
         self._last = transition
+        self._drain()
         self._keeper.transition(transition)
 
     def _metadata(self, name: str, values: dict[str, str]) -> None:

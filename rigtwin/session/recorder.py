@@ -5,32 +5,55 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from controllers import Commands, Measurements
 from rigtwin.arrays import Array
+from rigtwin.channels import topic_fields
 from rigtwin.errors import RigtwinError
+from rigtwin.loop import BLOCK
 from rigtwin.recording import Writer
 from rigtwin.recording.schema import TRANSITION_RECORD
 from rigtwin.supervisor import Transition
 
 SESSION = "/session"
+FIELDS = topic_fields(SESSION)
+SENSORS = [FIELDS.index(name) for name in Measurements._fields]
+COMMANDS = slice(len(FIELDS), len(FIELDS) + len(Commands._fields))
+NUMBER = len(FIELDS) + len(Commands._fields)
+ROW = NUMBER + 1
+"""Numbers of a tick as a `rigtwin.supervised.Recorder` gets them: /session, /command, the tick's number in the test."""
 
 
 class Keeper:
-    """A `rigtwin.supervised.Recorder` that writes at once. What cannot be written is no exception but a `fault`: the rig has to
-    be stopped first."""
+    """A `rigtwin.supervised.Recorder` that writes block by block. What cannot be written is no exception but a `fault`: the rig
+    has to be stopped first."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self.fault: str | None = None
+        self._rows, self._kept = np.empty((BLOCK, ROW)), 0
 
-    def ticks(self, at: NDArray[np.int64], commands: Array, measured: Array) -> None:
-        if self.fault is None:
-            self._try(lambda: self._writer.append_at(at, {"command": commands, "sensor": measured}))
+    def tick(self, row: tuple[float, ...]) -> None:
+        self._rows[self._kept] = row
+        self._kept += 1
+        if self._kept == BLOCK:
+            self.flush()
 
-    def session(self, rows: Array) -> None:
-        if self.fault is None:
-            self._try(lambda: self._writer.append_beside(SESSION, rows, rows[:, 0]))
+    def flush(self) -> None:
+        rows = self._rows[: self._kept]
+        self._kept = 0
+        self.block(rows)
+
+    def block(self, rows: Array) -> None:
+        """Consecutive ticks, shape (ticks, ROW)."""
+        if self.fault is not None or not len(rows):
+            return
+        tested = rows[np.isfinite(rows[:, NUMBER])]
+        if len(tested):
+            topics = {"command": tested[:, COMMANDS], "sensor": tested[:, SENSORS]}
+            self._try(lambda: self._writer.append_at(tested[:, NUMBER].astype(np.int64), topics))
+        session = np.ascontiguousarray(rows[:, : len(FIELDS)])
+        self._try(lambda: self._writer.append_beside(SESSION, session, session[:, 0]))
 
     def transition(self, transition: Transition) -> None:
         """Also when nothing else can be written any more: the writer has kept room for it."""

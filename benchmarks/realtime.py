@@ -1,0 +1,124 @@
+"""`python -m benchmarks.realtime`: what a tick costs on the way to the card, and how late a loop in real time is here."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from experiments import EXPERIMENTS
+from rigtwin.arrays import Array
+from rigtwin.cli import CARD
+from rigtwin.configuration import from_assignments
+from rigtwin.daq.card import Card
+from rigtwin.daq.table import load_table
+from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.realtime import Pacer
+from rigtwin.recording import load
+from rigtwin.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
+
+SECONDS = 20.0
+
+
+class _Taped:
+    """Terminals that note what a session reads, and then play it back at no cost."""
+
+    def __init__(self, terminals: Terminals) -> None:
+        self._terminals, self._tape, self._place = terminals, [terminals.volts.copy()], 0
+        self.volts: Array = terminals.volts.copy()
+        self._playing = False
+
+    def advance(self, written: Array, pressure: bool) -> None:
+        self._place += 1
+        if not self._playing:
+            self._terminals.advance(written, pressure)
+            self._tape.append(self._terminals.volts.copy())
+        self.volts[:] = self._tape[min(self._place, len(self._tape) - 1)]
+
+    def rewind(self) -> None:
+        self._playing, self._place = True, 0
+        self.volts[:] = self._tape[0]
+
+
+class _Timed:
+    """A card, read at the pace of the clock, and the time from the beginning of each tick to the end of all its work."""
+
+    def __init__(self, card: Card, period: float) -> None:
+        self._card, self._pacer, self.missed, self.late = card, Pacer(period), 0, 0.0
+        self.times, self._begun = list[float](), 0.0
+
+    def start(self) -> None:
+        self._card.start()
+
+    def read(self) -> Measurements:
+        self.times.append(perf_counter() - self._begun)
+        self.missed, self.late = self._pacer.wait(), self._pacer.late
+        self._begun = perf_counter()
+        return self._card.read()
+
+    def write(self, commands: Commands) -> None:
+        self._card.write(commands)
+
+    def pressure(self, on: bool) -> None:
+        self._card.pressure(on)
+
+    def stop(self) -> None:
+        self._card.stop()
+
+
+def _test(name: str) -> Test:
+    """Without the class a shared computer may keep a loop waiting for longer than a rig could bear; here nothing moves."""
+    experiment = EXPERIMENTS[name]
+    configuration = from_assignments(experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"])
+    return Test(name, configuration, experiment.demands(configuration, 0), 0, load_table(CARD))
+
+
+def compute(name: str, folder: Path) -> Array:
+    """s of each tick of a test on the virtual card, twin apart: driver's client, conversion, limits, controller, recording."""
+    test = _test(name)
+    tape = _Taped(test.terminals())
+    card, _ = on_virtual_card(test, tape)
+    record_at_leisure(card, test, folder / "tape.mcap")
+    tape.rewind()
+    card, _ = on_virtual_card(test, tape)
+    timed = _Timed(card, test.configuration.timing.period)
+    record_in_real_time(timed, test, folder / "timed.mcap", lambda: None, guarded=False)
+    return np.array(timed.times[400:])
+
+
+def late(fifo: bool, folder: Path) -> dict[str, str]:
+    """Figures of a recording's lateness, of the twin in real time, with the scheduling class or without."""
+    test = _test("road1.6")
+    twin = InRealTime(WiredTwin(test.terminals(), test.table), test.configuration.timing.period)
+    path = folder / f"{fifo}.mcap"
+    record_in_real_time(twin, test, path, lambda: None, guarded=False, fifo=fifo)
+    return dict(load(path).lateness)
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        print("time of a tick on the way to the card and back, twin apart, us (period 1000 us)")
+        print("test             median   99 %  99.9 %   most")
+        for test in ("road1.6", "semi-active", "beam-semi-active", "imposed"):
+            times = 1e6 * compute(test, folder)
+            figures = (*np.percentile(times, [50, 99, 99.9]), times.max())
+            print(f"{test:16s} " + " ".join(f"{value:7.1f}" for value in figures))
+        print("\nlateness of the twin in real time, us")
+        print("scheduling    median  99.9 %    most  missed of 20 000")
+        for fifo in (True, False):
+            found = late(fifo, folder)
+            figures = (1e6 * float(found[f"late_{key}"]) for key in ("median", "999", "max"))
+            print(
+                f"{'FIFO' if fifo else 'default':12s} "
+                + " ".join(f"{value:7.1f}" for value in figures)
+                + f"  {found['missed']}"
+            )
+            print(f"  {found['scheduling']}\n  {found['histogram']}")
+
+
+if __name__ == "__main__":
+    main()
