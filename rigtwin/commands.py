@@ -47,6 +47,10 @@ def run(parsed: Namespace) -> int:
     path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
         return _run_supervised(parsed, path)
+    for option in ("dry_run", "arm", "without_dry_run", "stop_file", "live"):
+        if getattr(parsed, option):
+            needs = "--card or --real-time" if option in ("stop_file", "live") else "--target daq"
+            raise RigtwinError(f"--{option.replace('_', '-')} goes with {needs}")
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)
     with tqdm(total=len(demands), unit="tick", unit_scale=True, disable=None, desc=experiment.name, leave=False) as bar:
@@ -64,6 +68,8 @@ def _run_supervised(parsed: Namespace, path: Path) -> int:
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
+    if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
+        raise RigtwinError("--live goes with a session in real time: --real-time, or --target daq without --dry-run")
     writable(path)
     return work(parsed, test_of(parsed, parsed.name), path)
 

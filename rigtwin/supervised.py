@@ -154,7 +154,7 @@ class _Session:
             raise RigtwinError(f"not armed: {refused}")
         rest = self._held = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
         self._updating(self._controller, self._state, measured, Demand(*self._demands[0].tolist()))
-        for _ in range(round(LOOKING / self._period)):
+        for _ in range(max(round(LOOKING / self._period), 1)):
             self._rig.write(rest)
             cause = self._faulty(measured)
             number, column = commanded_wrong(self._limits, self._period, self._watch, measured, rest)
@@ -165,7 +165,6 @@ class _Session:
             self._row(measured, rest)
             self._clock += 1
             measured = self._rig.read()
-        self._row(measured, rest)
         return rest
 
     def _move(self, rest: Commands) -> Cause:

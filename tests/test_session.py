@@ -1,0 +1,400 @@
+"""Sessions from the command line: dry runs, arming, lists of tests, calibration, real time and its guardian."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import threading
+import time
+from dataclasses import replace
+from datetime import date
+
+import numpy as np
+import pytest
+
+from controllers import Measurements
+from rigtwin.cli import CARD, main
+from rigtwin.configuration import Configuration, from_assignments
+from rigtwin.daq.calibration import FORCE, at_rest, bumps, responses, signed, spanned, zeroed
+from rigtwin.daq.table import load_table, written
+from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.errors import RigtwinError
+from rigtwin.realtime import Pacer, in_real_time, machine_lacks, monotonic, sleep_until
+from rigtwin.recording import load
+from rigtwin.recording.reader import transitions
+from rigtwin.session.dry_run import digest, enter, ledger, passed, predicted
+from rigtwin.session.plan import planned
+from rigtwin.session.record import Test, record_in_real_time
+
+TABLE = load_table(CARD)
+SHORT = ["--set", "timing.duration=1", "--set", "safety.ramp=0.3", "--set", "safety.hold=0.1"]
+
+
+@pytest.fixture
+def card(tmp_path):
+    """A table that somebody answers for, but whose card is nowhere."""
+    table = replace(
+        TABLE,
+        inputs=tuple(line._replace(sign_checked=True) for line in TABLE.inputs),
+        outputs=tuple(line._replace(sign_checked=True) for line in TABLE.outputs),
+        calibrated="2026-01-31",
+        operator="A. Tester",
+    )
+    path = tmp_path / "card.toml"
+    path.write_text(written(table), encoding="utf-8")
+    return path
+
+
+def session(*settings: str, seed: int = 0) -> Test:
+    from experiments import find
+
+    experiment = find("imposed")
+    configuration = from_assignments(experiment.configuration, ["timing.duration=1", "safety.ramp=0.3", *settings])
+    return Test("imposed", configuration, experiment.demands(configuration, seed), seed, TABLE)
+
+
+# Dry runs
+
+
+def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
+    out = tmp_path / "d.mcap"
+    assert main(["run", "imposed", "--target", "daq", "--dry-run", "--card", str(card), "--out", str(out), *SHORT]) == 0
+    said = capsys.readouterr().out
+    for quantity in ("force", "travel", "velocity of travel", "margin"):
+        assert quantity in said
+    assert "driver is missing" in said
+    entries = json.loads(ledger(card).read_text())
+    assert [entry["experiment"] for entry in entries.values()] == ["imposed"]
+    recording = load(out)
+    figures = {figure.name: figure for figure in predicted(recording, Configuration())}
+    force = np.abs(recording.column("/sensor", "load_cell"))
+    assert figures["force"].peak == pytest.approx(float(force.max()))
+    assert figures["force"].margin == pytest.approx(1.0 - float(force.max()) / 1500.0)
+
+
+def test_another_setting_is_another_session(tmp_path):
+    def key(test: Test) -> str:
+        return digest(test.experiment, test.configuration, test.demands, test.table)
+
+    base = session()
+    others = [session("controller.kp=0.31"), session("safety.force=1400"), session("timing.duration=1.1")]
+    others.append(replace(base, experiment="drop"))
+    others.append(replace(base, demands=base.demands * 1.0001))
+    others.append(replace(base, table=replace(TABLE, device="Dev2")))
+    keys = [key(test) for test in (base, *others)]
+    assert len(set(keys)) == len(keys)
+    assert key(base) == key(session())
+    path = tmp_path / "card.toml"
+    assert not passed(path, keys[0])
+    enter(path, keys[0], {"experiment": "imposed"})
+    enter(path, keys[1], {"experiment": "imposed"})
+    assert passed(path, keys[0])
+    assert passed(path, keys[1])
+    assert not passed(path, keys[2])
+    ledger(path).write_text("[]")
+    with pytest.raises(RigtwinError, match="not a list of dry runs"):
+        passed(path, keys[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--target", "daq"], "needs the card's channel table"),
+        (["--target", "daq", "--card", "nowhere.toml"], "cannot read nowhere.toml"),
+        (["--dry-run"], "--dry-run goes with --target daq"),
+        (["--arm"], "--arm goes with --target daq"),
+        (["--live"], "--live goes with --card or --real-time"),
+        (["--card", "CARD", "--arm"], "go with --target daq"),
+        (["--card", "CARD", "--live"], "--live goes with a session in real time"),
+        (["--target", "daq", "--card", "CARD"], "the NI-DAQmx driver is missing"),
+        (["--target", "daq", "--card", "UNSIGNED"], "sign not checked: ground_lvdt"),
+        (["--target", "daq", "--card", "CARD", "--effect", "coulomb@rail=80"], "--effect is the twin's"),
+        (["--target", "daq", "--card", "CARD", "--set", "safety.structure=0.3"], "range too small for the limit"),
+        (["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.structure=0.3"], "range too small for the limit"),
+        (["--target", "daq", "--dry-run", "--card", "CARD", "--out", "/nowhere/x.mcap"], "its folder does not exist"),
+        (["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.stuck=2"], "safety.stuck = 2"),
+    ],
+)
+def test_mistakes_are_said_before_anything_moves(card, capsys, arguments, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"CARD": str(card), "UNSIGNED": str(CARD)}
+    assert main(["run", "imposed", *(names.get(text, text) for text in arguments)]) == 1
+    shown = capsys.readouterr()
+    assert said in shown.err
+    assert len(shown.err.splitlines()) == 1
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
+    from rigtwin.session import commands
+
+    monkeypatch.setattr(commands, "on_card", lambda _: None)
+    monkeypatch.chdir(tmp_path)
+    run = ["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]
+    assert main(run) == 1
+    assert "has had no dry run" in capsys.readouterr().err
+    assert main([*run, "--dry-run", "--set", "controller.kp=0.31"]) == 0
+    assert main(run) == 1
+    assert "has had no dry run" in capsys.readouterr().err
+    assert main([*run, "--dry-run"]) == 0
+    assert main(run) == 1
+    assert "no terminal to ask for arming" in capsys.readouterr().err
+    assert main([*run, "--set", "controller.kp=0.4", "--without-dry-run", "A. Tester"]) == 1
+    assert "no terminal to ask for arming" in capsys.readouterr().err
+
+
+# Lists of tests
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({}, r"no \[\[test\]\]"),
+        ({"tests": []}, "unknown 'tests'"),
+        ({"test": [{}]}, "test 1: experiment is missing"),
+        ({"test": [{"experiment": "x"}]}, "unknown experiment"),
+        ({"test": [{"experiment": "drop", "seed": -1}]}, "test 1: seed = -1"),
+        ({"test": [{"experiment": "drop", "pause": "long"}]}, "pause = 'long'"),
+        ({"test": [{"experiment": "drop", "wait": 1}]}, "unknown 'wait'"),
+        ({"test": [{"experiment": "drop", "set": 3}]}, "set = 3"),
+        ({"test": [{"experiment": "drop", "name": "../a"}]}, "expected what a file can be called"),
+        ({"test": [{"experiment": "drop", "name": "a"}, {"experiment": "drop", "name": "a"}]}, "another test's"),
+    ],
+)
+def test_mistakes_in_a_list(tables, said):
+    with pytest.raises(RigtwinError, match=said):
+        planned(tables)
+
+
+def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):
+    plan, folder = tmp_path / "list.toml", tmp_path / "out"
+    plan.write_text(
+        '[[test]]\nexperiment = "imposed"\nname = "one"\n'
+        '[[test]]\nexperiment = "drop"\nname = "two"\nseed = 2\nset = {safety = {structure = 0.01}}\n'
+        '[[test]]\nexperiment = "imposed"\nname = "three"\n'
+    )
+    base = ["session", str(plan), "--card", str(CARD), "--folder", str(folder), *SHORT]
+    assert main(base) == 3
+    said = capsys.readouterr().out
+    assert "closed_loop" in said
+    assert "two did not complete" in said
+    assert load(folder / "one.mcap").end == "completed"
+    assert not (folder / "three.mcap").exists()
+    assert main(base) == 1
+    assert "--resume" in capsys.readouterr().err
+    plan.write_text(plan.read_text().replace("0.01", "0.15"))
+    assert main([*base, "--resume"]) == 0
+    assert "1 of 3 tests are done already" in capsys.readouterr().out
+    assert all(load(folder / f"{name}.mcap").end == "completed" for name in ("one", "two", "three"))
+    assert (folder / "two.1.mcap").exists()
+
+
+# Calibration
+
+
+@pytest.mark.parametrize("signs", list(itertools.product((1, -1), repeat=7))[::9])
+def test_every_wrong_sign_is_found(signs):
+    from rigtwin.daq.card import Card
+    from rigtwin.daq.transport import InProcess
+    from rigtwin.daq.virtual import OnDemand, VirtualCard
+    from rigtwin.session.recorder import NUMBER, SENSORS
+    from rigtwin.supervised import supervise
+    from rigtwin.supervisor import COMPLETED
+
+    turned = [
+        line._replace(scaling=line.scaling._replace(sign=float(sign))) for line, sign in zip(TABLE.lines, signs, strict=True)
+    ]
+    wiring = replace(TABLE, inputs=tuple(turned[:4]), outputs=tuple(turned[4:]))
+    configuration, demands = bumps(0.005, FORCE, 1e-3)
+    device = VirtualCard(
+        Terminals(configuration, wiring, 0),
+        [line.line for line in wiring.inputs],
+        [line.line for line in wiring.outputs],
+        wiring.pressure,
+        OnDemand(),
+    )
+    rows = []
+
+    class Rows:
+        fault = None
+
+        def tick(self, row):
+            if np.isfinite(row[NUMBER]):
+                rows.append(row)
+
+        def transition(self, transition): ...
+
+        def beat(self, ground, structure): ...
+
+        def flush(self): ...
+
+    card = Card(TABLE, 1e-3, InProcess(device), clock=lambda: device.tick * 1e-3)
+    ended = supervise(card, configuration, demands, Rows())
+    assert ended.cause == COMPLETED
+    measured = np.array(rows)[:, SENSORS]
+    moved = {line.name: sign for line, sign in zip(TABLE.outputs, signs[4:], strict=True)}
+    found, _ = signed(TABLE, responses(measured, demands), moved)
+    assert [line.scaling.sign for line in found.lines] == list(signs)
+    assert all(line.sign_checked for line in found.lines)
+
+
+def test_a_dead_signal_is_no_sign():
+    demands = bumps(0.005, FORCE, 1e-3)[1]
+    noise = np.random.default_rng(0).normal(0.0, 1e-4, (len(demands), 4))
+    with pytest.raises(RigtwinError, match="hardly answers"):
+        signed(TABLE, responses(noise, demands), {"ground": 1, "structure": 1, "voltage": 1})
+
+
+class Standing:
+    """A rig that stands at true values, read through a table that is off."""
+
+    missed = 0
+
+    def __init__(self, values: list[float]) -> None:
+        self._values, self._random = values, np.random.default_rng(0)
+
+    def read(self) -> Measurements:
+        return Measurements(*(self._values + self._random.normal(0.0, 1e-4, 4)).tolist())
+
+
+def test_zero_and_span():
+    still = at_rest(Standing([0.003, -0.002, 0.001, 12.5]), 500)  # type: ignore[arg-type]
+    table = zeroed(TABLE, still, {"structure_lvdt": 0.1})
+    offsets = [line.scaling.offset for line in table.inputs]
+    assert offsets == pytest.approx([-0.003, 0.102, -0.001, -12.5], abs=5e-5)
+    still = at_rest(Standing([0.0, 0.0, 0.105, 0.0]), 500)  # type: ignore[arg-type]
+    spread = spanned(TABLE, still, {"suspension_lvdt": 0.1})
+    assert spread.inputs[2].scaling.scale == pytest.approx(0.025 * 0.1 / 0.105, rel=1e-3)
+    for name, said in (("ground_lvdt", "which is noise"),):
+        with pytest.raises(RigtwinError, match=said):
+            spanned(TABLE, still, {name: 0.1})
+    with pytest.raises(RigtwinError, match="check signs first"):
+        spanned(TABLE, still, {"suspension_lvdt": -0.1})
+
+
+def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
+    from rigtwin.daq.table import trusted
+
+    wiring = replace(TABLE, inputs=(*TABLE.inputs[:3], TABLE.inputs[3]._replace(
+        scaling=TABLE.inputs[3].scaling._replace(sign=-1.0, offset=12.5))))  # fmt: skip
+    (tmp_path / "wiring.toml").write_text(written(wiring))
+    out = tmp_path / "checked.toml"
+    check = ["card", "check", str(CARD), "--operator", "A. Tester", "--note", "first", "--signs", "--zero"]
+    assert main([*check, "--virtual", str(tmp_path / "wiring.toml"), "-o", str(out)]) == 0
+    assert "load_cell: reads the wrong way" in capsys.readouterr().out
+    checked = load_table(out)
+    trusted(checked, date.today())
+    cell = checked.inputs[3].scaling
+    assert cell.sign == -1.0
+    assert cell.offset == pytest.approx(12.5, abs=0.5)
+    assert (checked.operator, checked.note) == ("A. Tester", "first")
+    assert main([*check, "--virtual", str(tmp_path / "wiring.toml"), "-o", str(CARD)]) == 1
+    assert main(["card", "check", str(CARD), "-o", str(out), "--operator", "a", "--span", "x=1"]) == 1
+    assert main(["card", "check", str(CARD), "-o", str(out), "--operator", " ", "--zero"]) == 1
+
+
+# Real time
+
+
+def test_deadlines_do_not_drift():
+    pacer, period = Pacer(0.004), 0.004
+    begun, waits = monotonic(), 40
+    missed = 0
+    for number in range(waits):
+        missed += pacer.wait()
+        if number == 10:
+            time.sleep(3.3 * period)
+    took = monotonic() - begun
+    assert missed >= 2
+    assert took >= (waits - 1 + missed) * period - 1e-6
+    assert took - (waits - 1 + missed) * period == pytest.approx(pacer.late, abs=2e-3)
+
+
+def test_sleeping_ends_at_its_time():
+    deadline = monotonic() + 0.01
+    sleep_until(deadline)
+    assert monotonic() >= deadline
+
+
+def test_what_was_taken_for_real_time_is_given_back():
+    import gc
+
+    before = os.sched_getscheduler(0) if hasattr(os, "sched_getscheduler") else None
+    with in_real_time() as grants:
+        assert not gc.isenabled()
+        assert all(grant.name for grant in grants)
+    assert gc.isenabled()
+    if before is not None:
+        assert os.sched_getscheduler(0) == before
+    assert all(": " in line for line in machine_lacks())
+
+
+def patient(**more: str) -> Test:
+    """One that waits for a busy computer."""
+    return session("safety.missed=5000", *(f"{key}={value}" for key, value in more.items()))
+
+
+def test_a_session_in_real_time_is_kept_by_the_guardian(tmp_path):
+    test = patient()
+    twin = InRealTime(WiredTwin(test.terminals(), TABLE), 1e-3)
+    begun = monotonic()
+    ended = record_in_real_time(twin, test, tmp_path / "r.mcap", lambda: None, guarded=False)
+    assert monotonic() - begun > 2.0
+    recording = load(tmp_path / "r.mcap")
+    assert ended.cause.name == recording.transitions[-1]["cause"] == "completed"
+    assert recording.ticks == ended.ticks
+    assert recording.ticks + int(recording.lateness["missed"]) >= 1000
+    counts = json.loads(recording.lateness["histogram"])["counts"]
+    assert sum(counts) == int(recording.lateness["ticks"])
+    assert "FIFO scheduling" in recording.lateness["scheduling"]
+
+
+def test_without_its_guardian_the_session_stops(tmp_path):
+    import multiprocessing
+
+    test = patient()
+    twin = InRealTime(WiredTwin(test.terminals(), TABLE), 1e-3)
+
+    def kill() -> None:
+        for child in multiprocessing.active_children():
+            child.kill()
+
+    def stop() -> str | None:
+        if not timer.is_alive() and not timer.finished.is_set():
+            timer.start()
+        return None
+
+    timer = threading.Timer(1.2, kill)
+    ended = record_in_real_time(twin, test, tmp_path / "r.mcap", stop, guarded=False)
+    assert ended.cause.name == "recording"
+    assert "guardian process is gone" in ended.cause.reason
+    assert transitions(tmp_path / "r.mcap")
+
+
+def test_the_live_view_is_served_on_this_computer_only():
+    import socket
+
+    from rigtwin.channels import topic_fields
+    from rigtwin.session.live import live_view
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    show = live_view(port)
+    show("/session", np.zeros((20, len(topic_fields("/session")))))
+    with socket.create_connection(("127.0.0.1", port), 5.0):
+        pass
+    with pytest.raises(RigtwinError, match="no live view on port"):
+        live_view(port)
+    others = {address[4][0] for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
+    for address in others:
+        with pytest.raises(OSError, match=r".*"), socket.create_connection((address, port), 1.0):
+            pass
+
+
+def test_a_recording_that_cannot_be_written_is_said_at_once(tmp_path):
+    test = patient()
+    twin = InRealTime(WiredTwin(test.terminals(), TABLE), 1e-3)
+    with pytest.raises(RigtwinError, match="cannot write"):
+        record_in_real_time(twin, test, tmp_path / "no" / "r.mcap", lambda: None, guarded=False)

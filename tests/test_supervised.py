@@ -1,0 +1,290 @@
+"""Sessions: the states and the ways between them, ramps, stops; the same on the twin and on the virtual card; faults."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers import Measurements
+from experiments import find
+from rigtwin.cli import CARD
+from rigtwin.configuration import from_assignments
+from rigtwin.daq.table import load_table
+from rigtwin.daq.terminals import WiredTwin
+from rigtwin.errors import RigtwinError
+from rigtwin.faults.campaign import drawn, last_words, tried
+from rigtwin.faults.kinds import KINDS
+from rigtwin.faults.processes import tried as tried_apart
+from rigtwin.recording import load
+from rigtwin.recording.reader import transitions
+from rigtwin.safety import Trip
+from rigtwin.session.record import Test, on_virtual_card, record_at_leisure
+from rigtwin.session.stops import stop_requests
+from rigtwin.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
+
+TABLE = load_table(CARD)
+HERE = [kind for kind in KINDS if kind.place != "process"]
+APART = [kind for kind in KINDS if kind.place == "process"]
+SHORT = ("timing.duration=1.5", "safety.ramp=0.4", "safety.hold=0.1")
+
+
+def session(name: str, *settings: str, seed: int = 0) -> Test:
+    experiment = find(name)
+    configuration = from_assignments(experiment.configuration, list(settings or SHORT))
+    return Test(name, configuration, experiment.demands(configuration, seed), seed, TABLE)
+
+
+def states(path: Path) -> list[str]:
+    return [transition["to"] for transition in transitions(path)]
+
+
+# States
+
+
+@pytest.mark.parametrize(("before", "after"), list(itertools.product(Phase, Phase)))
+def test_only_the_ways_that_there_are(before, after):
+    told = []
+    supervisor = Supervisor(told.append)
+    supervisor.phase = before
+    if after in NEXT[before]:
+        supervisor.go(after, COMPLETED, 1.0)
+        assert (told[0].before, told[0].after) == (before, after)
+    else:
+        with pytest.raises(RigtwinError, match="no way from"):
+            supervisor.go(after, COMPLETED, 1.0)
+        assert (supervisor.phase, told) == (before, [])
+
+
+def test_motion_is_reached_and_left_through_every_state_between():
+    """Every walk from idle to running passes armed and ramping; every walk out of motion passes stopping."""
+    ways = [[Phase.IDLE]]
+    for _ in range(8):
+        ways += [[*way, after] for way in ways if way[-1] != Phase.IDLE or len(way) == 1 for after in NEXT[way[-1]]]
+    to_running = [way for way in ways if way[-1] == Phase.RUNNING]
+    assert to_running
+    assert all(way[:3] == [Phase.IDLE, Phase.ARMED, Phase.RAMPING] for way in to_running)
+    ends = [way for way in ways if way[-1] in (Phase.STOPPED, Phase.FAULTED) and Phase.ARMED in way]
+    assert ends
+    assert all(way[-2] == Phase.STOPPING for way in ends)
+
+
+# The same on the twin and on the card
+
+
+@pytest.mark.parametrize("name", ["road1.6", "imposed"])
+def test_card_and_twin_give_the_same_recording_over_45_seconds(tmp_path, name):
+    test = session(name, "timing.duration=45", seed=2)
+    card, _ = on_virtual_card(test)
+    ended = record_at_leisure(card, test, tmp_path / "card.mcap")
+    assert ended.cause == COMPLETED
+    record_at_leisure(WiredTwin(test.terminals(), TABLE), test, tmp_path / "twin.mcap")
+    assert (tmp_path / "card.mcap").read_bytes() == (tmp_path / "twin.mcap").read_bytes()
+    recording = load(tmp_path / "card.mcap")
+    assert (recording.ticks, recording.time[0], recording.notes) == (45_000, 0.0, ())
+
+
+def test_a_software_timed_card_gives_the_same_too(tmp_path):
+    test = session("imposed")
+    records = []
+    for timing in ("hardware", "software"):
+        timed = replace(test, table=replace(TABLE, timing=timing))
+        card, _ = on_virtual_card(timed)
+        record_at_leisure(card, timed, tmp_path / f"{timing}.mcap")
+        records.append(load(tmp_path / f"{timing}.mcap"))
+    for topic, names in records[0].columns.items():
+        for name in names:
+            assert np.array_equal(records[0].column(topic, name), records[1].column(topic, name))
+
+
+def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    test = session("drop")
+    card, device = on_virtual_card(test)
+    record_at_leisure(card, test, tmp_path / "r.mcap")
+    with (tmp_path / "r.mcap").open("rb") as file:
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics=["/session"])
+        rows = np.array([(m.time, m.phase, m.structure, m.voltage, m.pressure) for *_, m in messages])
+    assert np.allclose(np.diff(rows[:, 0]), 1e-3)
+    assert sorted(set(rows[:, 1])) == [0.0, 1.0, 2.0, 3.0, 4.0]
+    ramping = rows[rows[:, 1] == Phase.RAMPING]
+    assert np.max(np.abs(np.diff(ramping[:, 2]))) < 2.5e-5
+    assert ramping[-1, 2] == pytest.approx(-0.004, abs=1e-9)
+    assert rows[rows[:, 0] < 0.0][-1, 3] == pytest.approx(200.0 / 186.0)
+    idle = rows[rows[:, 1] == Phase.IDLE]
+    assert not idle[:, 3:].any()
+    assert rows[-1, 3] == 0.0
+    assert not device.pressure
+    assert device.outputs[0] == 0.0
+
+
+def test_the_rest_before_arming_may_be_ended_too(tmp_path):
+    test = session("imposed")
+    card, _ = on_virtual_card(test)
+    with pytest.raises(RigtwinError, match="not armed: stopped by the operator"):
+        record_at_leisure(card, test, tmp_path / "r.mcap", lambda: "stopped by the operator: test")
+    assert states(tmp_path / "r.mcap") == ["faulted"]
+
+
+# Stopping
+
+
+@pytest.mark.parametrize("seconds", [-0.75, -0.5, 0.5, 1.49, 1.6])
+def test_the_operator_stops_in_every_state(tmp_path, seconds):
+    """Armed, ramping, running, at the end, and while it is being ramped out."""
+    test = session("imposed")
+    card, device = on_virtual_card(test)
+    at = device.tick + round(1000 * (seconds + 1.1))
+    outputs = []
+
+    def stop() -> str | None:
+        outputs.append((device.tick, float(device.outputs[0]), device.pressure))
+        return "stopped by the operator: test" if device.tick >= at else None
+
+    ended = record_at_leisure(card, test, tmp_path / "r.mcap", stop)
+    assert ended.cause.name == "operator"
+    assert states(tmp_path / "r.mcap")[-2:] == ["stopping", "stopped"]
+    assert device.outputs[0] == 0.0
+    assert not device.pressure
+    last_driven = max((tick for tick, volts, _ in outputs if volts != 0.0), default=0)
+    assert last_driven <= at
+
+
+def test_signals_files_and_nothing_else_stop(tmp_path):
+    file = tmp_path / "stop"
+    before = signal.getsignal(signal.SIGTERM)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        with stop_requests(file) as asked:
+            assert asked() is None
+            os.kill(os.getpid(), number)
+            assert signal.Signals(number).name in (asked() or "")
+    with stop_requests(file) as asked:
+        file.touch()
+        assert str(file) in (asked() or "")
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_any_key_stops():
+    import pty
+    import subprocess
+    import sys
+
+    main, other = pty.openpty()
+    code = (
+        "import time\nfrom rigtwin.session.stops import stop_requests\n"
+        "with stop_requests() as asked:\n print('ready', flush=True)\n"
+        " while asked() is None: time.sleep(0.01)\n print(asked.__name__, 'stopped', flush=True)\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=other, stdout=subprocess.PIPE, text=True, start_new_session=True,
+        preexec_fn=lambda: __import__("fcntl").ioctl(0, __import__("termios").TIOCSCTTY, 0),
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert "ready" in process.stdout.readline()
+    os.write(main, b"x")
+    assert "stopped" in process.stdout.readline()
+    process.wait(10)
+
+
+def test_a_rig_that_is_out_of_its_limits_is_not_armed(tmp_path):
+    test = session("imposed")
+    wrong = TABLE.inputs[1]._replace(scaling=TABLE.inputs[1].scaling._replace(offset=-0.14))
+    wired = replace(test, table=replace(TABLE, inputs=(TABLE.inputs[0], wrong, *TABLE.inputs[2:])))
+    card, device = on_virtual_card(test, wired.terminals())
+    with pytest.raises(RigtwinError, match=r"structure_lvdt is .*; arming needs it within 0\.135"):
+        record_at_leisure(card, test, tmp_path / "r.mcap")
+    assert states(tmp_path / "r.mcap") == ["faulted"]
+    assert device.outputs[0] == 0.0
+    assert not device.pressure
+
+
+def test_limits_of_the_card_reach_the_session():
+    assert session("imposed").limited.safety.stuck == 7.0
+    with pytest.raises(RigtwinError, match="range too small"):
+        _ = session("single-mass-road").limited
+
+
+# Faults
+
+
+@pytest.mark.parametrize("kind", HERE, ids=lambda kind: kind.name)
+def test_every_kind_of_fault_stops_the_rig(tmp_path, kind):
+    for fault in drawn(2, 11, [kind]):
+        outcome = tried(fault, TABLE, tmp_path)
+        assert outcome.passed, outcome
+
+
+@pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="Linux")
+def test_a_dead_controller_process_is_stopped_for(tmp_path):
+    [fault] = drawn(1, 3, APART)
+    outcome = tried_apart(replace(fault, at=1300 + fault.at % 500), TABLE, tmp_path)
+    assert (outcome.cause, outcome.right, outcome.readable) == ("process", True, True)
+    assert outcome.exceeded <= 1.1
+    # In ticks of a card whose clock is slowed; a busy computer may add to them.
+    assert outcome.late is not None
+
+
+def test_every_cause_of_a_kind_is_one_that_can_be_said():
+    said = {trip.name.lower() for trip in Trip} | {"card", "controller", "late", "operator", "process", "recording"}
+    assert all(set(kind.causes) <= said for kind in KINDS)
+
+
+class Hopeless:
+    """A rig whose writes fail for good once the test has begun."""
+
+    missed, late = 0, 0.0
+
+    def __init__(self, rig: WiredTwin) -> None:
+        self._rig, self.ticks, self.stopped = rig, 0, 0
+
+    def start(self) -> None:
+        self._rig.start()
+
+    def read(self) -> Measurements:
+        self.ticks += 1
+        return self._rig.read()
+
+    def write(self, commands) -> None:
+        if self.ticks > 1500:
+            raise OSError("gone")
+        self._rig.write(commands)
+
+    def pressure(self, on: bool) -> None:
+        self._rig.pressure(on)
+
+    def stop(self) -> None:
+        self.stopped += 1
+        self._rig.stop()
+
+
+def test_a_rig_that_takes_no_output_any_more_is_stopped_its_own_way(tmp_path):
+    test = session("drop")
+    rig = Hopeless(WiredTwin(test.terminals(), TABLE))
+    ended = record_at_leisure(rig, test, tmp_path / "r.mcap")
+    assert ended.cause == Cause("rig", "OSError: gone")
+    assert rig.stopped >= 1
+    assert last_words(tmp_path / "r.mcap") == ("rig", "OSError: gone")
+    assert states(tmp_path / "r.mcap")[-1] == "faulted"
+
+
+def test_lateness_of_a_recording():
+    from rigtwin.realtime import EDGES, Lateness
+
+    lateness = Lateness(10)
+    for late in (1e-7, 3e-6, 2e-3, 0.2):
+        lateness.add(late, 5e-5)
+    lateness.missed = 3
+    record = lateness.record("FIFO scheduling: granted")
+    histogram = json.loads(record["histogram"])
+    assert sum(histogram["counts"]) == 4
+    assert len(histogram["counts"]) == len(EDGES) + 1
+    assert histogram["counts"][0] == histogram["counts"][-1] == 1
+    assert (record["missed"], record["ticks"], float(record["late_max"])) == ("3", "4", 0.2)
