@@ -43,7 +43,7 @@ class Plausible(NamedTuple):
     """What living sensors of one rig cannot do; see rigtwin.safety. stuck: same readings in a row. Greatest seen on the twin
     in all experiments: 4 readings, 9.5 mm, 34 N."""
 
-    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "repeats by chance once in 20 000 tests of 45 s")] = 7.0
+    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "by chance in none of 1800 simulated tests of 45 s")] = 7.0
     wheel: Annotated[float, Quantity("m", 1e-4, 1e9, "twice what the tyre gives in the experiments")] = 0.02
     motor: Annotated[float, Quantity("N", 1.0, 1e9, "3 times friction, hum and noise in the experiments")] = 100.0
 
