@@ -70,7 +70,7 @@ def _run_supervised(parsed: Namespace, path: Path) -> int:
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
         raise RigtwinError("--live goes with a session in real time: --real-time, or --target daq without --dry-run")
-    writable(path)
+    writable(apart(path, *(given for given in (parsed.card, parsed.config) if given is not None)))
     return work(parsed, test_of(parsed, parsed.name), path)
 
 

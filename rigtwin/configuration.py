@@ -32,14 +32,14 @@ class Safety(NamedTuple):
     lvdt_rate: Annotated[float, Quantity("m/s", 1e-3, 1e3, "change of an LVDT in a tick; 3 times the experiments'")] = 2.0
     force_rate: Annotated[float, Quantity("N/s", 1.0, 1e9, "change of the load cell in a tick; 3 times the experiments'")] = 3e5
     command_rate: Annotated[float, Quantity("m/s", 1e-3, 1e3, "position commands; 7 times what the cylinders follow")] = 2.0
-    voltage_rate: Annotated[float, Quantity("V/s", 1.0, 1e6, "half the motor's range in a tick of 1 ms")] = 1e4
+    voltage_rate: Annotated[float, Quantity("V/s", 1.0, 1e6, "4 times the experiments'; less than force_rate shows")] = 2500.0
     following: Annotated[float, Quantity("m", 1e-4, 100.0, "cylinder off its command; 1.6 times the experiments'")] = 0.06
     following_force: Annotated[float, Quantity("N", 1.0, 1e8, "load cell off its demand; 2.6 times the experiments'")] = 400.0
     stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "same reading in a row; a card's channel table says how many")] = 1e9
     wheel: Annotated[float, Quantity("m", 1e-4, 1e9, "wheel off the ground plate; a card's channel table says")] = 1e9
     motor: Annotated[float, Quantity("N", 1.0, 1e9, "load cell off the voltage's force; a card's channel table says")] = 1e9
     hysteresis: Annotated[float, Quantity("1", 0.0, 0.9, "share of a limit to be back inside before arming")] = 0.1
-    missed: Annotated[float, Quantity("tick", 0.0, 1e6, "that may be missed in a row")] = 3.0
+    missed: Annotated[float, Quantity("tick", 0.0, 1e6, "that may be missed in a row; a fifth of all")] = 3.0
     ramp: Annotated[float, Quantity("s", 0.05, 600.0, "cosine to the start of a test and back")] = 2.0
     hold: Annotated[float, Quantity("s", 0.0, 600.0, "cylinders hold after a stop before pressure is taken off")] = 0.5
 

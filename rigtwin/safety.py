@@ -178,7 +178,8 @@ def held(limits: Safety, commands: Commands) -> Commands:
 
 def beyond(limits: Safety, measured: Measurements) -> bool:
     """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
-    return not (abs(measured.ground_lvdt) <= limits.ground and abs(measured.structure_lvdt) <= limits.structure)
+    ground, structure = abs(measured.ground_lvdt) <= limits.ground, abs(measured.structure_lvdt) <= limits.structure
+    return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
 def within(limits: Safety, measured: Measurements) -> str | None:

@@ -30,6 +30,12 @@ ARMED = 0.1
 SETTLING = 0.3
 """s at the start position between the ramp and the test."""
 
+OFTEN, MOST_MISSED = 0.005, 0.2
+"""Share by which a tick enters the average of ticks missed, and what that may be: one in five, over some 200."""
+NOT_HELD = ("following", "structure", "ground", "travel", "velocity", "wheel")
+"""Causes after which cylinders are not held under pressure: one of them may be what is wrong."""
+UNREAD = Measurements(math.nan, math.nan, math.nan, math.nan)
+
 Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Commands]]
 
 
@@ -45,6 +51,10 @@ class Recorder(Protocol):
         ...
 
     def transition(self, transition: Transition) -> None: ...
+
+    def ready(self) -> None:
+        """Called when the rig's lines are there and nothing moves yet. Raises RigtwinError if the session must not begin."""
+        ...
 
     def beat(self, ground: float, structure: float) -> None:
         """Called once a tick: the loop is alive, and holds the cylinders there, m."""
@@ -106,6 +116,7 @@ class _Session:
         self._clock = -round(sum(self._before) / self._period)
         self._held, self._pressure = Commands(0.0, 0.0, 0.0, 0.0), False
         self._told = self._done_before = 0
+        self._behind = 0.0
         self._done, self._peaks = 0, [0.0] * 5
 
     @staticmethod
@@ -117,30 +128,37 @@ class _Session:
         return Commands(ground, structure, force, force / MOTOR_CONSTANT)
 
     @property
+    def _elapsed(self) -> float:
+        """s since the tick before, of which some may have been missed."""
+        return (1 + self._rig.missed) * self._period
+
+    @property
     def _time(self) -> float:
         return self._clock * self._period
 
     def run(self) -> Ended:
         """The way through all states; every step of it ends in `_come_to_rest`."""
         rig, recorder = self._rig, self._recorder
-        rig.start()
         try:
-            rest = self._look()
-            rig.pressure(True)
-        except BaseException as error:
-            rig.stop()
-            self._supervisor.go(Phase.FAULTED, _cause_of(error), self._time)
-            raise
-        self._pressure = True
-        try:
-            cause = self._move(rest)
-        except BaseException as error:
-            cause = self._halt(_cause_of(error), None)
-        try:
+            try:
+                rig.start()
+                recorder.ready()
+                rest = self._look()
+            except BaseException as error:
+                rig.stop()
+                self._supervisor.go(Phase.FAULTED, _cause_of(error), self._time)
+                raise
+            try:
+                cause = self._move(rest)
+            except BaseException as error:
+                cause = self._halt(_cause_of(error))
             self._come_to_rest(cause, rest)
         finally:
             rig.stop()
+            if self._supervisor.phase == Phase.STOPPING:
+                self._supervisor.go(Phase.FAULTED, Cause("rig", "cut short while it was coming to rest"), self._time)
             recorder.flush()
+            self._progress(self._done - self._done_before)
         names = (*Measurements._fields, "voltage")
         transitions = tuple(self._supervisor.transitions)
         return Ended(transitions[-1].cause, self._done, transitions, dict(zip(names, self._peaks, strict=True)))
@@ -157,13 +175,12 @@ class _Session:
         for _ in range(max(round(LOOKING / self._period), 1)):
             self._rig.write(rest)
             cause = self._faulty(measured)
-            number, column = commanded_wrong(self._limits, self._period, self._watch, measured, rest)
+            number, column = commanded_wrong(self._limits, self._elapsed, self._watch, measured, rest)
             if number != Trip.NONE:
                 cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
             self._row(measured, rest)
-            self._clock += 1
             measured = self._rig.read()
         return rest
 
@@ -172,6 +189,8 @@ class _Session:
         self._supervisor.go(
             Phase.ARMED, Cause("operator", "every sensor lives and is within its limit", fault=False), self._time
         )
+        self._pressure = True
+        self._rig.pressure(True)
         for _ in range(round(ARMED / self._period)):
             cause = self._tick(lambda _: rest)
             if cause is not None:
@@ -186,6 +205,7 @@ class _Session:
             cause = self._tick(lambda _: self._target)
             if cause is not None:
                 return cause
+        self._clock = 0
         self._supervisor.go(Phase.RUNNING, Cause("test", "at the start; the test begins", fault=False), self._time)
         while self._clock < len(self._demands):
             cause = self._tick(self._control)
@@ -205,7 +225,7 @@ class _Session:
         try:
             measured = self._rig.read()
         except Exception as error:
-            return self._halt(_cause_of(error), None)
+            return self._halt(_cause_of(error))
         begun = monotonic()
         self._clock += self._rig.missed
         if self._lateness is not None:
@@ -217,22 +237,21 @@ class _Session:
         if cause is None:
             try:
                 commands = command(measured)
+                number, column = commanded_wrong(self._limits, self._elapsed, self._watch, measured, commands)
+                if number != Trip.NONE:
+                    cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
             except Exception as error:
+                commands = self._held
                 cause = Cause("controller", f"the controller failed: {type(error).__name__}: {_line(error)}")
-        if cause is None:
-            number, column = commanded_wrong(self._limits, self._period, self._watch, measured, commands)
-            if number != Trip.NONE:
-                cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+        tick = float(self._clock) if running else math.nan
         if cause is not None:
-            self._note(measured, commands, running)
-            return self._halt(cause, measured)
+            return self._halt(cause, measured, commands, tick)
         try:
             self._rig.write(commands)
         except Exception as error:
-            return self._halt(_cause_of(error), measured)
+            return self._halt(_cause_of(error), measured, commands, tick)
         self._held = commands
-        self._note(measured, commands, running)
-        self._clock += 1
+        self._row(measured, commands, tick)
         if self._lateness is not None:
             self._lateness.add(getattr(self._rig, "late", 0.0), monotonic() - begun)
         return None
@@ -240,28 +259,36 @@ class _Session:
     def _faulty(self, measured: Measurements) -> Cause | None:
         """What is wrong besides the commands."""
         self._recorder.beat(self._held.ground, self._held.structure)
-        number, column = sensed_wrong(self._limits, self._period, self._watch, measured)
-        if number != Trip.NONE:
-            return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+        number, column = sensed_wrong(self._limits, self._elapsed, self._watch, measured)
         missed = self._rig.missed
         if missed > self._limits.missed:
             return Cause("late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be")
+        self._behind += OFTEN * (missed / (1.0 + missed) - self._behind)
+        if self._behind > MOST_MISSED:
+            return Cause("late", f"of the last ticks {100 * self._behind:.0f} % were missed; the loop cannot keep the pace")
+        if number != Trip.NONE:
+            return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
         fault = self._recorder.fault
         if fault is not None:
             return Cause("recording", fault)
         asked = self._stop()
         return Cause("operator", asked, fault=False) if asked is not None else None
 
-    def _halt(self, cause: Cause, measured: Measurements | None) -> Cause:
-        """Outputs to the stop state, now: no force, cylinders where they were last told to be."""
+    def _halt(
+        self,
+        cause: Cause,
+        measured: Measurements = UNREAD,
+        commands: Commands | None = None,
+        tick: float = math.nan,
+    ) -> Cause:
+        """Outputs to the stop state, now: no force, cylinders where they were last told to be. Then it is noted."""
         self._held = held(self._limits, self._held)
         try:
             self._rig.write(self._held)
         except Exception:
             self._pressure = False
             self._rig.stop()
-        self._row(measured if measured is not None else Measurements(*[math.nan] * 4), self._held)
-        self._clock += 1
+        self._row(measured, commands or self._held, tick)
         return cause
 
     def _come_to_rest(self, cause: Cause, rest: Commands) -> None:
@@ -270,11 +297,15 @@ class _Session:
         if cause == COMPLETED:
             later = self._ramp_out(rest)
             cause = later or cause
-        for _ in range(round(self._limits.hold / self._period)):
+        for _ in range(0 if cause.name in NOT_HELD else round(self._limits.hold / self._period)):
             if not self._pressure or not self._holding():
                 break
+        try:
+            self._rig.pressure(False)
+        except Exception:
+            self._rig.stop()
         self._pressure = False
-        self._rig.stop()
+        # Nothing is left that could move: giving the card back may take its time.
         self._supervisor.go(Phase.FAULTED if cause.fault else Phase.STOPPED, cause, self._time)
 
     def _ramp_out(self, rest: Commands) -> Cause | None:
@@ -297,21 +328,19 @@ class _Session:
         self._recorder.beat(self._held.ground, self._held.structure)
         self._clock += self._rig.missed
         self._row(measured, self._held)
-        self._clock += 1
         return not beyond(self._limits, measured)
 
-    def _note(self, measured: Measurements, commands: Commands, running: bool) -> None:
-        self._row(measured, commands, float(self._clock) if running else math.nan)
-        for place, value in enumerate((*measured, commands.voltage)):
-            if abs(value) > self._peaks[place]:
-                self._peaks[place] = abs(value)
-        self._done += running
-
     def _row(self, measured: Measurements, commands: Commands, tick: float = math.nan) -> None:
+        """Notes a tick, which is over with that. tick: its number in the test, if it is of the test."""
         held, rig = self._held, self._rig
         written = (held.ground, held.structure, held.voltage, float(self._pressure))
         late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)
         self._recorder.tick((self._time, phase, *written, *measured, late, float(rig.missed), *commands, tick))
+        for place, value in enumerate((*measured, commands.voltage)):
+            if abs(value) > self._peaks[place]:
+                self._peaks[place] = abs(value)
+        self._done += not math.isnan(tick)
+        self._clock += 1
         self._told += 1
         if self._told % BLOCK == 0:
             self._progress(self._done - self._done_before)

@@ -52,8 +52,8 @@ def test_each_limit(measured, commands, trip, where):
         (REST._replace(suspension_lvdt=0.0021), STILL, Trip.JUMP, "suspension_lvdt"),
         (REST._replace(load_cell=501.0), STILL._replace(force=501.0), Trip.JUMP, "load_cell"),
         (REST, STILL._replace(structure=-0.0061), Trip.COMMAND_RATE, "command structure"),
-        (REST, STILL._replace(voltage=-9.0), Trip.COMMAND_RATE, "command voltage"),
-        (REST._replace(suspension_lvdt=0.0019), STILL._replace(voltage=9.0), Trip.NONE, "ground_lvdt"),
+        (REST, STILL._replace(voltage=-1.5), Trip.COMMAND_RATE, "command voltage"),
+        (REST._replace(suspension_lvdt=0.0019), STILL._replace(voltage=3.5), Trip.NONE, "ground_lvdt"),
     ],
 )
 def test_limits_on_what_a_tick_may_change(measured, commands, trip, where):

@@ -62,7 +62,9 @@ def connected(address: str) -> grpc.Channel | None:
         import grpc
     except ImportError:
         raise CardFault(PACKAGE) from None
-    return grpc.insecure_channel(address)
+    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have no end of their own.
+    alive = (("grpc.keepalive_time_ms", 1000), ("grpc.keepalive_timeout_ms", 1000), ("grpc.http2.max_pings_without_data", 0))
+    return grpc.insecure_channel(address, options=alive)
 
 
 class Card:
@@ -109,6 +111,8 @@ class Card:
                 "inputs": [channel.name for channel in device.ai_physical_chans],
                 "outputs": [channel.name for channel in device.ao_physical_chans],
             }
+            if table.physical(table.pressure) not in [line.name for line in device.do_lines]:
+                raise CardFault(f"card.pressure: {device.product_type} has no line {table.pressure}")
             ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
             for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
                 for line in lines:
@@ -197,19 +201,34 @@ class Card:
             self._pressure.write_one_sample_one_line(on)
 
     def stop(self) -> None:
-        """Motor to zero, pressure off, the card's lines given back. Never raises: there is nobody left to hear it."""
+        """Motor to zero, pressure off, the card's lines given back; a card that takes no output any more is reset, which sets
+        them to zero. Never raises: there is nobody left to hear it."""
         if len(self._tasks) == 3:
             self._commands[:] = 0.0, 0.0, 0.0
             to_volts(self._outputs, self._commands, self._commands)
             self._asked[2] = self._commands[2]
-            with suppress(Exception):
+            refused = False
+            try:
                 self._writer.write_one_sample(self._asked)
-            with suppress(Exception):
+            except Exception:
+                refused = True
+            try:
                 self._pressure.write_one_sample_one_line(False)
+            except Exception:
+                refused = True
+            if refused:
+                with suppress(Exception):
+                    self._device().reset_device()
         for task in self._tasks:
             with suppress(Exception):
                 task.close()
         self._tasks = []
+
+    def _device(self) -> Any:
+        from nidaqmx.system import System
+
+        options = self._options("")
+        return (System.local() if options is None else System.remote(options)).devices[self._table.device]
 
     def _options(self, name: str) -> Any:
         if self._channel is None:
@@ -227,22 +246,3 @@ class Card:
                 raise error
         self._tasks.append(task)
         return task
-
-
-def release(table: ChannelTable, channel: grpc.Channel) -> int:
-    """Ends the tasks that a program which died has left on a gRPC device server, after taking the pressure off; returns how
-    many there were. Raises CardFault."""
-    from nidaqmx import Task
-    from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
-    from nidaqmx.stream_writers import DigitalSingleChannelWriter
-
-    attach, ended = SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION, 0
-    for name in (PRESSURE, OUTPUTS, INPUTS):
-        with suppress(CardFault), translated(f"card {table.device}"):
-            task = Task(name, grpc_options=GrpcSessionOptions(channel, name, initialization_behavior=attach))
-            if name == PRESSURE:
-                DigitalSingleChannelWriter(task.out_stream).write_one_sample_one_line(False)
-            task.stop()
-            task.close()
-            ended += 1
-    return ended

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,18 +17,22 @@ from rigtwin.configuration import Configuration
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
 from rigtwin.daq.calibration import FORCE, at_rest, bumps, dated, responses, signed, spanned, zeroed
-from rigtwin.daq.card import Card, connected, release
-from rigtwin.daq.table import OUTPUTS, ChannelTable, fit, load_table, written
+from rigtwin.daq.card import Card, connected
+from rigtwin.daq.last_resort import release
+from rigtwin.daq.table import OUTPUTS, ChannelTable, Plausible, fit, load_table, written
 from rigtwin.daq.terminals import Terminals
 from rigtwin.daq.virtual import OnDemand, RealTime, VirtualCard
 from rigtwin.effects import applied
 from rigtwin.errors import RigtwinError
 from rigtwin.realtime import Pacer
-from rigtwin.recording import Writer, load
-from rigtwin.session.recorder import Keeper
+from rigtwin.recording import load
+from rigtwin.session.record import Test, record_at_leisure, record_in_real_time
 from rigtwin.session.stops import stop_requests
-from rigtwin.supervised import supervise
 from rigtwin.supervisor import COMPLETED
+
+PORTS = 65535
+LEAST_STROKE, MOST_STROKE = 0.001, 0.02
+"""m that a plate is moved to see its sign: well above noise, well within any rig."""
 
 
 def serve(parsed: Namespace) -> int:
@@ -35,6 +40,8 @@ def serve(parsed: Namespace) -> int:
     from rigtwin.daq.transport import LOCAL
     from rigtwin.daq.transport import serve as listen
 
+    if parsed.seed < 0 or not 0 <= parsed.port <= PORTS:
+        raise RigtwinError(f"--seed: expected 0 or more; --port: 0 to {PORTS}")
     table = load_table(parsed.card)
     configuration = configured(Configuration(), parsed)
     terminals = Terminals(applied(configuration, parsed.effect), table, parsed.seed)
@@ -59,10 +66,10 @@ def serve(parsed: Namespace) -> int:
 def free(parsed: Namespace) -> int:
     """Frees what a program that died has left on a gRPC device server."""
     table = load_table(parsed.card)
-    channel = connected(table.address)
-    if channel is None:
+    if not table.address:
         raise RigtwinError("card.address is empty: the driver of this computer frees a dead program's lines by itself")
-    print(f"{release(table, channel)} tasks ended, pressure off")
+    left = release(table)
+    print(f"motor at zero, pressure off; {'what a dead program had is free' if left else 'nothing had been left'}")
     return 0
 
 
@@ -74,11 +81,15 @@ def check(parsed: Namespace) -> int:
     if not parsed.operator.strip():
         raise RigtwinError("--operator is empty: expected who calibrates")
     spans, references = _named(parsed.span, "--span", table), _named(parsed.reference, "--reference", table)
+    if not LEAST_STROKE <= parsed.stroke <= MOST_STROKE:
+        raise RigtwinError(f"--stroke {parsed.stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
+    told = _told(parsed.moved)
+    fit(table, Configuration().safety)
     if not (parsed.signs or parsed.zero or spans):
         raise RigtwinError("nothing to do: --zero, --span NAME=VALUE or --signs")
     wiring = load_table(parsed.virtual) if parsed.virtual is not None else None
     if parsed.signs:
-        table = _signs(table, wiring, parsed)
+        table = _signs(table, wiring, parsed, told)
     if parsed.zero or spans:
         rig = _rig(table, wiring)
         rig.start()
@@ -134,37 +145,49 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     return card
 
 
-def _signs(table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace) -> ChannelTable:
+def _signs(table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace, told: Mapping[str, int]) -> ChannelTable:
     """Moves every output a little, under supervision, and turns the signs that are wrong."""
     if wiring is None and not parsed.arm:
         _ask("the check moves ground, structure and motor a little; everybody clear? type arm to go: ", ("arm",))
     rig = _rig(table, wiring)
     configuration, demands = bumps(parsed.stroke, FORCE, Configuration().timing.period)
     # Signals whose signs are unknown cannot be held against each other; each alone still can.
-    limits = configuration.safety._replace(stuck=table.plausible.stuck)
+    alone = replace(table, plausible=Plausible(stuck=table.plausible.stuck, wheel=1e9, motor=1e9))
+    test = Test("sign check", configuration, demands, 0, alone)
     with TemporaryDirectory(prefix="rigtwin-check-") as folder, stop_requests() as stop:
         path = Path(folder) / "check.mcap"
-        with Writer(path, "sign check", configuration.timing.period, {}) as writer:
-            ended = supervise(rig, configuration._replace(safety=limits), demands, Keeper(writer), stop)
+        if wiring is None:
+            ended = record_in_real_time(rig, test, path, stop, guarded=True)
+        else:
+            ended = record_at_leisure(rig, test, path, stop)
         if ended.cause != COMPLETED:
             raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
         recording = load(path)
+    if recording.ticks != len(demands):
+        raise RigtwinError(f"{len(demands) - recording.ticks} ticks were missed; do it again, with less else on this computer")
     measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
-    moved = {output: _went(output, table, wiring, parsed.moved) for output in OUTPUTS}
+    moved = {output: _went(output, table, wiring, told) for output in OUTPUTS}
     checked, said = signed(table, responses(measured, demands), moved)
     for line in said or ("every sign is right",):
         print(line)
     return checked
 
 
-def _went(output: str, table: ChannelTable, wiring: ChannelTable | None, told: Sequence[str]) -> int:
-    """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
-    for text in told:
+def _told(texts: Sequence[str]) -> dict[str, int]:
+    """output → which way it went, of each OUTPUT=+ or OUTPUT=-. Raises RigtwinError."""
+    told: dict[str, int] = {}
+    for text in texts:
         name, _, sign = text.partition("=")
         if name not in OUTPUTS or sign not in ("+", "-"):
             raise RigtwinError(f"--moved {text}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+")
-        if name == output:
-            return 1 if sign == "+" else -1
+        told[name] = 1 if sign == "+" else -1
+    return told
+
+
+def _went(output: str, table: ChannelTable, wiring: ChannelTable | None, told: Mapping[str, int]) -> int:
+    """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
+    if output in told:
+        return told[output]
     place = OUTPUTS.index(output)
     if wiring is not None:
         return int(table.outputs[place].scaling.sign * wiring.outputs[place].scaling.sign)
@@ -179,8 +202,11 @@ def _went(output: str, table: ChannelTable, wiring: ChannelTable | None, told: S
 def _ask(question: str, answers: tuple[str, ...]) -> str:
     if not sys.stdin.isatty():
         raise RigtwinError(f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)")
-    while (said := input(question).strip().lower()) not in answers:
-        pass
+    try:
+        while (said := input(question).strip().lower()) not in answers:
+            pass
+    except EOFError:
+        raise RigtwinError(f"not answered: {question.strip()}") from None
     return said
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.daq.card import INPUTS, OUTPUTS, PRESSURE, connected, translated
+from rigtwin.daq.card import INPUTS, OUTPUTS, PRESSURE, CardFault, connected, translated
 from rigtwin.daq.conversion import conversion, to_volts
 from rigtwin.daq.table import ChannelTable
 
@@ -25,13 +25,13 @@ class LastResort:
         self._values, self._volts = np.zeros(3), np.empty(3)
         to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
 
+        connected(table.address)  # loads the driver's client, which takes a while
+
     def prepare(self) -> None:
         """Called once the owner has its outputs. Raises CardFault."""
-        with translated(f"card {self._table.device}: watching it"):
-            if self._table.address:
+        if self._table.address:
+            with translated(f"card {self._table.device}: watching it"):
                 self._attach()
-            else:
-                import nidaqmx.stream_writers  # noqa: F401 - loading it later would cost the time that counts
 
     def force_off(self, positions: Sequence[float]) -> None:
         """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
@@ -46,6 +46,9 @@ class LastResort:
     def pressure_off(self) -> None:
         """Raises CardFault."""
         with translated(f"card {self._table.device}: taking its pressure off"):
+            if self._pressure is None:
+                self._take()
+            assert self._pressure is not None
             self._pressure.write_one_sample_one_line(False)
 
     def close(self) -> None:
@@ -55,6 +58,7 @@ class LastResort:
                 task.stop()
             with suppress(Exception):
                 task.close()
+        self._tasks, self._outputs, self._pressure = [], None, None
 
     def _attach(self) -> None:
         from nidaqmx import Task
@@ -70,7 +74,15 @@ class LastResort:
     def _take(self) -> None:
         from nidaqmx import Task
 
-        outputs, pressure = Task(f"{OUTPUTS}-again"), Task(f"{PRESSURE}-again")
+        self.close()
+        channel = connected(self._table.address)
+        names = (f"{OUTPUTS}-again", f"{PRESSURE}-again")
+        if channel is None:
+            outputs, pressure = (Task(name) for name in names)
+        else:
+            from nidaqmx.grpc_session_options import GrpcSessionOptions
+
+            outputs, pressure = (Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names)
         self._tasks = [outputs, pressure]
         for line in self._table.outputs:
             volts = line.scaling.range
@@ -85,3 +97,18 @@ class LastResort:
         self._pressure = DigitalSingleChannelWriter(self._tasks[1].out_stream)
         self._outputs.verify_array_shape = self._pressure.verify_array_shape = False
         self._outputs.auto_start = self._pressure.auto_start = not started
+
+
+def release(table: ChannelTable) -> bool:
+    """Frees what a program that died has left on a gRPC device server: motor to zero, pressure off, its tasks ended. Returns
+    whether there was anything. Raises CardFault if the outputs could not be set."""
+    resort = LastResort(table)
+    try:
+        resort.prepare()
+        left = True
+    except CardFault:
+        left = False
+    resort.pressure_off()
+    resort.force_off((0.0, 0.0))
+    resort.close()
+    return left

@@ -90,8 +90,8 @@ class ChannelTable:
         return f"{self.device}/{line}"
 
     def of(self, safety: Safety) -> Safety:
-        """The limits with what the card knows of its sensors."""
-        return safety._replace(**self.plausible._asdict())
+        """The limits with what the card knows of its sensors, or those asked for, if they are closer."""
+        return safety._replace(**{name: min(value, getattr(safety, name)) for name, value in self.plausible._asdict().items()})
 
 
 def load_table(path: Path) -> ChannelTable:

@@ -183,6 +183,7 @@ class VirtualCard:
         lists = {
             0x231E: [f"ai{n}" for n in range(32)],
             0x231F: [f"ao{n}" for n in range(4)],
+            0x2322: [f"port0/line{n}" for n in range(32)],
         }
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
@@ -204,6 +205,13 @@ class VirtualCard:
     def _known_device(self, name: str) -> None:
         if name != self._device:
             raise DriverError(NO_DEVICE, f"Device identifier is invalid. Device specified: {name}")
+
+    def _ResetDevice(self, request: Any, response: type) -> Any:
+        self._known_device(request.device_name)
+        self._tasks.clear()
+        self.outputs[:] = 0.0
+        self.pressure = False
+        return response()
 
     def _CreateTask(self, request: Any, response: type) -> Any:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"

@@ -93,7 +93,7 @@ def test_of(fault: Fault, table: ChannelTable) -> Test:
     from experiments import find
 
     experiment = find(fault.experiment)
-    changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP, "hold": 0.2}}
+    changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
     configuration = overridden(experiment.configuration, changes)
     return Test(fault.experiment, configuration, experiment.demands(configuration, fault.seed), fault.seed, table)
 

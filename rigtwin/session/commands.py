@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from rigtwin.cli import CARD
 from rigtwin.console import table
+from rigtwin.daq.card import Card
 from rigtwin.daq.table import load_table, trusted
 from rigtwin.daq.terminals import InRealTime, WiredTwin
 from rigtwin.errors import RigtwinError
@@ -22,6 +23,8 @@ from rigtwin.session.record import Test, on_card, on_virtual_card, record_at_lei
 from rigtwin.session.stops import stop_requests
 from rigtwin.supervised import Ended
 from rigtwin.supervisor import COMPLETED
+
+PORTS = 65535
 
 
 def run(parsed: Namespace, test: Test, path: Path) -> int:
@@ -80,7 +83,9 @@ def _key(test: Test) -> str:
     return digest(test.experiment, test.configuration, test.demands, test.table)
 
 
-def _on_the_rig(parsed: Namespace, test: Test, path: Path) -> int:
+def permitted(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
+    """The card, on which nothing has moved yet, and what the recording has to say of it. Raises RigtwinError if the test must not
+    be run on the rig."""
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     trusted(test.table, date.today())
@@ -94,6 +99,11 @@ def _on_the_rig(parsed: Namespace, test: Test, path: Path) -> int:
                 "(or say who answers for it: --without-dry-run NAME)"
             )
         notes.append(("rigtwin.override", {"dry run": f"left out by {parsed.without_dry_run}"}))
+    return card, notes
+
+
+def _on_the_rig(parsed: Namespace, test: Test, path: Path) -> int:
+    card, notes = permitted(parsed, test)
     for lacking in machine_lacks():
         print(f"this computer lacks {lacking}")
     if not parsed.arm and not _armed_by_hand(test):
@@ -108,7 +118,10 @@ def _armed_by_hand(test: Test) -> bool:
     if not sys.stdin.isatty():
         raise RigtwinError("no terminal to ask for arming; say --arm if everybody is clear of the rig")
     print(f"{test.experiment} on card {test.table.device}. Any key stops it. Everybody clear of the rig?")
-    return input("type arm to go: ").strip() == "arm"
+    try:
+        return input("type arm to go: ").strip() == "arm"
+    except EOFError:
+        return False
 
 
 def _bar(test: Test) -> tqdm:
@@ -131,6 +144,8 @@ def test_of(parsed: Namespace, name: str) -> Test:
     from experiments import find
     from rigtwin.console import configured
 
+    if not 0 <= parsed.live <= PORTS:
+        raise RigtwinError(f"--live {parsed.live}: expected a port up to {PORTS}")
     experiment = find(name)
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import select
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -31,11 +32,15 @@ LOOK = 2.5e-4
 """s between two looks at the loop."""
 STARTED = 30.0
 """s within which the guardian must be there."""
+GONE = 1.0
+"""s within which a killed process must be gone."""
 RING = 8192
 """Ticks that the shared memory holds for the recording: seconds of them."""
-_BEAT, _GROUND, _STRUCTURE, _WATCHED, _WRITTEN, _READ, _NUMBERS = range(7)
+ABSENT = 1.0
+"""s after which a guardian that does not look any more is missed."""
+_BEAT, _GROUND, _STRUCTURE, _WATCHED, _WRITTEN, _READ, _PREPARED, _ALIVE, _NUMBERS = range(9)
 """Numbers in the shared memory, before the ticks: time of the last tick, positions held, whether there is anything to watch,
-ticks written by the loop and read by the guardian."""
+ticks written by the loop and read by the guardian, whether it could stop the rig, when it last looked."""
 
 
 def _parts(memory: Any) -> tuple[Array, Array]:
@@ -86,8 +91,10 @@ class Guardian:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def beat(self, ground: float, structure: float) -> None:
-        shared = self._shared
-        shared[_GROUND], shared[_STRUCTURE], shared[_BEAT] = ground, structure, time.monotonic()
+        shared, now = self._shared, time.monotonic()
+        shared[_GROUND], shared[_STRUCTURE], shared[_BEAT] = ground, structure, now
+        if now - shared[_ALIVE] > ABSENT:
+            self.fault = self.fault or "the guardian process does not answer any more"
 
     def tick(self, row: tuple[float, ...]) -> None:
         written = int(self._shared[_WRITTEN])
@@ -100,10 +107,17 @@ class Guardian:
     def flush(self) -> None:
         """The other process writes by itself."""
 
+    def ready(self) -> None:
+        self._send("prepare")
+        end = monotonic() + STARTED
+        while self._shared[_PREPARED] == 0.0 and self.fault is None and monotonic() < end:
+            time.sleep(1e-3)
+        if self._shared[_PREPARED] == 0.0:
+            raise RigtwinError(self.fault or "the guardian process does not answer")
+
     def transition(self, transition: Transition) -> None:
         if transition.after in self._watched.phases and self._shared[_WATCHED] == 0.0:
             self._shared[_BEAT] = time.monotonic()
-            self._send("prepare")
             self._shared[_WATCHED] = 1.0
         self._send("transition", transition)
         if transition.after not in self._watched.phases:
@@ -145,7 +159,12 @@ class Guardian:
 
 def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
     """The other process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the operator's Ctrl-C is the loop's to answer
+    # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
+    with suppress(OSError, AttributeError):
+        os.setsid()
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
     shared, ring = _parts(memory)
     from rigtwin.recording import Writer
 
@@ -155,11 +174,12 @@ def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
         for name, values in watched.metadata.items():
             writer.add_metadata(name, values)
         view = _live(watched)
+        keeping = _Keeping(writer, pipe, watched, view, shared, ring)
+        keeping.make_ready()
     except RigtwinError as error:
         pipe.send(str(error))
         return
-    keeping = _Keeping(writer, pipe, watched, view, shared, ring)
-    keeping.make_ready()
+    shared[_ALIVE] = monotonic()
     thread = threading.Thread(target=keeping.work, daemon=True)
     thread.start()
     with suppress(OSError, AttributeError):
@@ -186,6 +206,7 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
     handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
     try:
         while not keeping.done.is_set():
+            shared[_ALIVE] = monotonic()
             if handle is not None:
                 dead = bool(select.select([handle], [], [], LOOK)[0])
             else:
@@ -193,9 +214,12 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
                 dead = os.getppid() != owner
             if dead:
                 return Cause("process", "the controller process died") if shared[_WATCHED] else None
-            if shared[_WATCHED] and monotonic() - shared[_BEAT] > watched.patience:
+            if watched.table is not None and shared[_WATCHED] and monotonic() - shared[_BEAT] > watched.patience:
                 with suppress(ProcessLookupError):
                     os.kill(owner, signal.SIGKILL)
+                if handle is not None and not watched.table.address:
+                    # A driver on this computer keeps the lines until the process is gone altogether.
+                    select.select([handle], [], [], GONE)
                 waited = f"{1e3 * watched.patience:.3g} ms"
                 return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
         return None
@@ -266,6 +290,8 @@ class _Keeping:
                 self._resort.prepare()
             except RigtwinError as error:
                 self._pipe.send(str(error))
+                return
+        self._shared[_PREPARED] = 1.0
 
     def _transition(self, transition: Transition) -> None:
         self._last = transition
@@ -282,15 +308,17 @@ class _Keeping:
     def stop_rig(self, cause: Cause, shared: Array) -> None:
         """Force off now, pressure off after the hold."""
         said = cause.reason
-        if self._resort is not None:
-            try:
-                self._resort.force_off((shared[_GROUND], shared[_STRUCTURE]))
+        resort = self._resort
+        if resort is not None:
+            failed = _tried_often(lambda: resort.force_off((shared[_GROUND], shared[_STRUCTURE])))
+            if failed is None:
                 time.sleep(self._watched.hold)
-                self._resort.pressure_off()
-            except RigtwinError as error:
-                said = f"{said}; and {error}: stop the rig by hand"
-            self._resort.close()
+            failed = _tried_often(resort.pressure_off) or failed
+            if failed is not None:
+                said = f"{said}; and {failed}: stop the rig by hand"
+            resort.close()
         self._cause = Cause(cause.name, said)
+        print(f"rigtwin: {said}", file=sys.stderr, flush=True)
 
     def finish(self, died: Cause | None) -> None:
         """Closes the recording with what it has to say."""
@@ -298,9 +326,27 @@ class _Keeping:
             self._writer.finish(self._reason or "the loop ended without a word")
             return
         before = self._last.after if self._last is not None else Phase.IDLE
-        cause = self._cause
+        cause, now = self._cause, self._time if self._last is None else max(self._time, self._last.time)
         if before != Phase.STOPPING:
-            self._keeper.transition(Transition(self._time, before, Phase.STOPPING, cause))
-        self._keeper.transition(Transition(self._time, Phase.STOPPING, Phase.FAULTED, cause))
+            self._keeper.transition(Transition(now, before, Phase.STOPPING, cause))
+        self._keeper.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))
         with suppress(RigtwinError):
             self._writer.finish(cause.reason)
+
+
+def _tried_often(act: Callable[[], None]) -> str | None:
+    """What is wrong with it after some tries, or None."""
+    failed = None
+    for _ in range(TRIES):
+        try:
+            act()
+        except RigtwinError as error:
+            failed = str(error)
+            time.sleep(0.02)
+        else:
+            return None
+    return failed
+
+
+TRIES = 25
+"""Of a call that has to succeed: half a second of them."""

@@ -23,7 +23,7 @@ def live_view(port: int) -> Callable[[str, Array], None]:
         raise RigtwinError("the foxglove-sdk package is missing; pip install 'rigtwin[live]'") from None
     try:
         server = foxglove.start_server(name="rigtwin", host=HOST, port=port)
-    except RuntimeError as error:
+    except (RuntimeError, OverflowError) as error:
         raise RigtwinError(f"no live view on port {port}: {error}") from None
     channels: dict[str, Any] = {"server": server}
 

@@ -12,7 +12,7 @@ from typing import Any
 from rigtwin.configuration import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
-from rigtwin.session.commands import run, test_of
+from rigtwin.session.commands import permitted, run, test_of
 
 LONGEST = 3600.0
 """s of a pause."""
@@ -40,6 +40,8 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
     found: list[Planned] = []
     for number, test in enumerate(tests, start=1):
         where = f"test {number}"
+        if not isinstance(test, Mapping):
+            raise RigtwinError(f"{where} = {test!r}; expected a table, [[test]]")
         for key in test:
             if key not in ("experiment", "name", "seed", "pause", "set"):
                 raise RigtwinError(f"{where}: unknown {key!r}; there are experiment, name, seed, pause, set")
@@ -55,7 +57,7 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
         if not isinstance(settings, Mapping):
             raise RigtwinError(f"{where}: set = {settings!r}; expected a table of settings")
         name = test.get("name", f"{number:02d}-{experiment}-{seed}")
-        if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith("."):
+        if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
             raise RigtwinError(f"{where}: name = {name!r}; expected what a file can be called")
         if name in (other.name for other in found):
             raise RigtwinError(f"{where}: name {name!r} is another test's; expected one of its own")
@@ -83,7 +85,8 @@ def session(parsed: Namespace) -> int:
         parsed.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RigtwinError(f"cannot make {parsed.folder}: {error.strerror}") from None
-    todo = [test for test in tests if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap"))]
+    real = parsed.target == "daq" and not parsed.dry_run
+    todo = [test for test in tests if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap", real))]
     taken = [test.name for test in todo if (parsed.folder / f"{test.name}.mcap").exists()]
     if taken and not parsed.resume:
         raise RigtwinError(f"{parsed.folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder")
@@ -91,6 +94,8 @@ def session(parsed: Namespace) -> int:
     ready = [(test, test_of(_of(parsed, test), test.experiment)) for test in todo]
     for _, one in ready:
         _ = one.limited
+        if real:
+            permitted(parsed, one)
     if len(todo) < len(tests):
         print(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
     for test, one in ready:
@@ -114,13 +119,15 @@ def _of(parsed: Namespace, test: Planned) -> Namespace:
     return Namespace(**{**vars(parsed), "seed": test.seed, "set": [*parsed.set, *test.settings]})
 
 
-def _completed(path: Path) -> bool:
+def _completed(path: Path, real: bool) -> bool:
+    """Whether it is there, of the rig itself where that is asked for."""
     if not path.exists():
         return False
     try:
-        return load(path).end == "completed"
+        recording = load(path)
     except RigtwinError:
         return False
+    return recording.end == "completed" and real == (not recording.twin)
 
 
 def _aside(path: Path) -> Path | None:

@@ -25,6 +25,9 @@ from rigtwin.session.guardian import Guardian, Watched
 from rigtwin.session.recorder import Keeper
 from rigtwin.supervised import Ended, Update, supervise
 
+LONGEST = 1.0
+"""s that a guardian waits for a tick at most, however many may be missed."""
+
 
 @dataclass(frozen=True)
 class Test:
@@ -114,8 +117,8 @@ def record_at_leisure(
 def watched(test: Test, path: Path, guarded: bool, notes: Sequence[tuple[str, dict[str, str]]] = (), live: int = 0) -> Watched:
     """What a guardian has to know of a test."""
     safety = test.configuration.safety
-    # A tick missed more than may be is seen by the loop at the next; the guardian acts if that next never comes.
-    patience = (safety.missed + 1.0) * test.configuration.timing.period
+    # The last tick that may be late comes `missed` + 1 periods after the one before, and a little more.
+    patience = min((safety.missed + 1.5) * test.configuration.timing.period, LONGEST)
     told = metadata(test, virtual=not guarded) | dict(notes)
     return Watched(_writing(path, test), told, test.table if guarded else None, patience, safety.hold, live)
 

@@ -59,6 +59,9 @@ class Keeper:
         """Also when nothing else can be written any more: the writer has kept room for it."""
         self._try(lambda: self._writer.add_metadata(TRANSITION_RECORD, transition.record()))
 
+    def ready(self) -> None:
+        """It is, since the writer is there."""
+
     def beat(self, ground: float, structure: float) -> None:
         """Nobody watches this process."""
 
