@@ -37,6 +37,7 @@ RAMP = 0.6
 """s."""
 BEFORE = round(1000.0 * (LOOKING + ARMED + RAMP + SETTLING))
 """Ticks of the card before the test."""
+SOON = 600
 SLOW = 5
 """Ticks that pass during a slow one."""
 
@@ -83,7 +84,9 @@ def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]
         first = BEFORE if kind.place in ("controller", "loop") or kind.name == "controller hangs" else moving
-        at = int(random.uniform(first + 20.0, ending - 50.0))
+        # A process on a slowed card takes its time: its faults come in the ramp or soon after.
+        last = min(ending, BEFORE + SOON) if kind.place == "process" else ending
+        at = int(random.uniform(first + 20.0, last - 50.0))
         faults.append(Fault(kind, experiment, at, place, int(random.integers(2**31))))
     return faults
 

@@ -40,13 +40,16 @@ def faults(parsed: Namespace) -> int:
             writable(out)
     channels = load_table(parsed.card)
     todo = _todo(parsed)
-    outcomes: list[Outcome] = []
+    outcomes, undone = list[Outcome](), list[str]()
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder, tqdm(todo, unit="fault", disable=None, leave=False) as bar:
         try:
             for fault in bar:
                 bar.set_description(fault.kind.name)
                 run = processes.tried if fault.kind.place == "process" else tried
-                outcomes.append(run(fault, channels, Path(folder)))
+                try:
+                    outcomes.append(run(fault, channels, Path(folder)))
+                except RigtwinError as error:
+                    undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
             print(f"interrupted after {len(outcomes)} of {len(todo)}")
     rows = [_row(kind, [outcome for outcome in outcomes if outcome.fault.kind == kind]) for kind in KINDS]
@@ -57,12 +60,14 @@ def faults(parsed: Namespace) -> int:
     print(table([HEADER, *rows]))
     for outcome in failed:
         print(f"failed: {_described(outcome)}")
+    for one in undone:
+        print(f"not run: {one}")
     print(said)
     if parsed.out is not None:
         _write(parsed.out, said, rows, failed)
     if parsed.json is not None:
         write_json(parsed.json, [asdict(outcome) for outcome in outcomes])
-    return 0 if not failed else 4
+    return 0 if not failed and not undone else 4
 
 
 def _todo(parsed: Namespace) -> list[Fault]:

@@ -84,8 +84,8 @@ def _key(test: Test) -> str:
 
 
 def permitted(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
-    """The card, on which nothing has moved yet, and what the recording has to say of it. Raises RigtwinError if the test must not
-    be run on the rig."""
+    """The card, on which nothing has moved yet, and what the recording has to say of it. Raises RigtwinError if the test must
+    not be run on the rig."""
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     trusted(test.table, date.today())
