@@ -20,7 +20,7 @@ from rigtwin.daq.last_resort import release
 from rigtwin.daq.table import ChannelTable, fit, load_table, parsed, trusted, written
 from rigtwin.daq.terminals import Terminals, WiredTwin
 from rigtwin.daq.transport import LOCAL, InProcess, serve
-from rigtwin.daq.virtual import OnDemand, RealTime, VirtualCard
+from rigtwin.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
 from rigtwin.errors import RigtwinError
 
 TABLE = load_table(CARD)
@@ -218,6 +218,7 @@ def test_a_table_that_is_not_the_wiring_reads_wrong():
     [
         (lambda t: replace(t, device="Dev7"), "no card 'Dev7'; the driver knows Dev1"),
         (lambda t: replace(t, inputs=(t.inputs[0]._replace(line="ai40"), *t.inputs[1:])), "PCI-6229 has no line ai40"),
+        (lambda t: replace(t, pressure="port0/line77"), "PCI-6229 has no line port0/line77"),
         (lambda t: replace(t, outputs=(t.outputs[0]._replace(line="ao7"), *t.outputs[1:])), "PCI-6229 has no line ao7"),
         (
             lambda t: replace(t, inputs=(t.inputs[0]._replace(scaling=t.inputs[0].scaling._replace(range=2.0)), *t.inputs[1:])),
@@ -254,6 +255,22 @@ def test_outputs_beyond_the_range_and_no_numbers_are_refused():
     assert device.outputs[0] == 1.0
     card.stop()
     assert device.outputs[0] == 0.0
+
+
+def test_a_card_that_refuses_its_outputs_for_good_is_reset(monkeypatch):
+    card, device = virtual()
+    card.start()
+    card.pressure(True)
+    card.read()
+    card.write(Commands(0.0, 0.0, 0.0, 1.0))
+
+    def refuse(*_):
+        raise DriverError(BAD_VALUE, "no")
+
+    monkeypatch.setattr(device, "_WriteAnalogF64", refuse)
+    card.stop()
+    assert np.all(device.outputs == 0.0)
+    assert not device.pressure
 
 
 def test_a_disconnected_card_says_so_and_has_no_output():

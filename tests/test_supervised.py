@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
+from controllers import update as healthy
 from experiments import find
 from rigtwin.cli import CARD
 from rigtwin.configuration import from_assignments
@@ -230,6 +231,54 @@ def test_a_dead_controller_process_is_stopped_for(tmp_path):
     assert outcome.exceeded <= 1.1
     # In ticks of a card whose clock is slowed; a busy computer may add to them.
     assert outcome.late is not None
+
+
+def slowed(device, ticks):
+    """A controller that takes so many periods for each of its own ticks, by their number."""
+    done = itertools.count()
+
+    def update(controlling, state, measured, demand):
+        device.run_until(device.tick + ticks(next(done)))
+        return healthy(controlling, state, measured, demand)
+
+    return update
+
+
+@pytest.mark.parametrize(
+    ("ticks", "said"),
+    [
+        (lambda number: 40 if number == 700 else 0, "39 ticks missed in a row; at most 3 may be"),
+        (lambda number: 3 if number > 500 else 0, "% were missed; the loop cannot keep the pace"),
+        (lambda number: 3 if number % 40 == 0 else 0, "completed"),
+    ],
+)
+def test_a_loop_that_is_too_slow_is_called_late(tmp_path, ticks, said):
+    test = session("road1.6", "timing.duration=3", "safety.ramp=0.4", "safety.hold=0.1")
+    card, device = on_virtual_card(test)
+    ended = record_at_leisure(card, test, tmp_path / "r.mcap", updating=slowed(device, ticks))
+    assert said in ended.cause.reason
+    recording = load(tmp_path / "r.mcap")
+    assert recording.time[0] == 0.0
+    assert device.outputs[0] == 0.0
+
+
+def test_ticks_missed_in_the_ramp_do_not_cut_off_the_beginning(tmp_path):
+    test = session("imposed")
+    card, device = on_virtual_card(test)
+
+    def stop() -> None:
+        if device.tick % 50 == 0 and 450 < device.tick < 1000:
+            device.run_until(device.tick + 2)
+
+    ended = record_at_leisure(card, test, tmp_path / "r.mcap", stop)
+    assert ended.cause == COMPLETED
+    recording = load(tmp_path / "r.mcap")
+    assert (recording.time[0], recording.ticks) == (0.0, len(test.demands))
+
+
+def test_limits_closer_than_the_tables_are_kept():
+    limits = session("imposed", "safety.stuck=5", "safety.motor=80").limited.safety
+    assert (limits.stuck, limits.wheel, limits.motor) == (5.0, 0.02, 80.0)
 
 
 def test_every_cause_of_a_kind_is_one_that_can_be_said():

@@ -130,7 +130,7 @@ class Guardian:
         """Ends the recording and the other process."""
         self._shared[_WATCHED] = 0.0
         self._send("finish", reason)
-        self._process.join(STARTED)
+        self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
 
     def _send(self, *message: Any) -> None:
