@@ -33,6 +33,11 @@ def conversion(lines: Sequence[Line]) -> Conversion:
     )
 
 
+def rows(lines: Conversion) -> list[tuple[float, float, float]]:
+    """Factor, offset and range of each line, as Python reads them fastest."""
+    return list(zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True))
+
+
 @compilable
 def volts_of(lines: Conversion, values: Array, out: Array) -> None:
     """The voltages that stand for values, both of shape (lines,), not beyond the lines' ranges."""

@@ -69,7 +69,7 @@ class Guardian:
 
     def __init__(self, watched: Watched) -> None:
         """Raises RigtwinError if the recording cannot be written or the other process does not come."""
-        self._watched = watched
+        self._watched, self._finishing = watched, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
         memory = context.RawArray("d", _NUMBERS + RING * ROW)
@@ -128,7 +128,7 @@ class Guardian:
 
     def finish(self, reason: str) -> None:
         """Ends the recording and the other process."""
-        self._shared[_WATCHED] = 0.0
+        self._shared[_WATCHED], self._finishing = 0.0, True
         self._send("finish", reason)
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
@@ -148,7 +148,7 @@ class Guardian:
     def _listen(self) -> None:
         while (said := self._answer()) is not None:
             self.fault = str(said)
-        if self.fault is None and self._process.exitcode not in (None, 0):
+        if self.fault is None and not self._finishing:
             self.fault = "the guardian process is gone, and the recording with it"
 
     def _release(self) -> None:
