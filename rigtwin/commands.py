@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
-from rigtwin.console import apart, configured, table, writable
+from rigtwin.console import apart, configured, late, table, writable
 from rigtwin.diagnosis.commands import blindcheck, compare, diagnose
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.commands import machine, machines
@@ -87,6 +87,9 @@ def session(parsed: Namespace) -> int:
 
 
 def faults(parsed: Namespace) -> int:
+    from rigtwin.daq.card import require_client
+
+    require_client()
     from rigtwin.faults.commands import faults as work
 
     return work(parsed)
@@ -137,6 +140,10 @@ def info(parsed: Namespace) -> int:
         print(f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}")
     for note in recording.notes:
         print(f"note: {note}")
+    for step in recording.transitions:
+        print(f"{step.get('time', '?'):>12s} s  {step.get('from')} → {step.get('to')}: {step.get('reason')}")
+    if recording.lateness:
+        print(late(recording.lateness))
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
     for channel in channels_of(recording.machine, recording.columns):
         values = recording.column(channel.topic, channel.name)

@@ -147,6 +147,23 @@ def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_pa
     assert "no terminal to ask for arming" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("missing", ["nidaqmx", "grpc"])
+def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, monkeypatch, missing, tmp_path):
+    import sys
+
+    monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.chdir(tmp_path)
+    for command in (
+        ["run", "imposed", "--target", "daq", "--card", str(card), "--dry-run"],
+        ["run", "imposed", "--target", "daq", "--card", str(card)],
+        ["card", "serve", str(card)],
+        ["card", "check", str(card), "-o", "new.toml", "--operator", "a", "--zero", "--virtual", str(card)],
+        ["faults", "--each", "1"],
+    ):
+        assert main(command) == 1
+        assert "pip install 'rigtwin[daq]'" in capsys.readouterr().err
+
+
 # Lists of tests
 
 

@@ -50,18 +50,22 @@ def translated(doing: str) -> Iterator[None]:
         ) from None
 
 
-def connected(address: str) -> grpc.Channel | None:
-    """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
+def require_client() -> None:
+    """Raises CardFault unless the driver's client is installed, with what it needs to speak to a virtual card."""
     try:
+        import grpc  # noqa: F401
         import nidaqmx  # noqa: F401
     except ImportError:
         raise CardFault(PACKAGE) from None
+
+
+def connected(address: str) -> grpc.Channel | None:
+    """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
+    require_client()
     if not address:
         return None
-    try:
-        import grpc
-    except ImportError:
-        raise CardFault(PACKAGE) from None
+    import grpc
+
     # A server that is frozen, or a network that is gone, must be noticed: the client's calls have no end of their own.
     alive = (("grpc.keepalive_time_ms", 1000), ("grpc.keepalive_timeout_ms", 1000), ("grpc.http2.max_pings_without_data", 0))
     return grpc.insecure_channel(address, options=alive)

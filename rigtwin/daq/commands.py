@@ -17,7 +17,7 @@ from rigtwin.configuration import Configuration
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
 from rigtwin.daq.calibration import FORCE, at_rest, bumps, dated, responses, signed, spanned, zeroed
-from rigtwin.daq.card import Card, connected
+from rigtwin.daq.card import Card, connected, require_client
 from rigtwin.daq.last_resort import release
 from rigtwin.daq.table import OUTPUTS, ChannelTable, Plausible, fit, load_table, written
 from rigtwin.daq.terminals import Terminals
@@ -37,6 +37,7 @@ LEAST_STROKE, MOST_STROKE = 0.001, 0.02
 
 def serve(parsed: Namespace) -> int:
     """A virtual card with the twin at its terminals, in real time, for any NI-DAQmx gRPC client on this computer."""
+    require_client()
     from rigtwin.daq.transport import LOCAL
     from rigtwin.daq.transport import serve as listen
 
@@ -135,6 +136,7 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     if wiring is None:
         card = Card(table, period, connected(table.address), pacer=Pacer(period) if table.timing == "software" else None)
     else:
+        require_client()
         from rigtwin.daq.transport import InProcess
 
         lines = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]

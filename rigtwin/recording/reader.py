@@ -179,7 +179,14 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
 
 def _in_order(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """On a full disk the last ones stand where room had been kept for them, near the beginning of the file."""
-    return tuple(sorted(transitions, key=lambda transition: float(transition.get("time", "0"))))
+    return tuple(sorted(transitions, key=_moment))
+
+
+def _moment(transition: Mapping[str, str]) -> float:
+    try:
+        return float(transition.get("time", ""))
+    except ValueError:
+        return math.inf
 
 
 def _period(path: Path, about: Mapping[str, str]) -> float:

@@ -11,7 +11,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from rigtwin.cli import CARD
-from rigtwin.console import table
+from rigtwin.console import late, table
 from rigtwin.daq.card import Card
 from rigtwin.daq.table import load_table, trusted
 from rigtwin.daq.terminals import InRealTime, WiredTwin
@@ -131,11 +131,9 @@ def _bar(test: Test) -> tqdm:
 def _said(test: Test, path: Path, ended: Ended) -> int:
     seconds = ended.ticks * test.configuration.timing.period
     print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {ended.cause.reason}")
-    late = load(path).lateness if ended.ticks else {}
-    if late:
-        median, high, most = (f"{1e6 * float(late[f'late_{figure}']):.3g} us" for figure in ("median", "999", "max"))
-        print(f"late by {median} in the median, {high} at the 99.9th percentile, {most} at most; {late['missed']} ticks missed")
-        print(late["scheduling"])
+    lateness = load(path).lateness if ended.ticks else {}
+    if lateness:
+        print(late(lateness))
     return 0 if ended.cause == COMPLETED else 3
 
 

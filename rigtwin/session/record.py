@@ -12,7 +12,7 @@ from controllers import update
 from rigtwin import __version__
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration, flattened
-from rigtwin.daq.card import Card, connected
+from rigtwin.daq.card import Card, connected, require_client
 from rigtwin.daq.table import ChannelTable, fit, written
 from rigtwin.daq.terminals import Terminals
 from rigtwin.daq.virtual import OnDemand, VirtualCard, Wired
@@ -62,6 +62,7 @@ def wired(table: ChannelTable, terminals: Wired, **more: Any) -> VirtualCard:
 
 def on_virtual_card(test: Test, terminals: Wired | None = None, **more: Any) -> tuple[Card, VirtualCard]:
     """The card backend on a virtual card in this process: the unmodified nidaqmx client, volts both ways."""
+    require_client()
     from rigtwin.daq.transport import InProcess
 
     period = test.configuration.timing.period
