@@ -153,6 +153,7 @@ def test_cases_are_drawn_the_same_again_and_hold_every_sort():
 
 
 @pytest.mark.skipif(not EMPS.is_dir(), reason="the EMPS data are not here")
+@pytest.mark.slow
 def test_emps_on_its_held_out_recording(tmp_path: Path):
     for data, name in (("DATA_EMPS", "emps"), ("DATA_EMPS_PULSES", "emps_pulses")):
         convert(EMPS / f"{data}.mat", SHIPPED / "maps" / f"{name}.toml", tmp_path / f"{name}.mcap")
