@@ -93,8 +93,8 @@ def check(parsed: Namespace) -> int:
         table = _signs(table, wiring, parsed, told)
     if parsed.zero or spans:
         rig = _rig(table, wiring)
-        rig.start()
         try:
+            rig.start()
             still = at_rest(rig)
         finally:
             rig.stop()
