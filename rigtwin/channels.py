@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from controllers import Commands, Measurements
 
@@ -42,10 +42,7 @@ SESSION = (
     Channel("/session", "structure", "m", "structure cylinder position written to the rig"),
     Channel("/session", "voltage", "V", "written to the motor amplifier"),
     Channel("/session", "pressure", "1", "whether the hydraulics have pressure"),
-    Channel("/session", "ground_lvdt", "m", "ground cylinder position"),
-    Channel("/session", "structure_lvdt", "m", "structure cylinder (plate) position"),
-    Channel("/session", "suspension_lvdt", "m", "suspension travel: plate minus carriage"),
-    Channel("/session", "load_cell", "N", "suspension force, positive in compression"),
+    *(replace(channel, topic="/session") for channel in CHANNELS if channel.topic == "/sensor"),
     Channel("/session", "late", "s", "by which the tick began after it was due"),
     Channel("/session", "missed", "tick", "that passed unread before this one"),
 )

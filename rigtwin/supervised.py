@@ -8,7 +8,7 @@ off.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -364,16 +364,3 @@ def _cause_of(error: BaseException) -> Cause:
     if isinstance(error, RigtwinError):
         return Cause("card", _line(error))
     return Cause("rig", f"{type(error).__name__}: {_line(error)}")
-
-
-def stopped_by(sources: Sequence[Callable[[], str | None]]) -> Callable[[], str | None]:
-    """The first of several ways to stop that has something to say."""
-
-    def look() -> str | None:
-        for source in sources:
-            said = source()
-            if said is not None:
-                return said
-        return None
-
-    return look

@@ -35,7 +35,6 @@ NEXT = {
     Phase.STOPPED: (Phase.IDLE,),
     Phase.FAULTED: (Phase.IDLE,),
 }
-AT_REST = (Phase.IDLE, Phase.STOPPED, Phase.FAULTED)
 
 
 @dataclass(frozen=True)

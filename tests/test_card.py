@@ -28,12 +28,8 @@ PERIOD = 1e-3
 TODAY = date(2026, 6, 1)
 
 
-def lines(table: ChannelTable) -> tuple[list[str], list[str], str]:
-    return [line.line for line in table.inputs], [line.line for line in table.outputs], table.pressure
-
-
 def virtual(table: ChannelTable = TABLE, wiring: ChannelTable = TABLE, timing=None, seed: int = 0) -> tuple[Card, VirtualCard]:
-    card = VirtualCard(Terminals(Configuration(), wiring, seed), *lines(wiring), timing or OnDemand(), "Dev1")
+    card = VirtualCard(Terminals(Configuration(), wiring, seed), wiring, timing or OnDemand())
     clock = (lambda: card.tick * PERIOD) if timing is None else time.monotonic
     return Card(table, PERIOD, InProcess(card), clock=clock), card
 
@@ -319,7 +315,7 @@ def test_calls_that_the_virtual_card_does_not_know_are_refused():
 
 
 def test_through_a_socket_it_is_the_same_card():
-    device = VirtualCard(Terminals(Configuration(), TABLE, 5), *lines(TABLE), OnDemand(), "Dev1")
+    device = VirtualCard(Terminals(Configuration(), TABLE, 5), TABLE, OnDemand())
     server, port = serve(device, 0)
     try:
         channel = connected(f"{LOCAL}:{port}")

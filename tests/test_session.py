@@ -229,13 +229,7 @@ def test_every_wrong_sign_is_found(signs):
     ]
     wiring = replace(TABLE, inputs=tuple(turned[:4]), outputs=tuple(turned[4:]))
     configuration, demands = bumps(0.005, FORCE, 1e-3)
-    device = VirtualCard(
-        Terminals(configuration, wiring, 0),
-        [line.line for line in wiring.inputs],
-        [line.line for line in wiring.outputs],
-        wiring.pressure,
-        OnDemand(),
-    )
+    device = VirtualCard(Terminals(configuration, wiring, 0), wiring, OnDemand())
     rows = []
 
     class Rows:

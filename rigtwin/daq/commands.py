@@ -46,14 +46,7 @@ def serve(parsed: Namespace) -> int:
     table = load_table(parsed.card)
     configuration = configured(Configuration(), parsed)
     terminals = Terminals(applied(configuration, parsed.effect), table, parsed.seed)
-    card = VirtualCard(
-        terminals,
-        [line.line for line in table.inputs],
-        [line.line for line in table.outputs],
-        table.pressure,
-        RealTime(configuration.timing.period),
-        table.device,
-    )
+    card = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, port = listen(card, parsed.port)
     print(f'virtual card {table.device}: set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.', flush=True)
     with stop_requests() as stop:
@@ -139,9 +132,7 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
         require_client()
         from rigtwin.daq.transport import InProcess
 
-        lines = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]
-        terminals = Terminals(Configuration(), wiring, 0)
-        virtual = VirtualCard(terminals, *lines, wiring.pressure, OnDemand(), wiring.device)
+        virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
         card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     card.inspect()
     return card

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controllers import Commands, Measurements
+from controllers.compiled import compilable
 from rigtwin.arrays import Array
 from rigtwin.compiling import kernel
 from rigtwin.configuration import Configuration
@@ -26,8 +27,8 @@ def analogue(plant: Plant) -> Plant:
     return plant._replace(**{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)})
 
 
-@kernel
-def _sampled(machine: Machine, sensing: Sensing, disturbance: Array, inputs: Conversion, truth: Array, volts: Array) -> None:
+@compilable
+def _sample(machine: Machine, sensing: Sensing, disturbance: Array, inputs: Conversion, truth: Array, volts: Array) -> None:
     true = sense(machine)
     measured = sampled(sensing, true, disturbance)
     for column in range(4):
@@ -51,12 +52,10 @@ def _advanced(
     digitised(outputs, written, asked)
     values_of(outputs, asked, asked)
     advance(machine, asked[0], asked[1], asked[2])
-    true = sense(machine)
-    measured = sampled(sensing, true, disturbance)
-    for column in range(4):
-        truth[column], volts[column] = true[column], measured[column]
-    volts_of(inputs, volts, volts)
-    digitised(inputs, volts, volts)
+    _sample(machine, sensing, disturbance, inputs, truth, volts)
+
+
+_sampled = kernel(_sample)
 
 
 class Terminals:

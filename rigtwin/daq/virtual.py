@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 import threading
 from collections import deque
-from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
 from rigtwin.arrays import Array
+from rigtwin.daq.table import ChannelTable
 from rigtwin.errors import RigtwinError
 from rigtwin.realtime import monotonic, sleep_until
 
@@ -97,20 +97,18 @@ class VirtualCard:
     """One card. Thread-safe. `answer` takes a call's name, its request, and the class of its response.
 
     tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital line. Before the first tick
-    and after `disconnect` all outputs are at zero. wiring: which lines the terminals' signals are on, inputs and outputs.
+    and after `disconnect` all outputs are at zero. wiring: the card's name, and which lines the terminals' signals are on.
     """
 
     def __init__(
         self,
         terminals: Wired,
-        inputs: Sequence[str],
-        outputs: Sequence[str],
-        pressure: str,
+        wiring: ChannelTable,
         time: OnDemand | RealTime,
-        device: str = "Dev1",
     ) -> None:
-        self._terminals, self._time, self._device = terminals, time, device
-        self._inputs, self._outputs, self._pressure_line = list(inputs), list(outputs), pressure
+        self._terminals, self._time, self._device = terminals, time, wiring.device
+        self._inputs, self._outputs = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]
+        self._pressure_line = wiring.pressure
         self.outputs, self.pressure, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
         self._places = [int(line[2:]) for line in self._outputs]

@@ -127,8 +127,7 @@ def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
     test = test_of(fault, table)
     period, name = test.configuration.timing.period, fault.kind.name
     bench = FaultyBench(test.terminals(), table, name, fault.at, fault.place, fault.seed, whole(test))
-    lines = [line.line for line in table.inputs], [line.line for line in table.outputs]
-    virtual = _GlitchingCard(bench, *lines, table.pressure, OnDemand(), table.device)
+    virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)

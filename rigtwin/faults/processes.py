@@ -52,9 +52,8 @@ def _once(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
     test = test_of(fault, table)
     period = test.configuration.timing.period
     bench = FaultyBench(test.terminals(), table, "", whole(test), 0, fault.seed, whole(test))
-    lines = [line.line for line in table.inputs], [line.line for line in table.outputs]
     clock = RealTime(DILATION * period)
-    virtual = VirtualCard(bench, *lines, table.pressure, clock, table.device)
+    virtual = VirtualCard(bench, table, clock)
     server, port = serve(virtual, 0)
     reached = replace(table, address=f"{LOCAL}:{port}")
     path = folder / f"{fault.seed}.mcap"

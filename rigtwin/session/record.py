@@ -53,20 +53,13 @@ class Test:
         return Terminals(applied(self.configuration, list(self.effects)), self.table, self.seed)
 
 
-def wired(table: ChannelTable, terminals: Wired, **more: Any) -> VirtualCard:
-    """A virtual card whose time passes as it is read, with a rig at the lines of a table. more: of VirtualCard."""
-    return VirtualCard(
-        terminals, [line.line for line in table.inputs], [line.line for line in table.outputs], table.pressure, **more
-    )
-
-
-def on_virtual_card(test: Test, terminals: Wired | None = None, **more: Any) -> tuple[Card, VirtualCard]:
+def on_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
     """The card backend on a virtual card in this process: the unmodified nidaqmx client, volts both ways."""
     require_client()
     from rigtwin.daq.transport import InProcess
 
     period = test.configuration.timing.period
-    virtual = wired(test.table, terminals or test.terminals(), time=OnDemand(), device=test.table.device, **more)
+    virtual = VirtualCard(terminals or test.terminals(), test.table, OnDemand())
     card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     card.inspect()
     return card, virtual
