@@ -175,6 +175,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     blindcheck.add_argument("--baselines", action="store_true", help="also score what cruder methods would have said")
     blindcheck.add_argument("--json", type=Path, metavar="F.json", help="also write the scores to a file")
+    _workers(blindcheck)
 
     reproduce = command(
         "reproduce",
@@ -190,7 +191,7 @@ def _parser() -> argparse.ArgumentParser:
         "what", nargs="*", help="a chapter (3 to 7, A), study, table, figure or equation; default: everything"
     )
     reproduce.add_argument("--seeds", type=int, default=32, help="roads and noise to judge over (default 32)")
-    reproduce.add_argument("--workers", type=int, help="jobs at a time (default: one a core)")
+    _workers(reproduce)
     reproduce.add_argument("--folder", type=Path, default=Path("reproduction"), help="of the results (default reproduction)")
     reproduce.add_argument("--json", type=Path, metavar="F.json", help="also write everything for other programs")
     reproduce.add_argument("--html", type=Path, metavar="F.html", help="also write a page to look at, one file")
@@ -220,6 +221,11 @@ def _parser() -> argparse.ArgumentParser:
 
 def _effect(parser: argparse.ArgumentParser, summary: str) -> None:
     parser.add_argument("--effect", action="append", default=[], metavar="KIND@COMPONENT=VALUE", help=summary)
+
+
+def _workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--workers", type=int, metavar="N", help="processes that work side by side (default: one a core)")
+    parser.add_argument("--cluster", metavar="ADDRESS", help="work on a dask cluster instead, e.g. tcp://host:8786")
 
 
 def _stretch(parser: argparse.ArgumentParser) -> None:

@@ -17,6 +17,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.parameters import Plant
 
 Applied = TypeVar("Applied")
+POSTERIOR = "posterior"
+"""The table of a calibrated twin's file beside its values; rigtwin.posterior reads it."""
 MOST_TICKS = 100_000_000
 """More than a day at 1 kHz."""
 
@@ -175,7 +177,12 @@ def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
 
 def from_toml(configuration: Configuration, path: Path) -> Configuration:
     """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
-    return read_toml(path, lambda tables: overridden(configuration, tables))
+    return read_toml(path, lambda tables: overridden(configuration, values_of(tables)))
+
+
+def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """A configuration file's tables without that of a calibrated twin which says how sure its values are."""
+    return {name: table for name, table in tables.items() if name != POSTERIOR}
 
 
 def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:

@@ -96,6 +96,13 @@ def deflected(plant: Plant, preload: float) -> float:
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
+def tyre_force(plant: Plant, deflection: Array, rate: Array) -> Array:
+    """What the tyre pushes with, N, at a deflection (m) that changes at a rate (m/s); it cannot pull."""
+    tyre, squeezed = plant.tyre, np.maximum(deflection, 0.0)
+    slope = np.maximum(1.0 + tyre.hardening * squeezed * (squeezed / SCALE) ** (tyre.hardening_power - 1.0), 0.0)
+    return np.maximum(tyre.stiffness * slope * squeezed + np.where(deflection > 0.0, tyre.damping * rate, 0.0), 0.0)
+
+
 class Simulation:
     """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
     at rest. Owns the MuJoCo structures that `machine` looks into."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import threading
 
 import numpy as np
 import pytest
@@ -15,9 +14,10 @@ from experiments.thesis.entry import band, digits, factor, last_digit, number, s
 from experiments.thesis.identification import ELECTRIC, FITTED, electric, fitted, hydraulic
 from experiments.thesis.reproduction import Chapter, document, page, shares, text
 from experiments.thesis.study import Conclusion, Drawing, Study, sheet
-from experiments.thesis.work import done, keep, kept
+from experiments.thesis.work import done
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
+from rigtwin.sweep.workers import Here
 
 
 @pytest.mark.parametrize(
@@ -81,14 +81,12 @@ def test_which_drawing_is_of_a_figure():
     assert not matching("Table 4.1 and 4.2", "Figure 4.2")
 
 
-def counting(fails: set[str]) -> tuple[Study, list[str]]:
+def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, list[str]]:
     ran: list[str] = []
-    lock = threading.Lock()
 
     def job(key: str):
         def work():
-            with lock:
-                ran.append(key)
+            ran.append(key)
             if key in fails:
                 raise RigtwinError(f"{key} failed")
             return {"value": float(len(key)), "curve": np.arange(3.0)}
@@ -101,49 +99,37 @@ def counting(fails: set[str]) -> tuple[Study, list[str]]:
         total = sum(result["value"] for result in results.values())
         return Conclusion([digits("Table 3.1", "total", "15", total, "m", "a note")], [drawing], ["a remark"])
 
-    return Study(
-        "counted", "Counted", "9", ("Table 3.1",), conclude, lambda seeds: {f"job/{n}": job(f"job/{n}") for n in range(seeds)}
-    ), ran
+    jobs = lambda seeds: {f"job/{n}": job(f"job/{n}") for n in range(seeds)}  # noqa: E731
+    study = Study("counted", "Counted", "9", ("Table 3.1",), conclude, jobs)
+    monkeypatch.setitem(STUDIES, "counted", study)
+    return study, ran
 
 
-def test_finished_jobs_are_not_done_again(tmp_path):
-    study, ran = counting(set())
+def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
+    study, ran = counting(set(), monkeypatch)
     steps: list[tuple[int, int]] = []
-    first = done([study], 3, tmp_path, 2, lambda count, total: steps.append((count, total)))
+    first = done([study], 3, tmp_path, Here(), lambda count, total: steps.append((count, total)))
     assert sorted(ran) == ["job/0", "job/1", "job/2"]
     assert steps[0] == (0, 3)
     assert steps[-1] == (3, 3)
-    again = done([study], 4, tmp_path, 2)
+    again = done([study], 4, tmp_path, Here())
     assert sorted(ran) == ["job/0", "job/1", "job/2", "job/3"]
     assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
 
 
-def test_a_broken_run_goes_on_where_it_was(tmp_path):
-    study, ran = counting({"job/2"})
+def test_a_broken_run_goes_on_where_it_was(tmp_path, monkeypatch):
+    study, ran = counting({"job/2"}, monkeypatch)
     with pytest.raises(RigtwinError, match="job/2 failed"):
-        done([study], 3, tmp_path, 1)
+        done([study], 3, tmp_path, Here())
     assert ran == ["job/0", "job/1", "job/2"]
-    whole, ran = counting(set())
-    assert len(done([whole], 3, tmp_path, 1)["counted"]) == 3
+    whole, ran = counting(set(), monkeypatch)
+    assert len(done([whole], 3, tmp_path, Here())["counted"]) == 3
     assert ran == ["job/2"]
 
 
-def test_a_damaged_result_is_done_again(tmp_path):
-    path = tmp_path / "r.npz"
-    keep(path, {"a": 1.5, "b": np.ones(4)})
-    found = kept(path)
-    assert found is not None
-    assert found["a"] == 1.5
-    path.write_bytes(path.read_bytes()[:60])
-    assert kept(path) is None
-    path.write_bytes(b"")
-    assert kept(path) is None
-    assert kept(tmp_path / "absent.npz") is None
-
-
-def test_text_document_and_page_say_the_same(tmp_path):
-    study, _ = counting(set())
-    chapters = [Chapter(study, study.conclude(done([study], 3, tmp_path, 1)["counted"]))]
+def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
+    study, _ = counting(set(), monkeypatch)
+    chapters = [Chapter(study, study.conclude(done([study], 3, tmp_path, Here())["counted"]))]
     plain = text(chapters, every=True)
     assert "1 of 1 entries agree" in plain
     assert "[1] a note" in plain

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from argparse import Namespace
 from pathlib import Path
@@ -15,6 +14,7 @@ from experiments.thesis.work import done
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
 from rigtwin.plot import checked_ending, save
+from rigtwin.sweep import hired
 
 MOST_SEEDS = 1000
 
@@ -24,16 +24,16 @@ def reproduce(parsed: Namespace) -> int:
     wanted = asked(" ".join(parsed.what) or None)
     if not 1 <= parsed.seeds <= MOST_SEEDS:
         raise RigtwinError(f"--seeds {parsed.seeds}: expected 1 to {MOST_SEEDS}")
-    workers = os.cpu_count() or 1 if parsed.workers is None else parsed.workers
-    if workers < 1:
-        raise RigtwinError(f"--workers {parsed.workers}: expected 1 or more")
     for out in (parsed.json, parsed.html):
         if out is not None:
             writable(out)
     pictures = parsed.draw or parsed.folder / "figures"
     if pictures.exists() and not pictures.is_dir():
         raise RigtwinError(f"cannot draw into {pictures}: it is a file")
-    with tqdm(disable=None, desc="reproduce", unit="job", leave=False, file=sys.stderr) as bar:
+    with (
+        hired(parsed.workers, parsed.cluster) as workers,
+        tqdm(disable=None, desc="reproduce", unit="job", leave=False, file=sys.stderr) as bar,
+    ):
 
         def progress(count: int, total: int) -> None:
             bar.total = total

@@ -2,90 +2,42 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from zipfile import BadZipFile
 
-import numpy as np
-
-import controllers
-import experiments
-import rigtwin
-from experiments.thesis.study import Job, Result, Study
-from rigtwin.errors import RigtwinError
+from experiments.thesis.study import Result, Study
+from rigtwin.sweep import Store, Workers, swept
 
 
-def source_digest() -> str:
-    """Of all that a result depends on: the sources and models of this version."""
-    digest = hashlib.sha256()
-    for package in (rigtwin, controllers, experiments):
-        folder = Path(str(package.__file__)).parent
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(path.read_bytes())
-    for path in sorted((Path(str(rigtwin.__file__)).parents[1] / "models").rglob("*.xml")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
+def job(which: tuple[str, int, str]) -> Result:
+    """The work of one job: a study's name, its number of seeds, the job's key. Runs in any process."""
+    from experiments.thesis.catalogue import STUDIES
 
-
-def kept(path: Path) -> Result | None:
-    """A result from disk, or None if there is none that can be read."""
-    try:
-        with np.load(path) as stored:
-            return {name: stored[name] if stored[name].ndim else float(stored[name]) for name in stored.files}
-    except (OSError, ValueError, EOFError, BadZipFile):
-        return None
-
-
-def keep(path: Path, result: Result) -> None:
-    """Writes a result as a whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{os.getpid()}.{path.name}")
-    with temporary.open("wb") as file:
-        np.savez(file, **{name: np.asarray(value) for name, value in result.items()})  # type: ignore[arg-type]
-    temporary.replace(path)
+    study, seeds, key = which
+    return STUDIES[study].jobs(seeds)[key]()
 
 
 def done(
-    studies: Sequence[Study], seeds: int, folder: Path, workers: int, progress: Callable[[int, int], object] = lambda *_: None
+    studies: Sequence[Study],
+    seeds: int,
+    folder: Path,
+    workers: Workers,
+    progress: Callable[[int, int], object] = lambda *_: None,
 ) -> dict[str, dict[str, Result]]:
-    """Results of every study's jobs, study → key → result. progress is called with (jobs done, jobs in all).
+    """Results of every job of studies of the catalogue, study → key → result. progress is called with (jobs done, jobs in all).
 
     Interrupted, it keeps what is finished. Raises RigtwinError if the folder cannot be written.
     """
-    into = folder / source_digest()
-    results: dict[str, dict[str, Result]] = {study.name: {} for study in studies}
-    due: list[tuple[str, str, Path, Job]] = []
-    for study in studies:
-        for key, job in study.jobs(seeds).items():
-            path = into / study.name / f"{key.replace('/', '-')}.npz"
-            found = kept(path)
-            if found is None:
-                due.append((study.name, key, path, job))
-            else:
-                results[study.name][key] = found
-    total = len(due) + sum(len(found) for found in results.values())
-    progress(total - len(due), total)
+    keys = {study.name: list(study.jobs(seeds)) for study in studies}
+    total, count = sum(map(len, keys.values())), 0
+    progress(0, total)
 
-    def work(path: Path, job: Job) -> Result:
-        result = job()
-        keep(path, result)
-        return result
+    def step(more: int) -> None:
+        nonlocal count
+        count += more
+        progress(count, total)
 
-    try:
-        into.mkdir(parents=True, exist_ok=True)
-        with ThreadPoolExecutor(workers) as pool:
-            running = {pool.submit(work, path, job): (study, key) for study, key, path, job in due}
-            try:
-                for number, future in enumerate(as_completed(running), start=1):
-                    study, key = running[future]
-                    results[study][key] = future.result()
-                    progress(total - len(due) + number, total)
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
-    except OSError as error:
-        raise RigtwinError(f"cannot write {folder}: {error.strerror}") from None
-    return results
+    with Store(folder / "results.sqlite") as store:
+        jobs = [(f"{study}/{key}", (study, seeds, key)) for study, own in keys.items() for key in own]
+        swept(store, workers, job, jobs, step)
+        return {study: {key: store[f"{study}/{key}"] for key in own} for study, own in keys.items()}

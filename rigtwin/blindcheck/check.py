@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import subprocess
 import sys
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.errors import RigtwinError
+from rigtwin.sweep import Store, Workers, each, swept
+
+Files = Sequence[bytes]
+"""Contents of a case's recordings: the one that is diagnosed, and the one held out. A worker needs no disk in common."""
 
 
 @dataclass(frozen=True)
@@ -30,15 +32,21 @@ class Result:
     crude: dict[int, str]
 
 
-def check(folder: Path, cases: int, seed: int, baselines: bool, progress: Callable[[int], object] = lambda _: None) -> Result:
+def check(
+    folder: Path,
+    cases: int,
+    seed: int,
+    baselines: bool,
+    workers: Workers,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Result:
     """The whole check. folder: recordings and answers; answers that are there for the same recordings are kept, so that an
     interrupted check goes on. progress is called once a recording and once an answer.
 
     Raises RigtwinError if the referee fails, or its key is not the one that it committed itself to.
     """
     recordings = folder / f"seed-{seed}"
-    answers = recordings / "answers"
-    answers.mkdir(parents=True, exist_ok=True)
+    recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "rigtwin.blindcheck.referee", str(recordings), str(cases), str(seed)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as referee:
         assert referee.stdin is not None
@@ -55,8 +63,8 @@ def check(folder: Path, cases: int, seed: int, baselines: bool, progress: Callab
             raise RigtwinError("the referee ended before it committed itself to a key")
         (recordings / "commitment.txt").write_text(commitment + "\n")
         try:
-            given = _diagnosed(recordings, answers, cases, progress)
-            crude = _crude(recordings, cases) if baselines else {}
+            given = _diagnosed(recordings, cases, workers, progress)
+            crude = _crude(recordings, cases, workers) if baselines else {}
         except BaseException:
             referee.kill()
             raise
@@ -70,54 +78,55 @@ def check(folder: Path, cases: int, seed: int, baselines: bool, progress: Callab
     return Result(seed, commitment, json.loads(opened), given, crude)
 
 
-def _workers() -> int:
-    return max(1, os.cpu_count() or 1)
+def _diagnosed(recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]) -> list[dict[str, Any]]:
+    def jobs() -> Iterator[tuple[str, Files]]:
+        for number in range(cases):
+            files = [path.read_bytes() for path in _paths(recordings, number)]
+            yield keys[number], files
+
+    keys = [_key(recordings, number) for number in range(cases)]
+    with Store(recordings / "answers.sqlite") as store:
+        swept(store, workers, answer, jobs(), progress)
+        return [store[key] for key in keys]
 
 
-def _diagnosed(recordings: Path, answers: Path, cases: int, progress: Callable[[int], object]) -> list[dict[str, Any]]:
-    found: dict[int, dict[str, Any]] = {}
-    with ProcessPoolExecutor(_workers(), get_context("spawn")) as pool:
-        jobs = {pool.submit(answer, recordings, answers, number): number for number in range(cases)}
-        for job in as_completed(jobs):
-            found[jobs[job]] = job.result()
-            progress(1)
-    return [found[number] for number in range(cases)]
+def _paths(recordings: Path, number: int) -> tuple[Path, Path]:
+    return recordings / f"{number:03d}.mcap", recordings / f"{number:03d}-held-out.mcap"
 
 
-def answer(recordings: Path, answers: Path, number: int) -> dict[str, Any]:
-    """One case's answer, worked out or read again if its recording is the same. Runs in a process that knows files alone."""
+def _key(recordings: Path, number: int) -> str:
+    """Of a case: another recording is another question."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in _paths(recordings, number))).hexdigest()
+
+
+def answer(files: Files) -> dict[str, Any]:
+    """One case's answer, of its recording and the one held out. Runs where there are neither the key nor the other cases."""
     from rigtwin.channels import SUSPENSION_RIG
     from rigtwin.configuration import Configuration
     from rigtwin.diagnosis import diagnose as module
     from rigtwin.machine.library import find
     from rigtwin.recording import load
 
-    path, held_out = recordings / f"{number:03d}.mcap", recordings / f"{number:03d}-held-out.mcap"
-    digest = hashlib.sha256(path.read_bytes() + _version()).hexdigest()
-    place = answers / f"{number:03d}.json"
-    if place.exists():
-        kept = json.loads(place.read_text())
-        if kept.get("digest") == digest:
-            return kept
-    outcome = module.diagnose(find(SUSPENSION_RIG), [load(path)], Configuration(), [load(held_out)])
-    document = {**outcome.diagnosis.document(), "digest": digest}
-    place.write_text(json.dumps(document))
-    return document
+    with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
+        names = ("recording.mcap", "held-out.mcap")
+        for name, content in zip(names, files, strict=True):
+            (Path(folder) / name).write_bytes(content)
+        recording, held_out = (load(Path(folder) / name) for name in names)
+        return module.diagnose(find(SUSPENSION_RIG), [recording], Configuration(), [held_out]).diagnosis.document()
 
 
-def _version() -> bytes:
-    """Of the diagnosis: another one gives other answers."""
-    digest = hashlib.sha256()
-    for source in sorted((Path(__file__).parent.parent).rglob("*.py")):
-        if "blindcheck" not in source.parts:
-            digest.update(source.read_bytes())
-    return digest.digest()
+def named(content: bytes) -> str:
+    """What the black-box baseline names in a recording."""
+    from rigtwin.blindcheck.crude import black_box
+
+    with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
+        path = Path(folder) / "recording.mcap"
+        path.write_bytes(content)
+        return black_box(path)
 
 
-def _crude(recordings: Path, cases: int) -> dict[int, str]:
-    from rigtwin.blindcheck.crude import TRIED, black_box
+def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
+    from rigtwin.blindcheck.crude import TRIED
 
-    with ProcessPoolExecutor(_workers(), get_context("spawn")) as pool:
-        numbers = range(min(cases, TRIED))
-        names = pool.map(black_box, [recordings / f"{number:03d}.mcap" for number in numbers])
-        return dict(zip(numbers, names, strict=True))
+    jobs = ((str(number), _paths(recordings, number)[0].read_bytes()) for number in range(min(cases, TRIED)))
+    return {int(number): name for number, name in sorted(each(workers, named, jobs), key=lambda pair: int(pair[0]))}

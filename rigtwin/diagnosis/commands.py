@@ -211,11 +211,15 @@ def blindcheck(parsed: Namespace) -> int:
     from rigtwin.blindcheck.check import check
     from rigtwin.blindcheck.score import document
     from rigtwin.blindcheck.score import table as scores
+    from rigtwin.sweep import hired
 
     if parsed.cases < 1 or parsed.seed < 0:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
-    with tqdm(total=2 * parsed.cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar:
-        result = check(parsed.folder, parsed.cases, parsed.seed, parsed.baselines, bar.update)
+    with (
+        hired(parsed.workers, parsed.cluster) as workers,
+        tqdm(total=2 * parsed.cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar,
+    ):
+        result = check(parsed.folder, parsed.cases, parsed.seed, parsed.baselines, workers, bar.update)
     print(scores(result))
     if parsed.json is not None:
         write_json(parsed.json, document(result))

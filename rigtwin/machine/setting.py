@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from controllers.quantity import Quantity, fields
-from rigtwin.configuration import assigned, checked, read_toml
+from rigtwin.configuration import assigned, checked, read_toml, values_of
 from rigtwin.effects import find
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.machine import Machine
@@ -43,7 +43,7 @@ def overridden(setup: Setup, changes: Mapping[str, object]) -> Setup:
 
 def from_toml(setup: Setup, path: Path) -> Setup:
     """The setup with a TOML file's values. Raises RigtwinError naming file and fault."""
-    return read_toml(path, lambda tables: overridden(setup, tables))
+    return read_toml(path, lambda tables: overridden(setup, values_of(tables)))
 
 
 def from_assignments(setup: Setup, assignments: Sequence[str]) -> Setup:

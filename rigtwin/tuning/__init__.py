@@ -1,0 +1,1 @@
+"""Settings tuned on the twin before the rig is touched."""
