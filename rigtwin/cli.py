@@ -168,7 +168,10 @@ def _parser() -> argparse.ArgumentParser:
         "A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees the files\n"
         "alone; then the key is opened, checked against its digest, and every answer is scored.",
     )
-    blindcheck.add_argument("--cases", type=int, default=200, help="how many (default 200)")
+    blindcheck.add_argument("--cases", type=int, help="how many (default 200; of rigs to tune for 8)")
+    blindcheck.add_argument(
+        "--tune", metavar="STUDY", help="instead: is a controller tuned on the diagnosed twin better on the rig itself?"
+    )
     blindcheck.add_argument("--seed", type=int, default=2026, help="of the referee's draws (default 2026)")
     blindcheck.add_argument(
         "--folder", type=Path, default=Path("blindcheck"), help="of recordings and answers; a second run goes on"
@@ -200,6 +203,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     reproduce.add_argument("--gallery", type=Path, metavar="FOLDER", help="also write gallery.md with its pictures")
 
+    _tune(command("tune", "tune the controller on the twin, and judge it on roads that the tuning has not seen", TUNE))
+
     calibrate = command(
         "calibrate",
         "find the friction compensator's settings from a recording",
@@ -217,6 +222,32 @@ def _parser() -> argparse.ArgumentParser:
     )
     stability_arguments(stability)
     return top
+
+
+TUNE = """\
+A study is a TOML file: parameters with bounds, objectives, constraints, and what varies; docs/tuning.md. Without one, those
+that come along are listed.
+
+examples:
+  rigtwin tune skyhook --out tuning/skyhook
+  rigtwin tune friction --twin calibrated.toml     of a rig that diagnose --save-twin has described
+  rigtwin run active --config tuning/skyhook/tuned.toml
+
+Every run is kept; a second call goes on where the first was stopped."""
+
+
+def _tune(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("study", nargs="?", help="a study by name, or the path of its file")
+    parser.add_argument("--twin", type=Path, metavar="F.toml", help="tune on this calibrated twin and within its uncertainty")
+    parser.add_argument("--out", "-o", type=Path, metavar="FOLDER", help="of the results (default tuning/STUDY)")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of the optimiser (default 1); the same seed gives the same settings"
+    )
+    parser.add_argument("--evaluations", type=int, metavar="N", help="about how many candidates (default: the study's)")
+    parser.add_argument("--roads", type=int, metavar="N", help="scenarios that each is tried in (default: the study's)")
+    parser.add_argument("--held-out", type=int, metavar="N", help="scenarios to judge on (default: the study's)")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="override a setting of every run")
+    _workers(parser)
 
 
 def _effect(parser: argparse.ArgumentParser, summary: str) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rigtwin.console import apart, configured, late, table, writable
-from rigtwin.diagnosis.commands import blindcheck, compare, diagnose
+from rigtwin.diagnosis.commands import compare, diagnose
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.commands import machine, machines
 
@@ -196,6 +196,18 @@ def export(parsed: Namespace) -> int:
     return 0
 
 
+def blindcheck(parsed: Namespace) -> int:
+    from rigtwin.blindcheck.commands import blindcheck as work
+
+    return work(parsed)
+
+
+def tune(parsed: Namespace) -> int:
+    from rigtwin.tuning.commands import tune as work
+
+    return work(parsed)
+
+
 def reproduce(parsed: Namespace) -> int:
     from experiments.thesis.commands import reproduce as work
 
@@ -284,6 +296,7 @@ COMMANDS: dict[str, Callable[[Namespace], int]] = {
     "diagnose": diagnose,
     "blindcheck": blindcheck,
     "reproduce": reproduce,
+    "tune": tune,
     "stability": stability,
     "calibrate": calibrate,
 }

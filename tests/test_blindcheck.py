@@ -15,7 +15,8 @@ from rigtwin.blindcheck.asked import TESTS, asked
 from rigtwin.blindcheck.check import Result
 from rigtwin.blindcheck.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
 from rigtwin.blindcheck.referee import case, operator, sorts, write
-from rigtwin.blindcheck.reference_rig import Law, Truth, quiet, run
+from rigtwin.blindcheck.reference_plant import Truth
+from rigtwin.blindcheck.reference_rig import Law, quiet, run
 from rigtwin.blindcheck.score import misses, rows, table, wilson
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence

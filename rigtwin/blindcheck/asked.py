@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigtwin.blindcheck.reference_rig import Array, Law
+from rigtwin.blindcheck.reference_plant import Array
+from rigtwin.blindcheck.reference_rig import Law
 
 TESTS = ("imposed", "imposed", "imposed", "road10", "road1.6", "drop", "tripped")
 """Half of all that last are imposed; one in seven is short."""

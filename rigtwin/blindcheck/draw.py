@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.blindcheck.reference_rig import CELL, LVDT, Array, Law, Truth, quiet
+from rigtwin.blindcheck.reference_plant import CELL, LVDT, Array, Truth
+from rigtwin.blindcheck.reference_rig import Law, quiet
 
 Random = np.random.Generator
 Change = Callable[[Truth, Law], tuple[Truth, Law]]
@@ -50,7 +51,7 @@ def _either(random: Random, low: float, high: float) -> float:
     return _log(random, low, high) * float(random.choice([-1.0, 1.0]))
 
 
-def _friction(component: str, random: Random) -> list[Callable[[], Defect]]:
+def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
     base, big = (50.0, 1.0) if component == "rail" else (14.0, 0.3)
 
     def coulomb() -> Defect:
@@ -226,8 +227,8 @@ def library(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]
 
     carriage_and_tyre, controller = _others(random)[:4], _others(random)[4:]
     return [
-        _friction("rail", random),
-        _friction("motor", random) + _actuator("motor", "voltage", *reach(3), random),
+        friction("rail", random),
+        friction("motor", random) + _actuator("motor", "voltage", *reach(3), random),
         carriage_and_tyre,
         _actuator("ground_cylinder", "ground", *reach(0), random),
         _actuator("structure_cylinder", "structure", *reach(1), random),

@@ -18,7 +18,8 @@ from mcap.writer import CompressionType, Writer
 
 from rigtwin.blindcheck.asked import TESTS, asked
 from rigtwin.blindcheck.draw import MATERIAL, Defect, effect_size, library, outside, summary, tolerated
-from rigtwin.blindcheck.reference_rig import Array, Law, run
+from rigtwin.blindcheck.reference_plant import Array
+from rigtwin.blindcheck.reference_rig import Law, run
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
 """Of all cases."""

@@ -8,7 +8,13 @@ from pathlib import Path
 from rigtwin.configuration import Configuration, flattened
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.finding import Finding
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.effects import NAMES
 from rigtwin.errors import RigtwinError
+from rigtwin.posterior import Otherwise, Posterior, written
+
+GROUPS = {component: group for group, component in NAMES.items()}
+"""What a component is called among the parameters, where that is not its name in effects."""
 
 
 def toml(outcome: Outcome) -> str:
@@ -29,7 +35,28 @@ def toml(outcome: Outcome) -> str:
         changed = {key: value for key, value in corrected[group].items() if value != nominal[group][key]}
         if changed:
             lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in changed.items())]
+    if isinstance(outcome.corrected, Configuration) and outcome.diagnosis.effects:
+        lines += ["", *written(_posterior(outcome))]
     return "\n".join(lines) + "\n"
+
+
+def _posterior(outcome: Outcome) -> Posterior:
+    """How sure the values are, and what else would explain the recordings."""
+    intervals = {
+        f"{GROUPS.get(effect.name.component, effect.name.component)}.{name}": (each.low, each.high)
+        for effect in outcome.diagnosis.effects
+        if effect.name.kind not in ("setting", "unknown")
+        for name, each in effect.parameters.items()
+    }
+    sure = min(effect.confidence for effect in outcome.diagnosis.effects)
+    return Posterior({}, intervals, sure, tuple(_otherwise(fit, probability) for fit, probability in outcome.otherwise))
+
+
+def _otherwise(fit: Fit, probability: float) -> Otherwise:
+    changes: dict[str, dict[str, object]] = {}
+    for effect, values in zip(fit.effects, fit.values, strict=True):
+        changes.setdefault(effect.group, {}).update(zip(effect.kind.parameters, values, strict=True))
+    return Otherwise(fit.name, probability, changes)
 
 
 def _told(effect: Finding) -> str:

@@ -1,4 +1,4 @@
-"""What the commands do that look for a gap: compare, diagnose, blindcheck. Imports stay inside, as in rigtwin.commands."""
+"""What the commands do that look for a gap: compare, diagnose. Imports stay inside, as in rigtwin.commands."""
 
 from __future__ import annotations
 
@@ -203,24 +203,3 @@ def base_of(machine: Machine, parsed: Namespace) -> Any:
 
 NEXT_TESTS = ("imposed", "imposed-fast", "road10", "road1.6", "drop")
 """Experiments that a diagnosis may propose."""
-
-
-def blindcheck(parsed: Namespace) -> int:
-    from tqdm import tqdm
-
-    from rigtwin.blindcheck.check import check
-    from rigtwin.blindcheck.score import document
-    from rigtwin.blindcheck.score import table as scores
-    from rigtwin.sweep import hired
-
-    if parsed.cases < 1 or parsed.seed < 0:
-        raise RigtwinError("--cases must be at least 1, --seed at least 0")
-    with (
-        hired(parsed.workers, parsed.cluster) as workers,
-        tqdm(total=2 * parsed.cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar,
-    ):
-        result = check(parsed.folder, parsed.cases, parsed.seed, parsed.baselines, workers, bar.update)
-    print(scores(result))
-    if parsed.json is not None:
-        write_json(parsed.json, document(result))
-    return 0

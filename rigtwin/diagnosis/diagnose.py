@@ -59,6 +59,8 @@ TRACE = 0.01
 """Share of a rough model's gap below which an effect is not claimed."""
 NOTICED = 4.0
 """Times the power that is left without an effect that is claimed all the same, all others fitted again: twice the gap."""
+POSSIBLE = 0.01
+"""Probability from which on another explanation is kept beside the one named."""
 SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
@@ -68,11 +70,13 @@ Setting = TypeVar("Setting", Configuration, Setup, "Configuration | Setup")
 
 @dataclass(frozen=True)
 class Outcome:
-    """A diagnosis, what pictures of it are drawn from, and the corrected twin's configuration."""
+    """A diagnosis, what pictures of it are drawn from, and the corrected twin's configuration. otherwise: other explanations
+    that are not out of the question, with their probability."""
 
     diagnosis: Diagnosis
     evidence: Evidence | None
     corrected: Configuration | Setup
+    otherwise: tuple[tuple[Fit, float], ...] = ()
 
 
 def unusable(
@@ -204,7 +208,13 @@ def _diagnosed(
         tuple(leftovers(evidence, plant, disturbed)) if verdict != "no gap" and evidence.machine.rough else (),
         traces,
     )
-    return Outcome(diagnosis, evidence, corrected)
+    return Outcome(diagnosis, evidence, corrected, _otherwise(found, verdict_of_data.kept))
+
+
+def _otherwise(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, float], ...]:
+    """Explanations other than the one that is named, the likeliest first."""
+    others = [each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)]
+    return tuple((each.fit, each.probability) for each in others if each.probability >= POSSIBLE)
 
 
 def _clipped(evidence: Evidence) -> list[str]:

@@ -12,7 +12,7 @@ from uuid import uuid4
 from rigtwin.errors import RigtwinError
 from rigtwin.sweep.digest import source_digest
 
-ANSWERS = 10.0
+ANSWERS = 5.0
 """s that a scheduler may take to answer."""
 PATIENCE = 60.0
 """s without any worker until a sweep gives up."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,9 @@ from rigtwin.tuning.bench import Bench
 from rigtwin.tuning.measures import Measure
 from rigtwin.tuning.run import LIMITS, TRIP
 from rigtwin.tuning.scenario import Scenario
+
+Figures = Mapping[str, float]
+"""Of a run: name → figure, as `rigtwin.tuning.run` gives it."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +80,18 @@ def compared(
     bench: Bench, rig: str, scenarios: Sequence[Scenario], before: tuple[str, Settings], after: tuple[str, Settings]
 ) -> Comparison:
     """Both settings, each with its name, in every scenario."""
-    study = bench.study
-    first, second = bench.runs(study.configuration, [before[1], after[1]], scenarios)
+    first, second = bench.runs(bench.study.configuration, [before[1], after[1]], scenarios)
+    return comparison(bench.study.measures, rig, (before[0], first), (after[0], second))
+
+
+def comparison(
+    measures: Sequence[Measure], rig: str, before: tuple[str, Sequence[Figures]], after: tuple[str, Sequence[Figures]]
+) -> Comparison:
+    """Of runs of both settings, each with its name, in the same scenarios."""
+    (against, first), (settings, second) = before, after
     fine = [a[TRIP] == Trip.NONE and b[TRIP] == Trip.NONE for a, b in zip(first, second, strict=True)]
     changes = []
-    for measure in study.measures if any(fine) else ():
+    for measure in measures if any(fine) else ():
         one, other = (
             np.array([row[measure.name] for row, ok in zip(rows, fine, strict=True) if ok]) for rows in (first, second)
         )
@@ -93,4 +103,4 @@ def compared(
         changes.append(Change(measure, spread(one), spread(other), float(np.median(change)), low, high, better, relative))
     trips = tuple(float(np.mean([row[TRIP] != Trip.NONE for row in rows])) for rows in (first, second))
     limits = max(row[LIMITS] for row in second)
-    return Comparison(rig, after[0], before[0], tuple(changes), (trips[0], trips[1]), limits, int(sum(fine)))
+    return Comparison(rig, settings, against, tuple(changes), (trips[0], trips[1]), limits, int(sum(fine)))

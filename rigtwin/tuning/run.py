@@ -1,4 +1,4 @@
-"""One run of one candidate in one scenario, in any process: its measures, how near to its limits it came, whether it tripped."""
+"""One run of one candidate in one scenario, in any process: its measures, how near to its limits it came, any trip."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rigtwin.configuration import Configuration, flattened
 from rigtwin.peaks import peaks
-from rigtwin.runner import simulated
+from rigtwin.runner import Ran, simulated
 from rigtwin.safety import Trip
 from rigtwin.tuning.measures import MEASURES, Test
 
@@ -38,9 +38,13 @@ def run(asked: Run) -> dict[str, float]:
     """Name → figure. A run that tripped has no measures: they are not a number."""
     import experiments
 
+    demands = experiments.find(asked.experiment).demands(asked.configuration, asked.seed)
+    return figures(asked, simulated(asked.configuration, demands, asked.seed))
+
+
+def figures(asked: Run, ran: Ran) -> dict[str, float]:
+    """The same of a run that was made."""
     configuration = asked.configuration
-    demands = experiments.find(asked.experiment).demands(configuration, asked.seed)
-    ran = simulated(configuration, demands, asked.seed)
     reached = max(1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, configuration))
     found = {LIMITS: reached, TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:

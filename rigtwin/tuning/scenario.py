@@ -1,4 +1,4 @@
-"""The circumstances of one run: a road and noise of its own, and a rig as it may be. Drawn once; every candidate meets the same."""
+"""The circumstances of one run: a road and noise of its own, a rig as it may be. Every candidate meets the same ones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Rig = Callable[[Configuration, np.random.Generator], Configuration]
 """Draws a rig: of a configuration and random numbers, the configuration with what is known of this rig."""
 
 
-def nominal(configuration: Configuration, random: np.random.Generator) -> Configuration:
+def nominal(configuration: Configuration, _: np.random.Generator) -> Configuration:
     """The rig as the study has it."""
     return configuration
 
@@ -47,7 +47,7 @@ def changed(changes: Mapping[str, Mapping[str, object]]) -> Rig:
 
 
 def _changed(
-    changes: Mapping[str, Mapping[str, object]], configuration: Configuration, random: np.random.Generator
+    changes: Mapping[str, Mapping[str, object]], configuration: Configuration, _: np.random.Generator
 ) -> Configuration:
     return overridden(configuration, changes)
 

@@ -176,9 +176,8 @@ def front(search: Search) -> tuple[Tried, ...]:
 
 def _none(search: Search) -> Tried:
     study = search.study
-    names = ["no trip", f"limits within {study.limits:g}", *(constraint.measure.name for constraint in study.constraints)]
+    names = ["trips", "limits", *(constraint.measure.name for constraint in study.constraints)]
     least = np.min([each.violations for each in search.tried.values()], axis=0)
     hardest = names[int(np.argmax(least))]
-    raise RigtwinError(
-        f"none of {len(search.tried)} candidates meets every constraint; the hardest is {hardest!r}: allow more, or wider bounds"
-    )
+    tried = len(search.tried)
+    raise RigtwinError(f"none of {tried} candidates meets every constraint, hardest {hardest!r}: allow more, or wider bounds")

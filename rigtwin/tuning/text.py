@@ -1,0 +1,116 @@
+"""What came out of a study, in words and tables; on a terminal and on its page."""
+
+from __future__ import annotations
+
+from rigtwin.configuration import parameters
+from rigtwin.console import table
+from rigtwin.tuning.judged import Change, Comparison, Spread
+from rigtwin.tuning.outcome import NOMINAL, TUNED_NOMINAL, Outcome
+
+HEADER = ("measure", "unit", "before", "5 to 95 %", "after", "5 to 95 %", "change", "95 % of the median", "no worse in")
+
+
+def number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def spread(of: Spread) -> tuple[str, str]:
+    return number(of.median), f"{number(of.low)} to {number(of.high)}"
+
+
+def change(of: Change) -> tuple[str, str]:
+    """The change of the median, and its interval."""
+    unit = " %" if of.relative else ""
+    return f"{of.median:+.3g}{unit}", f"{of.low:+.3g} to {of.high:+.3g}{unit}"
+
+
+def row(of: Change) -> tuple[str, ...]:
+    better = f"{100.0 * of.better:.0f} %"
+    return of.measure.title, of.measure.unit, *spread(of.before), *spread(of.after), *change(of), better
+
+
+def heading(of: Comparison) -> str:
+    """What is compared, where."""
+    return f"{of.settings} against {of.against}, {of.rig}, {of.runs} held-out scenarios"
+
+
+def remarks(of: Comparison) -> list[str]:
+    """What is besides figures: trips, and how near to the limits it came."""
+    before, after = (f"{100.0 * share:.0f} %" for share in of.trips)
+    lines = [f"at most {100.0 * of.limits:.0f} % of a safety limit"]
+    if max(of.trips) > 0.0:
+        lines.append(f"tripped: {after} of the runs, {before} before; those are not compared")
+    return lines
+
+
+def sentence(outcome: Outcome) -> str:
+    """The answer in one sentence."""
+    objectives = [outcome.found.of(measure.name) for measure in outcome.study.minimise if outcome.found.changes]
+    if not objectives:
+        return f"Every held-out run of one of the two tripped on the {outcome.rig}: nothing can be compared."
+    parts = [f"{each.measure.title} {' '.join(change(each)[:1])} [{change(each)[1]}]" for each in objectives]
+    held = [
+        f"{constraint.measure.title} {change(each)[0]} [{change(each)[1]}]"
+        for constraint in outcome.study.constraints
+        for each in [outcome.found.of(constraint.measure.name)]
+    ]
+    beside = f"; held: {', '.join(held)}" if held else ""
+    return f"{', '.join(parts)} on {outcome.found.runs} held-out scenarios{beside}."
+
+
+def wrong(outcome: Outcome) -> list[str]:
+    """What the diagnosis is worth if it is right, and what the settings lose if it is wrong."""
+    lines = []
+    for comparison in outcome.comparisons:
+        if comparison.against != TUNED_NOMINAL or not comparison.changes:
+            continue
+        each = comparison.of(outcome.study.minimise[0].name)
+        which = "if the diagnosis were wrong and the rig nominal" if comparison.rig == NOMINAL else f"on the {comparison.rig}"
+        middle, ends = change(each)
+        lines.append(f"{which}: {each.measure.title} {middle} [{ends}] against settings {TUNED_NOMINAL}")
+    return lines
+
+
+def values(outcome: Outcome) -> list[tuple[str, ...]]:
+    """Every parameter: before, after, bounds, unit."""
+    before = outcome.study.reference
+    rows = [("parameter", "before", "after", "between", "unit")]
+    for parameter, value in zip(outcome.study.parameters, outcome.chosen.values, strict=True):
+        there = getattr(before, parameter.key.partition(".")[2])
+        at_end = " (at its bound)" if value in (parameter.low, parameter.high) else ""
+        bounds = f"{number(parameter.low)} to {number(parameter.high)}"
+        rows.append((parameter.key, number(there), number(value) + at_end, bounds, parameter.unit))
+    return rows
+
+
+def text(outcome: Outcome) -> str:
+    """Everything as plain text."""
+    blocks = [f"{outcome.study.title}\n{sentence(outcome)}", table(values(outcome))]
+    for comparison in (*outcome.comparisons, *outcome.on_front):
+        lines = [
+            heading(comparison),
+            table([HEADER, *map(row, comparison.changes)]) if comparison.changes else "nothing to compare",
+        ]
+        blocks.append("\n".join([*lines, *remarks(comparison)]))
+    if found := wrong(outcome):
+        blocks.append("\n".join(found))
+    return "\n\n".join(blocks)
+
+
+def toml(outcome: Outcome, number_of_point: int | None = None) -> str:
+    """The settings as `run --config` takes them: all of the controller's that differ from the experiment's own."""
+    import experiments
+    from rigtwin.tuning.outcome import settings_of
+
+    study = outcome.study
+    candidate = outcome.chosen if number_of_point is None else outcome.front[number_of_point]
+    comparison = outcome.found if number_of_point is None else outcome.on_front[number_of_point]
+    own = experiments.find(study.experiment).configuration
+    lines = [f"# {study.title}", f"# tuned on the {outcome.rig}, seed {outcome.seed}, {study.roads} scenarios"]
+    lines += [f"# {each.measure.title}: {change(each)[0]} [{change(each)[1]}] held out" for each in comparison.changes]
+    lines += [f"# rigtwin run {study.experiment} --config THIS.toml", "", "[controller]"]
+    before = {key: value for key, value, _ in parameters(own) if key.startswith("controller.")}
+    for name, value in settings_of(study, candidate)._asdict().items():
+        if value != before[f"controller.{name}"]:
+            lines.append(f'{name} = "{value.label}"' if hasattr(value, "label") else f"{name} = {value!r}")
+    return "\n".join(lines) + "\n"

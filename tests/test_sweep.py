@@ -1,0 +1,313 @@
+"""Sweeps: results on disk, workers that die, clusters, and the same answers whoever works."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigtwin.errors import RigtwinError
+from rigtwin.sweep import Store, each, hired, swept
+from rigtwin.sweep.cluster import _same
+from rigtwin.sweep.workers import Here
+
+
+def square(number: int) -> dict[str, float]:
+    return {"square": float(number * number)}
+
+
+def faulty(number: int) -> int:
+    if number == 3:
+        raise RigtwinError(f"{number} cannot be done")
+    return number
+
+
+def deadly(argument: tuple[str, int]) -> int:
+    """Kills its process the first time that it is called with 5."""
+    mark, number = argument
+    if number == 5 and not Path(mark).exists():
+        Path(mark).write_text("died here")
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 10 * number
+
+
+def always_deadly(number: int) -> int:
+    if number == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def process(_: int) -> int:
+    time.sleep(0.02)
+    return os.getpid()
+
+
+VALUES = {
+    "number": 0.1 + 0.2,
+    "whole": 7,
+    "none": float("nan"),
+    "endless": float("inf"),
+    "text": "°",
+    "curve": np.linspace(0.0, 1.0, 7),
+    "table": np.arange(6, dtype=np.int32).reshape(2, 3),
+    "flags": np.array([True, False]),
+    "scalar": np.float64(1.5),
+    "list": [1.0, {"deep": np.ones(2)}],
+}
+
+
+def test_a_store_gives_back_to_the_bit(tmp_path):
+    with Store(tmp_path / "s.sqlite") as store:
+        store["a"] = VALUES
+    with Store(tmp_path / "s.sqlite") as store:
+        found = store["a"]
+        assert list(store.keys()) == ["a"]
+    for name in ("number", "whole", "endless", "text", "scalar"):
+        assert found[name] == VALUES[name]
+    assert np.isnan(found["none"])
+    for name in ("curve", "table", "flags"):
+        assert np.array_equal(found[name], VALUES[name])
+        assert found[name].dtype == VALUES[name].dtype
+    assert np.array_equal(found["list"][1]["deep"], np.ones(2))
+
+
+def test_results_of_other_sources_are_not_taken_for_these(tmp_path):
+    with Store(tmp_path / "s.sqlite", "one") as store:
+        store["a"] = 1
+    with Store(tmp_path / "s.sqlite", "other") as store:
+        assert "a" not in store
+        with pytest.raises(KeyError):
+            store["a"]
+        assert len(store) == 0
+
+
+def test_mistakes_of_a_store_are_one_line(tmp_path):
+    (tmp_path / "text.sqlite").write_text("this is no database, and long enough to be read as one" * 10)
+    with pytest.raises(RigtwinError, match="is not a file of results, or damaged"):
+        Store(tmp_path / "text.sqlite")
+    with Store(tmp_path / "s.sqlite") as store:
+        store["a"] = 1
+        with pytest.raises(RigtwinError, match="in use by another run"):
+            Store(tmp_path / "s.sqlite")
+        with pytest.raises(TypeError, match="a result holds set"):
+            store["b"] = {1}
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RigtwinError, match="cannot"):
+        Store(tmp_path / "file" / "s.sqlite")
+
+
+def test_what_was_done_is_not_done_again(tmp_path):
+    ran: list[int] = []
+
+    def counted(number: int) -> int:
+        ran.append(number)
+        return -number
+
+    steps: list[int] = []
+    with Store(tmp_path / "s.sqlite") as store:
+        swept(store, Here(), counted, ((str(n), n) for n in range(5)))
+        swept(store, Here(), counted, ((str(n), n) for n in range(8)), steps.append)
+        assert [store[str(n)] for n in range(8)] == [-n for n in range(8)]
+    assert ran == list(range(8))
+    assert sum(steps) == 8
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_the_answers_do_not_depend_on_the_number_of_workers(count, tmp_path):
+    with hired(count) as workers, Store(tmp_path / "s.sqlite") as store:
+        swept(store, workers, square, ((f"{n:02d}", n) for n in range(20)))
+        assert [store[key]["square"] for key in store.keys()] == [float(n * n) for n in range(20)]  # noqa: SIM118
+
+
+def test_several_processes_work():
+    with hired(2) as workers:
+        found = {result for _, result in each(workers, process, ((str(n), n) for n in range(30)))}
+    assert len(found) == 2
+    assert os.getpid() not in found
+
+
+def test_a_worker_that_is_killed_loses_nothing(tmp_path):
+    mark = tmp_path / "mark"
+    with hired(2) as workers:
+        found = dict(each(workers, deadly, ((str(n), (str(mark), n)) for n in range(12))))
+    assert mark.exists()
+    assert found == {str(n): 10 * n for n in range(12)}
+
+
+def test_a_job_that_always_kills_its_worker_is_named_in_the_end():
+    with pytest.raises(RigtwinError, match="a worker died 3 times over"), hired(2) as workers:
+        list(each(workers, always_deadly, ((str(n), n) for n in range(4))))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_job_that_fails_ends_the_sweep_and_keeps_what_is_done(count, tmp_path):
+    with Store(tmp_path / "s.sqlite") as store:
+        with pytest.raises(RigtwinError, match="3 cannot be done"), hired(count) as workers:
+            swept(store, workers, faulty, ((str(n), n) for n in range(100)))
+        kept = {int(key) for key in store.keys()}  # noqa: SIM118
+    # What was under way beside it may be lost, nothing else.
+    assert len({0, 1, 2} - kept) < count
+    assert 3 not in kept
+    assert len(kept) < 50
+
+
+def test_jobs_are_taken_as_workers_become_free():
+    """Endlessly many may follow; memory holds those under way alone."""
+    taken = 0
+
+    def endless():
+        nonlocal taken
+        while True:
+            taken += 1
+            yield str(taken), taken
+
+    with hired(2) as workers:
+        for number, _ in enumerate(each(workers, square, endless())):
+            assert taken - number < 12
+            if number == 200:
+                break
+
+
+def test_wrong_workers_are_one_line():
+    for count in (0, -1, 100_000):
+        with pytest.raises(RigtwinError, match="expected 1 to 1024"):
+            hired(count)
+    with pytest.raises(RigtwinError, match="expected one of them"):
+        hired(2, "tcp://127.0.0.1:1")
+
+
+SWEEP = """
+import sys
+from pathlib import Path
+from rigtwin.sweep import Store, hired, swept
+from tests.test_sweep import slow
+
+if __name__ == "__main__":
+    with hired(2) as workers, Store(Path(sys.argv[1])) as store:
+        swept(store, workers, slow, ((str(n), n) for n in range(40)), lambda _: print("done", flush=True))
+"""
+
+
+def slow(number: int) -> int:
+    time.sleep(0.05)
+    return number
+
+
+def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
+    path = tmp_path / "s.sqlite"
+    script = tmp_path / "sweep.py"
+    script.write_text(SWEEP)
+    root = Path(__file__).parents[1]
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    with subprocess.Popen([sys.executable, str(script), str(path)], stdout=subprocess.PIPE, text=True, env=environment) as run:
+        assert run.stdout is not None
+        for _ in range(6):
+            assert run.stdout.readline() == "done\n"
+        workers = children(run.pid)
+        assert len(workers) >= 2
+        run.kill()
+    deadline = time.monotonic() + 10.0
+    while any(map(alive, workers)) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not any(map(alive, workers))
+    with closing(sqlite3.connect(path)) as base:
+        assert base.execute("SELECT COUNT(*) FROM results").fetchone()[0] >= 6
+    with Store(path) as store:
+        kept = set(store.keys())
+        ran: list[int] = []
+        swept(store, Here(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40)))
+        assert len(kept) + len(ran) == 40
+        assert [store[str(n)] for n in range(40)] == list(range(40))
+
+
+def children(process: int) -> list[int]:
+    return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+def alive(process: int) -> bool:
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """A scheduler and two workers, a process each; yields the address and the workers."""
+    pytest.importorskip("distributed")
+    folder = tmp_path_factory.mktemp("cluster")
+    file = folder / "scheduler.json"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder, "env": environment}
+    common = ["--scheduler-file", str(file), "--no-dashboard"]
+    local = ["--host", "127.0.0.1"]
+    begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", *common, *local]
+    scheduler = subprocess.Popen(begin, **quiet)
+    begin = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *common, *local]
+    workers = [subprocess.Popen(begin, **quiet) for _ in range(2)]
+    try:
+        deadline = time.monotonic() + 60.0
+        while not file.exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        yield json.loads(file.read_text())["address"], workers
+    finally:
+        for one in (*workers, scheduler):
+            one.kill()
+            one.wait()
+
+
+def joined(address: str):
+    """The cluster once both workers are there."""
+    deadline = time.monotonic() + 60.0
+    while True:
+        try:
+            workers = hired(None, address)
+        except RigtwinError:
+            workers = None
+        if workers is not None and workers.capacity == 2:
+            return workers
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
+def test_a_cluster_gives_the_same_answers_and_may_lose_a_worker(cluster, tmp_path):
+    address, processes = cluster
+    with joined(address) as workers, Store(tmp_path / "s.sqlite") as store:
+        done = 0
+
+        def progress(_: int) -> None:
+            nonlocal done
+            done += 1
+            if done == 10:
+                processes[0].kill()
+
+        swept(store, workers, slow, ((f"{n:02d}", n) for n in range(60)), progress)
+        assert [store[key] for key in store.keys()] == list(range(60))  # noqa: SIM118
+    assert processes[0].wait() == -signal.SIGKILL
+    assert done == 60
+
+
+def test_a_failing_job_on_a_cluster_is_one_line(cluster):
+    address, _ = cluster
+    with pytest.raises(RigtwinError, match="3 cannot be done"), hired(None, address) as workers:
+        list(each(workers, faulty, ((str(n), n) for n in range(10))))
+
+
+def test_a_worker_with_other_sources_is_refused():
+    with pytest.raises(RigtwinError, match="another version of rigtwin"):
+        _same("0" * 12, square, 2)
+
+
+def test_a_cluster_that_is_not_there_is_one_line():
+    pytest.importorskip("distributed")
+    with pytest.raises(RigtwinError, match="no cluster at"):
+        hired(None, "tcp://127.0.0.1:9")
