@@ -118,7 +118,7 @@ class Actuators:
 
 class Environment(dm_env.Environment):
     """One experiment as episodes. Observations, a dictionary: `sensors`, the last raw samples, columns of
-    controllers.Measurements, m and N; `controller`, see OBSERVED; `commands`, the last, columns of controllers.Commands, m, N, V.
+    controllers.Measurements, m and N; `controller`, see OBSERVED; `commands`, the last, of controllers.Commands, m, N, V.
     `trip` says why the last episode ended early."""
 
     def __init__(
@@ -144,10 +144,10 @@ class Environment(dm_env.Environment):
         self._sag = (configuration.controller.preload - self._static) / max(configuration.controller.suspension_stiffness, 1e-9)
         self._over = True
 
-    def action_spec(self) -> specs.BoundedArray:
+    def action_spec(self) -> specs.BoundedArray:  # type: ignore[override]
         return self.actions.spec(self.configuration)
 
-    def observation_spec(self) -> dict[str, specs.Array]:
+    def observation_spec(self) -> dict[str, specs.Array]:  # type: ignore[override]
         return {
             "sensors": specs.Array((4,), np.float64, name=", ".join(Measurements._fields)),
             "controller": specs.Array((len(OBSERVED),), np.float64, name=", ".join(OBSERVED)),

@@ -25,12 +25,12 @@ def made(name: str, **options) -> Environment:
 
 
 class TestScheduleConforms(test_utils.EnvironmentTestMixin, unittest.TestCase):
-    def make_object_under_test(self):
+    def make_object_under_test(self, **_):
         return made("active")
 
 
 class TestActuatorsConform(test_utils.EnvironmentTestMixin, unittest.TestCase):
-    def make_object_under_test(self):
+    def make_object_under_test(self, **_):
         return made("drop", actions=Actuators())
 
 
@@ -39,7 +39,7 @@ def test_at_rest_it_is_the_compiled_loop_to_the_bit(name):
     configuration = short(name, 1.0, computer={"missed_ticks": 0.02})
     env = Environment(configuration, find(name).demands, seed=5, interval=1)
     ran = simulated(configuration, find(name).demands(configuration, 5), 5)
-    env.reset()
+    step = env.reset()
     for tick in range(len(ran.commands)):
         step = env.step(env.rest())
         assert np.array_equal(step.observation["sensors"], ran.measurements[tick]), tick

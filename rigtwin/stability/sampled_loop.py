@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag, expm
 from scipy.sparse.csgraph import breadth_first_order
 
@@ -59,7 +60,7 @@ def decay(configuration: Configuration) -> float:
     return -math.log(largest) / configuration.timing.period if largest > 0.0 else math.inf
 
 
-def _reachable(edges: Array, start: tuple[int, ...]) -> Array:
+def _reachable(edges: NDArray[np.bool_], start: tuple[int, ...]) -> NDArray[np.bool_]:
     """Which nodes can be come to from any of `start`; edges[i, j]: from i to j."""
     found = np.zeros(len(edges), dtype=bool)
     for node in start:
@@ -75,9 +76,7 @@ def closed_loop(configuration: Configuration) -> Array:
     late = [plant.structure_cylinder.delay + plant.computer.delay, plant.motor.delay + plant.computer.delay]
     registers = [max(1, math.floor(delay / period + 1e-9) + 1) for delay in late]
     transducers = [_transducer(sensor, period) for sensor in sensors(plant)[1:]]
-    sensing_a = block_diag(*(each[0] for each in transducers))
-    sensing_b = block_diag(*(each[1] for each in transducers))
-    sensing_c = block_diag(*(each[2] for each in transducers))
+    sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*(each[part] for each in transducers))) for part in range(3))
     sensing_d = np.diag([each[3] for each in transducers])
 
     sizes = [len(a), sum(registers), len(sensing_a), SIZE]

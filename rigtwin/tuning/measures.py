@@ -22,7 +22,7 @@ HEAVE = 3.0
 
 
 @dataclass(frozen=True)
-class Test:
+class Trial:
     """A test that was run to its end, judged from tick `first` on. commands, sensed: shape (ticks, 4), columns of
     controllers.Commands and .Measurements; sensed: without noise where a twin knows it."""
 
@@ -65,15 +65,15 @@ class Measure:
     name: str
     title: str
     unit: str
-    of: Callable[[Test], float]
+    of: Callable[[Trial], float]
     more: bool = False
 
 
-def _acceleration(test: Test) -> Array:
+def _acceleration(test: Trial) -> Array:
     return np.diff(test.plate, 2) / test.period**2
 
 
-def _heave(test: Test) -> float:
+def _heave(test: Trial) -> float:
     smooth = sosfiltfilt(butter(2, HEAVE, fs=1.0 / test.period, output="sos"), test.plate)
     return rms(np.diff(smooth, 2) / test.period**2)
 

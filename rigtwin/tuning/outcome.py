@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers import Settings
-from rigtwin.posterior import Posterior
+from rigtwin.posterior import Changes, Posterior
 from rigtwin.tuning.bench import Bench, Worth
 from rigtwin.tuning.judged import Comparison, compared
 from rigtwin.tuning.parameter import with_values
-from rigtwin.tuning.scenario import APART, Rig, changed, diagnosed, drawn, nominal
+from rigtwin.tuning.scenario import APART, NONE, Rig, diagnosed, drawn, nominal
 from rigtwin.tuning.search import Search, Tried, best, front
 from rigtwin.tuning.study import Study
 
@@ -70,9 +70,9 @@ def tuned(
         stage(f"tuning on the {NOMINAL}")
         rivals.append((TUNED_NOMINAL, searched(bench, nominal, seed)))
     comparisons = []
-    for where, of in _rigs(study, rig, name, posterior).items():
+    for where, (of, certain) in _rigs(study, rig, name, posterior).items():
         stage(f"judging on the {where}")
-        scenarios = drawn(study, of, study.held_out, APART)
+        scenarios = drawn(study, of, study.held_out, APART, certain)
         comparisons += [compared(bench, where, scenarios, rival, after) for rival in rivals]
     on_front = []
     if len(study.minimise) == 2:
@@ -110,10 +110,10 @@ def _nearest(study: Study, points: tuple[Tried, ...]) -> Tried:
     return points[int(np.argmin(np.linalg.norm((figures - figures.min(axis=0)) / spans, axis=1)))]
 
 
-def _rigs(study: Study, rig: Rig, name: str, posterior: Posterior | None) -> dict[str, Rig]:
+def _rigs(study: Study, rig: Rig, name: str, posterior: Posterior | None) -> dict[str, tuple[Rig, Changes]]:
     """What the result is judged on: the rig as known, the nominal one, the other explanations, and the study's own."""
-    rigs = {name: rig}
+    rigs: dict[str, tuple[Rig, Changes]] = {name: (rig, NONE)}
     if posterior is not None:
-        rigs[NOMINAL] = nominal
-        rigs |= {f"twin with {other.effect} instead": changed(other.changes) for other in posterior.otherwise}
-    return rigs | {f"rig with {label}": changed(changes) for label, changes in study.judge.items()}
+        rigs[NOMINAL] = nominal, NONE
+        rigs |= {f"twin with {other.effect} instead": (nominal, other.changes) for other in posterior.otherwise}
+    return rigs | {f"rig with {label}": (rig, changes) for label, changes in study.judge.items()}

@@ -11,7 +11,7 @@ from rigtwin.configuration import Configuration, flattened
 from rigtwin.peaks import peaks
 from rigtwin.runner import Ran, simulated
 from rigtwin.safety import Trip
-from rigtwin.tuning.measures import MEASURES, Test
+from rigtwin.tuning.measures import MEASURES, Trial
 
 LIMITS, TRIP = "limits", "trip"
 """Besides the measures: the largest share of a safety limit that was reached, and the number of a Trip."""
@@ -49,5 +49,5 @@ def figures(asked: Run, ran: Ran) -> dict[str, float]:
     found = {LIMITS: reached, TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:
         return found | dict.fromkeys(asked.measures, math.nan)
-    test = Test(configuration, ran.commands, ran.truth, round(asked.first / configuration.timing.period))
+    test = Trial(configuration, ran.commands, ran.truth, round(asked.first / configuration.timing.period))
     return found | {name: float(MEASURES[name].of(test)) for name in asked.measures}

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -12,9 +11,10 @@ from rigtwin.channels import SUSPENSION_RIG
 from rigtwin.configuration import Configuration, overridden
 from rigtwin.machine.library import find
 from rigtwin.parameters import Plant
-from rigtwin.posterior import Posterior, shifted_within
+from rigtwin.posterior import Changes, Posterior, shifted_within
 from rigtwin.tuning.study import Study
 
+NONE: Changes = {}
 APART = 1_000_000
 """Between the seeds of search and judgement: no study has as many roads."""
 
@@ -41,21 +41,11 @@ def diagnosed(posterior: Posterior) -> Rig:
     return posterior.drawn
 
 
-def changed(changes: Mapping[str, Mapping[str, object]]) -> Rig:
-    """The rig with certain changes."""
-    return partial(_changed, changes)
-
-
-def _changed(
-    changes: Mapping[str, Mapping[str, object]], configuration: Configuration, _: np.random.Generator
-) -> Configuration:
-    return overridden(configuration, changes)
-
-
-def drawn(study: Study, rig: Rig, count: int, first: int) -> list[Scenario]:
+def drawn(study: Study, rig: Rig, count: int, first: int, certain: Changes = NONE) -> list[Scenario]:
     """Scenarios with seeds from `first` on, each drawn from its seed alone, so that more of them leave the others as they are.
 
-    Tolerances and varied parameters are uniform within their bounds, about what is known of the rig.
+    Tolerances and varied parameters are uniform within their bounds, about what is known of the rig; certain: what has a value
+    for certain.
     """
     tolerances = find(SUSPENSION_RIG).tolerances if study.tolerances else ()
     found = []
@@ -70,5 +60,5 @@ def drawn(study: Study, rig: Rig, count: int, first: int) -> list[Scenario]:
             group, _, name = key.partition(".")
             value = float(getattr(getattr(configuration.plant, group), name))
             configuration = shifted_within(configuration, key, value * share * random.uniform(-1.0, 1.0))
-        found.append(Scenario(seed, configuration.plant))
+        found.append(Scenario(seed, overridden(configuration, certain).plant))
     return found

@@ -112,7 +112,7 @@ class Search:
             objectives,
             [(0.0, 1.0)] * count,
             constraints=NonlinearConstraint(lambda shares: told(shares, beyond), -math.inf, 0.0),
-            init=np.vstack([begun, fresh]),
+            init=np.vstack([begun, fresh]),  # type: ignore[arg-type]
             maxiter=max(1, round(evaluations / population) - 1),
             tol=CONVERGED,
             rng=random,

@@ -1,0 +1,523 @@
+"""Tuning: measures against closed forms, a search whose answer is known, judgement, and a study from end to end."""
+
+from __future__ import annotations
+
+import csv
+import math
+import sqlite3
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controllers import Settings
+from experiments import find as experiment
+from rigtwin.cli import main
+from rigtwin.configuration import Configuration, from_toml, overridden
+from rigtwin.errors import RigtwinError
+from rigtwin.posterior import Otherwise, Posterior, load_posterior, written
+from rigtwin.recording import load
+from rigtwin.sweep import Store
+from rigtwin.sweep.workers import Here
+from rigtwin.tuning.bench import Bench, Worth, quantile
+from rigtwin.tuning.judged import comparison, median_interval
+from rigtwin.tuning.measures import MEASURES, Trial
+from rigtwin.tuning.parameter import Parameter, values
+from rigtwin.tuning.run import LIMITS, TRIP, Run, run
+from rigtwin.tuning.scenario import APART, diagnosed, drawn, nominal
+from rigtwin.tuning.search import Search, best, front
+from rigtwin.tuning.study import Study, find, parsed, shipped
+
+SMALL = """
+title = "a small study"
+experiment = "active"
+from = 1.0
+roads = 2
+held_out = 6
+evaluations = 16
+minimise = "ride"
+report = ["heave", "road_holding"]
+
+[set]
+"timing.duration" = 2.5
+
+[search]
+"timing.timestep" = 5e-4
+
+[parameters]
+"controller.skyhook_damping" = [50.0, 1500.0]
+
+[constraints]
+limits = 0.9
+"""
+TABLES = {
+    "experiment": "active",
+    "minimise": "ride",
+    "parameters": {"controller.skyhook_damping": [50.0, 1500.0]},
+}
+
+
+def sine_test(amplitude: float, frequency: float, column: int) -> Trial:
+    """Ten seconds in which one true signal swings (m, N or V about a mean), and nothing else does."""
+    time = np.arange(10_000) * 1e-3
+    commands, sensed = np.zeros((10_000, 4)), np.zeros((10_000, 4))
+    # The tyre stays pressed: the wheel rests 4 mm below the ground plate.
+    sensed[:, 2] = 0.004
+    table = sensed if column < 4 else commands
+    table[:, column % 4] += amplitude * np.sin(2 * np.pi * frequency * time)
+    return Trial(Configuration(), commands, sensed)
+
+
+def test_measures_of_sines():
+    test = sine_test(0.002, 2.0, 1)
+    assert MEASURES["ride"].of(test) == pytest.approx(0.002 * (4 * np.pi) ** 2 / math.sqrt(2), rel=1e-3)
+    assert MEASURES["heave"].of(test) < MEASURES["ride"].of(test)
+    # The plate moves under a wheel whose travel does not change: so does the wheel.
+    assert MEASURES["road_holding"].of(test) == pytest.approx(50_000 * 0.002 / math.sqrt(2), rel=1e-3)
+    assert MEASURES["travel"].of(sine_test(0.003, 1.0, 2)) == pytest.approx(0.003 / math.sqrt(2), rel=1e-6)
+    assert MEASURES["effort"].of(sine_test(1.5, 1.0, 7)) == pytest.approx(1.5 / math.sqrt(2), rel=1e-6)
+    fast, slow = (MEASURES["heave"].of(sine_test(0.001, f, 1)) for f in (12.0, 1.0))
+    assert slow == pytest.approx(0.001 * (2 * np.pi) ** 2 / math.sqrt(2), rel=0.03)
+    # A second order there and back: 1/(1 + (12/3)⁴) of it is left.
+    assert fast == pytest.approx(0.001 * (24 * np.pi) ** 2 / math.sqrt(2) / (1 + 4**4), rel=0.05)
+
+
+def test_a_tyre_that_lifts_does_not_pull():
+    test = sine_test(0.010, 1.0, 0)
+    tyre = test.tyre
+    assert tyre.min() == 0.0
+    assert tyre.max() == pytest.approx(50_000 * 0.014, rel=1e-3)
+
+
+def test_only_what_comes_after_the_start_counts():
+    test = sine_test(0.002, 2.0, 1)
+    test.sensed[:1000, 1] += np.linspace(0.5, 0.0, 1000)
+    late = replace(test, first=2000)
+    assert MEASURES["ride"].of(late) == pytest.approx(0.002 * (4 * np.pi) ** 2 / math.sqrt(2), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["drop", "active", "semi-active", "friction-road", "single-mass", "imposed"])
+def test_every_measure_is_a_number_for_every_kind_of_test(name):
+    configuration = overridden(experiment(name).configuration, {"timing": {"duration": 2.0, "timestep": 1e-3}})
+    found = run(Run(name, configuration, 0, 0.5, tuple(MEASURES)))
+    assert set(found) == {*MEASURES, LIMITS, TRIP}
+    assert all(map(math.isfinite, found.values()))
+    assert 0.0 < found[LIMITS] < 1.0
+
+
+def test_a_run_that_trips_has_no_measures():
+    configuration = overridden(Configuration(), {"timing": {"duration": 1.0}, "safety": {"force": 150.0}})
+    found = run(Run("drop", configuration, 0, 0.0, ("ride",)))
+    assert found[TRIP] != 0.0
+    assert math.isnan(found["ride"])
+    assert found[LIMITS] > 1.0
+
+
+def test_errors_are_those_of_the_thesis_tables():
+    from rigtwin.metrics import tracking
+    from rigtwin.runner import record
+
+    configuration = overridden(Configuration(), {"timing": {"duration": 3.0}})
+    found = run(Run("drop", configuration, 4, 0.0, tuple(MEASURES)))
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "r.mcap"
+        record(path, "drop", configuration, experiment("drop").demands(configuration, 4), 4)
+        expected = tracking(load(path), configuration)
+    assert found["tracking"] == pytest.approx(expected.force_e2, rel=1e-12)
+    assert found["force_error"] == pytest.approx(expected.force_e1 + expected.force_e2, rel=1e-12)
+    assert found["position_error"] == pytest.approx(expected.position_e1 + expected.position_e2, rel=1e-12)
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_a_parameter_goes_there_and_back(logarithmic):
+    parameter = Parameter("controller.ki", 2.0, 300.0, logarithmic, "1/s")
+    assert parameter.value(0.0) == 2.0
+    assert parameter.value(1.0) == 300.0
+    for share in np.linspace(0, 1, 11):
+        value = parameter.value(share)
+        assert 2.0 <= value <= 300.0
+        assert parameter.share(value) == pytest.approx(share, abs=1e-3)
+        assert float(f"{value:.3e}") == value
+    assert parameter.share(1e6) == 1.0
+    assert parameter.share(0.0) == 0.0
+    middle = math.sqrt(600.0) if logarithmic else 151.0
+    assert parameter.value(0.5) == pytest.approx(middle, rel=1e-3)
+
+
+def test_every_study_that_comes_along_can_be_read():
+    assert {"skyhook", "friction", "two-step", "compensator"} <= set(shipped())
+    for name in shipped():
+        study = find(name)
+        assert study.parameters
+        assert study.title != name
+        for parameter in study.parameters:
+            there = getattr(study.reference, parameter.key.partition(".")[2])
+            assert parameter.low <= there <= parameter.high, parameter.key
+        assert run(
+            Run(
+                study.experiment,
+                overridden(study.searched, {"timing": {"duration": 1.0}})._replace(controller=study.reference),
+                0,
+                0.0,
+                tuple(measure.name for measure in study.measures),
+            )
+        )
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"nothing": 1}, "unknown 'nothing'"),
+        ({"experiment": "moon"}, "unknown experiment"),
+        ({"minimise": "beauty"}, "unknown 'beauty'; there are ride"),
+        ({"minimise": ["ride", "heave", "travel"]}, "one objective, or two"),
+        ({"minimise": 3}, "expected names of"),
+        ({"parameters": {}}, "expected settings with bounds"),
+        ({"parameters": {"rail.coulomb": [1, 2]}}, "only the controller is tuned"),
+        ({"parameters": {"controller.nothing": [1, 2]}}, "a setting that is a number"),
+        ({"parameters": {"controller.skyhook": [1, 2]}}, "a setting that is a number"),
+        ({"parameters": {"controller.kp": [2, 1]}}, "low below high"),
+        ({"parameters": {"controller.kp": [0, 1e9]}}, "expected a number from 0 to 20"),
+        ({"parameters": {"controller.kp": [0, math.nan]}}, "expected a number from 0 to 20"),
+        ({"parameters": {"controller.kp": 3}}, "expected its bounds"),
+        ({"parameters": {"controller.kp": {"between": [0, 1], "scale": "logarithmic"}}}, "above 0 if logarithmic"),
+        ({"parameters": {"controller.kp": {"between": [0, 1], "scale": "odd"}}}, "expected between"),
+        ({"constraints": {"beauty": 1}}, "unknown 'beauty'"),
+        ({"constraints": {"travel": "low"}}, 'expected a number, "baseline"'),
+        ({"constraints": {"travel": "-1 baseline"}}, 'expected a number, "baseline"'),
+        ({"constraints": {"limits": 2}}, "expected a number from 0.01 to 1"),
+        ({"vary": {"controller.kp": 0.3}}, "component.parameter of the rig"),
+        ({"vary": {"motor.coulomb": 3}}, "expected a number from 0 to 1"),
+        ({"judge": {"odd": {"controller.kp": 0.3}}}, "changes of the rig alone"),
+        ({"set": {"controller.kp": "x"}}, "controller.kp = x"),
+        ({"set": 3}, "expected a table of settings"),
+        ({"search": {"controller.kp": 0.2}}, "expected timing, safety or road"),
+        ({"search": {"timing.timestep": 3e-4}}, "whole multiple"),
+        ({"baseline": {"rail.coulomb": 0.2}}, "settings of the controller alone"),
+        ({"from": 44.5}, "at least a second before the test's end"),
+        ({"roads": 0}, "expected a whole number from 1"),
+        ({"held_out": 5}, "expected a whole number from 6"),
+        ({"roads": True}, "expected a whole number"),
+        ({"quantile": 1.5}, "expected a number from 0 to 1"),
+    ],
+)
+def test_mistakes_in_a_study_are_one_line(changes, says):
+    with pytest.raises(RigtwinError, match=says):
+        parsed("s", {**TABLES, **changes})
+
+
+@pytest.mark.parametrize("key", ["experiment", "minimise", "parameters"])
+def test_what_is_missing_in_a_study_is_said(key):
+    with pytest.raises(RigtwinError, match=f"{key} is missing"):
+        parsed("s", {name: value for name, value in TABLES.items() if name != key})
+
+
+def test_scenarios_are_the_same_for_everybody():
+    study = parsed("s", {**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
+    few, more = drawn(study, nominal, 3, 0), drawn(study, nominal, 6, 0)
+    assert few == more[:3]
+    assert [each.seed for each in drawn(study, nominal, 2, APART)] == [APART, APART + 1]
+    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, nominal, 200, 0)])
+    assert frictions.min() > 14.0 * 0.7 * 0.97
+    assert frictions.max() < 14.0 * 1.3 * 1.03
+    assert np.std(frictions) == pytest.approx(14.0 * 0.6 / math.sqrt(12), rel=0.15)
+    masses = np.array([each.plant.carriage.mass for each in drawn(study, nominal, 200, 0)])
+    assert np.all(np.abs(masses / 34.0 - 1.0) <= 0.005)
+    assert min(each.plant.motor.delay for each in more) >= 0.0
+    plain = parsed("s", TABLES)
+    assert {each.plant for each in drawn(plain, nominal, 5, 0)} == {plain.configuration.plant}
+
+
+POSTERIOR = Posterior(
+    {"motor": {"coulomb": 24.0}},
+    {"motor.coulomb": (22.0, 26.0)},
+    0.9,
+    (Otherwise("viscous@motor", 0.05, {"motor": {"viscous": 40.0}}),),
+)
+
+
+def calibrated(path: Path) -> Path:
+    path.write_text("\n".join(["[motor]", "coulomb = 24.0", "", *written(POSTERIOR)]) + "\n")
+    return path
+
+
+def test_a_posterior_is_read_as_it_was_written(tmp_path):
+    assert load_posterior(calibrated(tmp_path / "c.toml")) == POSTERIOR
+    # run and compare take the same file.
+    assert from_toml(Configuration(), tmp_path / "c.toml").plant.motor.coulomb == 24.0
+    (tmp_path / "plain.toml").write_text("[rail]\ncoulomb = 60\n")
+    plain = load_posterior(tmp_path / "plain.toml")
+    assert plain.intervals == {}
+    assert plain.at_best(Configuration()).plant.rail.coulomb == 60.0
+
+
+def test_a_rig_is_drawn_as_uncertain_as_it_is():
+    study = parsed("s", TABLES)
+    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, diagnosed(POSTERIOR), 400, 0)])
+    assert np.mean(frictions) == pytest.approx(24.0, abs=0.2)
+    assert np.std(frictions) == pytest.approx(4.0 / 3.92, rel=0.12)
+    wide = replace(POSTERIOR, intervals={"motor.coulomb": (-200.0, 200.0)})
+    assert min(each.plant.motor.coulomb for each in drawn(study, diagnosed(wide), 50, 0)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("posterior = 3", "expected a table"),
+        ("[posterior]\nodd = 1", "unknown posterior.odd"),
+        ("[posterior]\nprobability = 2", "expected 0 to 1"),
+        ('[posterior.intervals]\n"moon.mass" = [1, 2]', "unknown parameter 'moon.mass'"),
+        ('[posterior.intervals]\n"motor.coulomb" = [2, 1]', r"expected \[low, high\]"),
+        ('[posterior.intervals]\n"motor.coulomb" = [1, nan]', r"expected \[low, high\]"),
+        ("[posterior]\notherwise = 3", "expected tables"),
+        ("[[posterior.otherwise]]\nprobability = 0.1", "expected effect"),
+        ("[moon]\nmass = 1", "unknown group 'moon'"),
+    ],
+)
+def test_mistakes_in_a_calibrated_twin_are_one_line(text, says, tmp_path):
+    (tmp_path / "c.toml").write_text(text)
+    with pytest.raises(RigtwinError, match=says):
+        load_posterior(tmp_path / "c.toml")
+
+
+@dataclass(frozen=True)
+class Known(Bench):
+    """A bench that knows: ride is least at 700 Ns/m and kp 1.3; road holding at 300 Ns/m."""
+
+    def searched(self, candidates, scenarios) -> list[Worth]:
+        found = []
+        for one in candidates:
+            ride = 1.0 + ((one.skyhook_damping - 700.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
+            holding = 2.0 + ((one.skyhook_damping - 300.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
+            trips = 0.0 if one.kp < 1.8 else 0.5
+            figures = {"ride": ride, "road_holding": holding} if not trips else {"ride": math.nan, "road_holding": math.nan}
+            found.append(Worth(figures, 0.5, trips))
+            self.progress(1)
+        return found
+
+
+def searching(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> Search:
+    parameters = {"controller.skyhook_damping": [50.0, 1500.0], "controller.kp": [0.1, 2.0]}
+    study = parsed("s", {**TABLES, "parameters": parameters, "evaluations": 400, **tables})
+    return Search(Known(study, Store(tmp_path / "s.sqlite"), Here(), progress), [], 1)
+
+
+def test_the_best_is_found(tmp_path):
+    found = best(searching(tmp_path, {}))
+    assert found.values == pytest.approx((700.0, 1.3), rel=0.05)
+    assert found.worth.figures["ride"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_best_within_a_constraint_is_found(tmp_path):
+    """On the circle about (300, 1.3) of radius 0.4 in shares of 500: 500 Ns/m."""
+    found = best(searching(tmp_path, {"constraints": {"road_holding": 2.16}}))
+    assert found.allowed
+    assert found.values == pytest.approx((500.0, 1.3), rel=0.05)
+    assert found.worth.figures["ride"] == pytest.approx(1.16, abs=0.01)
+
+
+def test_what_trips_is_never_chosen(tmp_path):
+    search = searching(tmp_path, {"parameters": {"controller.skyhook_damping": [600, 800], "controller.kp": [1.5, 2.0]}})
+    found = best(search)
+    assert found.values[1] < 1.8
+    assert any(each.worth.trips for each in search.tried.values())
+
+
+def test_a_bound_may_be_the_baselines(tmp_path):
+    search = searching(tmp_path, {"constraints": {"road_holding": "0.9 baseline"}})
+    there = search.baseline.figures["road_holding"]
+    assert search.bounds == [pytest.approx(0.9 * there)]
+    assert best(search).worth.figures["road_holding"] <= 0.9 * there
+
+
+def test_nothing_allowed_is_said(tmp_path):
+    with pytest.raises(RigtwinError, match=r"none of .* candidates meets every constraint, hardest 'road_holding'"):
+        best(searching(tmp_path, {"constraints": {"road_holding": 1.5}}))
+
+
+def test_a_front_is_the_line_between_both_best(tmp_path):
+    search = searching(tmp_path, {"minimise": ["ride", "road_holding"], "points": 6, "evaluations": 600})
+    found = front(search)
+    assert len(found) > 6
+    for one, next_one in pairwise(found):
+        assert one.worth.figures["ride"] <= next_one.worth.figures["ride"]
+        assert one.worth.figures["road_holding"] > next_one.worth.figures["road_holding"]
+    # Between 300 and 700 Ns/m at kp 1.3, √(ride − 1) + √(holding − 2) = 0.8 on the true front.
+    for each in found:
+        short = math.sqrt(each.worth.figures["ride"] - 1.0) + math.sqrt(each.worth.figures["road_holding"] - 2.0)
+        assert 0.8 - 1e-9 <= short < 1.0
+    damping = [each.values[0] for each in found]
+    assert max(damping) > 650.0
+    assert min(damping) < 350.0
+
+
+def test_a_search_goes_the_same_way_again(tmp_path):
+    one, again = (list(_all(searching(tmp_path / name, {}))) for name in ("a", "b"))
+    assert one == again
+
+
+def _all(search: Search) -> dict[tuple[float, ...], object]:
+    best(search)
+    return search.tried
+
+
+def test_a_quantile_is_on_the_worse_side():
+    numbers = list(range(11))
+    assert quantile(MEASURES["ride"], numbers, 0.8) == 8.0
+    assert quantile(MEASURES["stability_margin"], numbers, 0.8) == pytest.approx(2.0)
+    assert math.isnan(quantile(MEASURES["ride"], [1.0, math.nan], 0.5))
+
+
+@pytest.mark.parametrize("count", [6, 16, 32])
+def test_the_interval_of_a_median_holds_it_as_often_as_it_says(count):
+    random = np.random.default_rng(count)
+    inside = 0
+    for _ in range(2000):
+        low, high = median_interval(random.exponential(1.0, count))
+        inside += low <= math.log(2.0) <= high
+    assert inside / 2000 > 0.94
+
+
+def test_a_comparison_is_paired_and_leaves_trips_out():
+    measures = (MEASURES["ride"], MEASURES["stability_margin"])
+
+    def rows(rides: list[float], margins: list[float], trips: list[float]) -> list[dict[str, float]]:
+        return [{"ride": r, "stability_margin": m, TRIP: t, LIMITS: 0.4} for r, m, t in zip(rides, margins, trips, strict=True)]
+
+    before = rows([1.0, 2.0, 4.0, math.nan], [1.0, 1.0, 1.0, 1.0], [0, 0, 0, 1])
+    after = rows([0.5, 1.0, 3.0, 1.0], [1.5, 0.5, 2.0, 1.0], [0, 0, 0, 0])
+    found = comparison(measures, "rig", ("before", before), ("tuned", after))
+    assert found.runs == 3
+    assert found.trips == (0.25, 0.0)
+    ride, margin = found.of("ride"), found.of("stability_margin")
+    assert ride.median == pytest.approx(-50.0)
+    assert ride.better == 1.0
+    assert margin.median == pytest.approx(0.5)
+    assert margin.better == pytest.approx(2 / 3)
+    assert not margin.relative
+
+
+def small(folder: Path, text: str = SMALL) -> Path:
+    path = folder / "small.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_study_from_end_to_end(tmp_path, capsys):
+    path, out = small(tmp_path), tmp_path / "out"
+    assert main(["tune", str(path), "--out", str(out), "--workers", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "a small study" in printed
+    assert "6 held-out scenarios" in printed
+    assert {"tuned.toml", "best.mcap", "candidates.csv", "held-out.csv", "index.html", "search.png"} <= {
+        each.name for each in out.iterdir()
+    }
+    # What was chosen is the best of those allowed, and better than what was begun with.
+    with (out / "candidates.csv").open() as file:
+        tried = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
+    chosen = from_toml(experiment("active").configuration, out / "tuned.toml").controller.skyhook_damping
+    least = min((row for row in tried if row["allowed"]), key=lambda row: row["ride"])
+    assert chosen == least["controller.skyhook_damping"]
+    assert chosen > 500.0
+    recording = load(out / "best.mcap")
+    assert recording.end == "completed"
+    assert recording.controller["skyhook_damping"] == chosen
+    page = (out / "index.html").read_text()
+    assert not any(word in page for word in ("<script", 'src="', 'href="http', "@import"))
+    assert (
+        main(
+            [
+                "run",
+                "active",
+                "--config",
+                str(out / "tuned.toml"),
+                "--set",
+                "timing.duration=0.2",
+                "-o",
+                str(tmp_path / "r.mcap"),
+            ]
+        )
+        == 0
+    )
+
+    # Again, with two workers, from nothing: the same answers to the byte; and from what is kept: no run more.
+    again = tmp_path / "again"
+    assert main(["tune", str(path), "--out", str(again), "--workers", "2"]) == 0
+    for name in ("tuned.toml", "candidates.csv", "held-out.csv", "index.html", "best.mcap"):
+        assert (out / name).read_bytes() == (again / name).read_bytes(), name
+    before = runs(out)
+    assert main(["tune", str(path), "--out", str(out), "--workers", "1"]) == 0
+    assert runs(out) == before
+
+
+def runs(folder: Path) -> int:
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as base:
+        return base.execute("SELECT COUNT(*) FROM results").fetchone()[0]
+
+
+def test_a_study_of_a_calibrated_twin_says_what_it_is_worth(tmp_path, capsys):
+    text = SMALL.replace('"ride"', '["ride", "road_holding"]').replace('report = ["heave", "road_holding"]', "points = 3")
+    twin = calibrated(tmp_path / "c.toml")
+    arguments = ["tune", str(small(tmp_path, text)), "--twin", str(twin), "--out", str(tmp_path / "out"), "--evaluations", "8"]
+    assert main([*arguments, "--workers", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert "tuned against tuned on the nominal twin, calibrated twin" in printed
+    assert "if the diagnosis were wrong and the rig nominal: rms body acceleration" in printed
+    assert "twin with viscous@motor instead" in printed
+    assert "point 1 against before" in printed
+    assert {"front.png", "tuned-1.toml"} <= {each.name for each in (tmp_path / "out").iterdir()}
+
+
+def test_a_study_that_is_interrupted_keeps_its_runs(tmp_path, monkeypatch):
+    import rigtwin.tuning.bench as module
+
+    made = 0
+
+    def impatient(asked: Run) -> dict[str, float]:
+        nonlocal made
+        made += 1
+        if made > 5:
+            raise KeyboardInterrupt
+        return run(asked)
+
+    monkeypatch.setattr(module, "run", impatient)
+    arguments = ["tune", str(small(tmp_path)), "--out", str(tmp_path / "out"), "--workers", "1"]
+    assert main(arguments) == 130
+    assert runs(tmp_path / "out") == 5
+
+
+def test_the_studies_are_listed(capsys):
+    assert main(["tune"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in shipped())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["nothing"], "unknown study 'nothing'; there are compensator"),
+        (["absent.toml"], "cannot read absent.toml"),
+        (["skyhook", "--roads", "0"], "roads = 0: expected a whole number from 1"),
+        (["skyhook", "--seed", "-1"], "expected 0 or more"),
+        (["skyhook", "--workers", "0"], "expected 1 to 1024"),
+        (["skyhook", "--twin", "absent.toml"], "cannot read absent.toml"),
+        (["skyhook", "--set", "moon.mass=1"], "unknown group 'moon'"),
+    ],
+)
+def test_mistakes_on_the_command_line_are_one_line(arguments, says, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", *arguments]) == 1
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1
+
+
+def test_settings_are_compared_with_those_of_the_study():
+    study: Study = parsed("s", {**TABLES, "baseline": {"controller.skyhook": "none"}})
+    assert study.reference == study.configuration.controller._replace(skyhook=Settings().skyhook)
+    assert values(study.parameters, np.array([0.5])) == (775.0,)
