@@ -28,7 +28,7 @@ from rigtwin.tuning.measures import MEASURES, Trial
 from rigtwin.tuning.parameter import Parameter, values
 from rigtwin.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.tuning.scenario import APART, diagnosed, drawn, nominal
-from rigtwin.tuning.search import Search, best, front
+from rigtwin.tuning.search import Search, Tried, best, front
 from rigtwin.tuning.study import Study, find, parsed, shipped
 
 SMALL = """
@@ -361,7 +361,7 @@ def test_a_search_goes_the_same_way_again(tmp_path):
     assert one == again
 
 
-def _all(search: Search) -> dict[tuple[float, ...], object]:
+def _all(search: Search) -> dict[tuple[float, ...], Tried]:
     best(search)
     return search.tried
 

@@ -1,0 +1,127 @@
+"""`python -m benchmarks.sweep`: what a sweep costs besides its runs, what a second worker brings, and its memory."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import statistics
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from experiments import EXPERIMENTS
+from rigtwin.configuration import overridden
+from rigtwin.console import table
+from rigtwin.sweep import Store, Workers, hired, swept
+from rigtwin.tuning.run import Run, run
+
+ROUNDS = 5
+RUNS = 48
+"""Of a round, 6 s of test each."""
+TRIVIAL = 2000
+MANY, GENERATION = 10_000, 500
+EXPERIMENT = EXPERIMENTS["active"]
+
+
+def asked(seconds: float, count: int, first: int = 0) -> Iterator[tuple[str, Run]]:
+    """Runs that have not been made."""
+    configuration = overridden(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
+    for seed in range(first, first + count):
+        one = Run(EXPERIMENT.name, configuration, seed, 0.0, ("ride", "road_holding"))
+        yield one.key, one
+
+
+def nothing(_: Run) -> dict[str, float]:
+    return {"ride": 0.0, "road_holding": 0.0, "limits": 0.0, "trip": 0.0}
+
+
+def timed(workers: Workers, folder: Path, number: int) -> float:
+    """s of a round's runs, workers warm."""
+    with Store(folder / f"{number}-{workers.capacity}.sqlite") as store:
+        begin = time.perf_counter()
+        swept(store, workers, run, asked(6.0, RUNS, 1000 * number))
+        return time.perf_counter() - begin
+
+
+def alone(job: Run) -> float:
+    """s that one process needs for a round's runs, one after the other."""
+    begin = time.perf_counter()
+    for _, one in asked(6.0, RUNS // 2, job.seed):
+        run(one)
+    return time.perf_counter() - begin
+
+
+def scaling(folder: Path) -> None:
+    """1 against 2 workers, side by side; and two processes that know nothing of each other, which is what the machine gives."""
+    ratios, machine = [], []
+    with hired(1) as one, hired(2) as two, multiprocessing.get_context("spawn").Pool(2) as pool:
+        jobs = [job for _, job in asked(6.0, 2)]
+        timed(one, folder, 900)
+        timed(two, folder, 900)
+        pool.map(alone, jobs, chunksize=1)
+        for number in range(ROUNDS):
+            ratios.append(timed(one, folder, number) / timed(two, folder, number))
+            single = pool.apply(alone, (jobs[0],))
+            machine.append(2.0 * single / max(pool.map(alone, jobs, chunksize=1)))
+    print(f"1 → 2 workers: {statistics.median(ratios):.2f} times as fast ({min(ratios):.2f} to {max(ratios):.2f})")
+    print(f"two processes apart: {statistics.median(machine):.2f} times ({min(machine):.2f} to {max(machine):.2f})")
+
+
+def overhead(folder: Path) -> None:
+    """ms a run besides the run: its key, on its way there and back, and into the store."""
+    rows = [("workers", "ms a run")]
+    for count in (1, 2):
+        with hired(count) as workers, Store(folder / f"overhead-{count}.sqlite") as store:
+            swept(store, workers, nothing, asked(6.0, 50, 10**6))
+            begin = time.perf_counter()
+            swept(store, workers, nothing, asked(6.0, TRIVIAL))
+            rows.append((str(count), f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
+    try:
+        from distributed import LocalCluster
+    except ImportError:
+        print(table(rows))
+        return
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        hired(None, cluster.scheduler_address) as workers,
+        Store(folder / "overhead-cluster.sqlite") as store,
+    ):
+        swept(store, workers, nothing, asked(6.0, 50, 10**6))
+        begin = time.perf_counter()
+        swept(store, workers, nothing, asked(6.0, TRIVIAL))
+        rows.append(("cluster of 2", f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
+    print(table(rows))
+
+
+def resident(process: int) -> float:
+    """MB."""
+    pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def memory(folder: Path) -> None:
+    """Of the program and its workers over many short runs."""
+    rows = [("runs", "program, MB", "a worker, MB")]
+    with hired(2) as workers, Store(folder / "memory.sqlite") as store:
+        for done in range(0, MANY, GENERATION):
+            swept(store, workers, run, asked(0.05, GENERATION, done))
+            if done + GENERATION in (1000, 2500, 5000, 7500, MANY):
+                own = [child.pid for child in multiprocessing.active_children() if child.pid is not None]
+                largest = max(map(resident, own))
+                rows.append((str(done + GENERATION), f"{resident(os.getpid()):.1f}", f"{largest:.1f}"))
+    print(table(rows))
+
+
+def main() -> None:
+    np.seterr(all="raise")
+    with tempfile.TemporaryDirectory() as name:
+        scaling(Path(name))
+        overhead(Path(name))
+        memory(Path(name))
+
+
+if __name__ == "__main__":
+    main()
