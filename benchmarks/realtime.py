@@ -11,8 +11,8 @@ import numpy as np
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
 from rigtwin.arrays import Array
-from rigtwin.cli import CARD
 from rigtwin.configuration import from_assignments
+from rigtwin.daq import CARD
 from rigtwin.daq.card import Card
 from rigtwin.daq.table import load_table
 from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin

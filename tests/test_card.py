@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
-from rigtwin.cli import CARD
 from rigtwin.configuration import Configuration, Safety, read_toml
+from rigtwin.daq import CARD
 from rigtwin.daq.card import Card, CardFault, connected
 from rigtwin.daq.conversion import CODES, conversion, to_bits, to_values, to_volts
 from rigtwin.daq.last_resort import release

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
-from rigtwin.cli import CARD, main
+from rigtwin.cli import main
 from rigtwin.configuration import Configuration, from_assignments
+from rigtwin.daq import CARD
 from rigtwin.daq.calibration import FORCE, at_rest, bumps, responses, signed, spanned, zeroed
 from rigtwin.daq.table import load_table, written
 from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin

@@ -15,8 +15,8 @@ import pytest
 from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
-from rigtwin.cli import CARD
 from rigtwin.configuration import from_assignments
+from rigtwin.daq import CARD
 from rigtwin.daq.table import load_table
 from rigtwin.daq.terminals import WiredTwin
 from rigtwin.errors import RigtwinError

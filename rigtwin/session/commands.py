@@ -10,8 +10,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from rigtwin.cli import CARD
 from rigtwin.console import late, table
+from rigtwin.daq import CARD
 from rigtwin.daq.card import Card
 from rigtwin.daq.table import load_table, trusted
 from rigtwin.daq.terminals import InRealTime, WiredTwin

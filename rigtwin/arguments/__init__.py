@@ -1,0 +1,1 @@
+"""What each command takes. Parsing only, so that help is instant."""
