@@ -76,7 +76,7 @@ def test_where_it_says_that_the_loop_begins_to_swing_the_twin_does():
     def with_gain(gain: float) -> Configuration:
         return free({"controller": {"skyhook": "active", "skyhook_damping": gain}})
 
-    critical = brentq(lambda gain: decay(with_gain(gain)), 1.0, 200.0)
+    critical = float(brentq(lambda gain: decay(with_gain(gain)), 1.0, 200.0))  # type: ignore[arg-type]
     assert measured(with_gain(0.8 * critical)) < 0.0 < measured(with_gain(1.2 * critical))
 
 

@@ -88,11 +88,11 @@ class OnRig:
 def on_rig(job: OnRig) -> dict[str, float]:
     """Name → figure, as the twin's runs give it."""
     import experiments
-    from rigtwin.blindcheck.reference_test import tested
+    from rigtwin.blindcheck.reference_drive import driven
 
     configuration = job.asked.configuration
     demands = experiments.find(job.asked.experiment).demands(configuration, job.asked.seed)
-    return figures(job.asked, tested(job.truth, configuration, demands, job.asked.seed))
+    return figures(job.asked, driven(job.truth, configuration, demands, job.asked.seed))
 
 
 def checked(

@@ -52,7 +52,7 @@ def _ticks(
     return len(demands), Trip.NONE.value
 
 
-def tested(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> Ran:
+def driven(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> Ran:
     """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant is not looked at."""
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)

@@ -1,0 +1,131 @@
+"""Tuning on a diagnosis, judged on the referee's plant: that plant under the rig's own controller, and the check itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments import find
+from rigtwin.blindcheck.asked import asked
+from rigtwin.blindcheck.reference_drive import driven
+from rigtwin.blindcheck.reference_plant import Truth
+from rigtwin.blindcheck.reference_rig import run
+from rigtwin.blindcheck.tuning import Case, checked, rig, text
+from rigtwin.cli import main
+from rigtwin.configuration import Configuration, overridden
+from rigtwin.runner import simulated
+from rigtwin.safety import Trip
+from rigtwin.sweep import Store
+from rigtwin.sweep.workers import Here
+from rigtwin.tuning.bench import Bench
+from rigtwin.tuning.judged import comparison
+from rigtwin.tuning.measures import Trial
+from rigtwin.tuning.run import LIMITS, TRIP
+from rigtwin.tuning.study import parsed
+
+
+@pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
+def test_the_rigs_controller_does_what_the_referees_own_does(test):
+    """Both laws were written from one description; on one plant with the same noise they command the same."""
+    truth = Truth(missed=0.02)
+    law, demands = asked(test, np.random.default_rng(3))
+    demands = demands[:4000]
+    commands, sensors = run(truth, law, demands, np.random.default_rng([9, 5]))
+    mode = "imposed" if law.imposed else "mil"
+    ran = driven(truth, overridden(Configuration(), {"controller": {"mode": mode}}), demands, 9)
+    assert np.allclose(ran.commands, commands, rtol=0.0, atol=[1e-9, 1e-6, 1e-3, 1e-5])
+    assert np.allclose(ran.measurements, sensors, rtol=0.0, atol=[1e-9, 1e-5, 1e-5, 0.2])
+
+
+def test_without_a_defect_it_is_the_twin_to_a_few_percent():
+    """Two plants, two codes: the force error of chapter 4's test."""
+    experiment = find("friction-road")
+    configuration = overridden(experiment.configuration, {"timing": {"duration": 8.0}})
+    demands = experiment.demands(configuration, 2)
+
+    def error(ran) -> float:
+        found = Trial(configuration, ran.commands, ran.truth).tracking
+        return found.force_e1 + found.force_e2
+
+    assert error(driven(Truth(), configuration, demands, 2)) == pytest.approx(
+        error(simulated(configuration, demands, 2)), rel=0.05
+    )
+
+
+def test_a_limit_ends_a_test_on_it():
+    configuration = overridden(Configuration(), {"safety": {"force": 150.0}})
+    ran = driven(Truth(), configuration, np.zeros((100, 3)), 0)
+    assert ran.trip == Trip.FORCE
+    assert len(ran.commands) == 1
+
+
+def test_rigs_are_drawn_from_their_seed_with_a_friction_each():
+    kinds = [rig(1, number)[1].kind for number in range(8)]
+    assert set(kinds) == {"coulomb", "viscous", "stribeck", "asymmetry"}
+    assert rig(1, 3)[0] == rig(1, 3)[0]
+    assert rig(1, 3)[0] != rig(2, 3)[0]
+    assert all(rig(5, number)[1].component == "motor" for number in range(8))
+
+
+STUDY = {
+    "experiment": "friction-road",
+    "minimise": "force_error",
+    "parameters": {"controller.friction_step": [2.0, 90.0]},
+    "set": {"controller.compensator": "two-step", "timing.duration": 3.0},
+    "search": {"timing.duration": 2.0, "timing.timestep": 1e-3},
+    "baseline": {"controller.compensator": "none"},
+    "roads": 1,
+    "held_out": 6,
+    "evaluations": 8,
+}
+
+
+def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, monkeypatch):
+    """With what a diagnosis would say taken as given: the rig has more friction than the nominal one."""
+    import rigtwin.blindcheck.tuning as module
+
+    monkeypatch.setattr(module, "calibrated", lambda _: ("more friction", "[motor]\ncoulomb = 28.0\n"))
+    said: list[Case] = []
+    with Store(tmp_path / "s.sqlite") as store:
+        study = parsed("s", STUDY)
+        found = checked(Bench(study, store, Here()), 1, 4, said=said.append)
+        made = len(store)
+        again = checked(Bench(study, store, Here()), 1, 4)
+        assert len(store) == made
+    assert found == said == again
+    (case,) = found
+    assert case.found == "more friction"
+    assert case.against_nominal.runs == 6
+    assert case.against_nominal.of("force_error").after == case.against_before.of("force_error").after
+    assert "1 of 1" in text(study, found) or "0 of 1" in text(study, found)
+
+
+def test_what_is_better_is_counted_by_its_interval():
+    study = parsed("s", STUDY)
+
+    def case(number: int, after: list[float], trips: float = 0.0) -> Case:
+        rows = [
+            [{"force_error": value, TRIP: trips, LIMITS: 0.5} for value in values] for values in ([10.0] * len(after), after)
+        ]
+        against = comparison(study.measures, "rig", ("before", rows[0]), ("tuned", rows[1]))
+        return Case(number, "coulomb@motor", "found", against, against)
+
+    better, worse = [9.0 + 0.1 * n for n in range(8)], [11.0 + 0.1 * n for n in range(8)]
+    mixed = [9.0, 11.0] * 4
+    printed = text(study, [case(0, better), case(1, worse), case(2, mixed), case(3, mixed, trips=2.0)])
+    assert "better for the diagnosis on 1 of 4, worse on 1, no difference to be told on 2" in printed
+    assert "tripped" in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--tune", "nothing"], "unknown study"),
+        (["--tune", "compensator", "--cases", "0"], "--cases must be at least 1"),
+        (["--workers", "0"], "expected 1 to 1024"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, says, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["blindcheck", *arguments]) == 1
+    assert says in capsys.readouterr().err
