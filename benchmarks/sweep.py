@@ -85,7 +85,7 @@ def overhead(folder: Path) -> None:
         print(table(rows))
         return
     with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         hired(None, cluster.scheduler_address) as workers,
         Store(folder / "overhead-cluster.sqlite") as store,
     ):

@@ -25,6 +25,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.machine.library import find as machine_of
 from rigtwin.machine.predictor import Motion
 from rigtwin.parameters import Plant
+from rigtwin.posterior import load_posterior
 from rigtwin.recording import Recording
 from tests.conftest import rig_recording
 from tests.test_fit import evidence_of, recorded
@@ -96,6 +97,21 @@ def test_the_corrected_twin_is_one_that_run_and_compare_take(friction, tmp_path)
     path.write_text(toml(friction))
     assert from_toml(Configuration(), path).plant == friction.corrected.plant
     assert "coulomb = " in toml(friction)
+
+
+def test_a_corrected_twin_says_how_sure_it_is(friction, tmp_path):
+    path = tmp_path / "twin.toml"
+    path.write_text(toml(friction))
+    posterior = load_posterior(path)
+    (effect,) = friction.diagnosis.effects
+    estimate = effect.parameters["coulomb"]
+    assert posterior.intervals == {"rail.coulomb": (estimate.low, estimate.high)}
+    assert posterior.probability == effect.confidence
+    assert posterior.at_best(Configuration()).plant == friction.corrected.plant
+    for other in posterior.otherwise:
+        assert other.effect != "coulomb@rail"
+        assert 0.01 <= other.probability <= 1.0 - posterior.probability + 0.05
+        assert overridden(Configuration(), other.changes).plant != Configuration().plant
 
 
 def test_the_same_data_give_the_same_answer(friction):

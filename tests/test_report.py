@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,24 +11,9 @@ import pytest
 from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.report import bars, html, plots
+from tests.browser import BROWSER, looked_at
 from tests.test_diagnose import RIG, drifting, spoilt
 from tests.test_fit import recorded
-
-BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
-VIEWER = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
-<iframe id="page" src="report.html" style="width:{width}px;height:900px;border:0"></iframe>
-<script>
-const page = document.getElementById('page');
-page.onload = () => {{
-  const root = page.contentDocument.documentElement;
-  document.body.dataset.result = JSON.stringify({{
-    wide: root.scrollWidth, first: page.contentDocument.querySelector('h1').getBoundingClientRect().bottom,
-    text: page.contentDocument.querySelector('h1').textContent,
-    small: [...page.contentDocument.querySelectorAll('td,li,p,h1,h2')]
-      .filter(e => parseFloat(getComputedStyle(e).fontSize) < 12).length
-  }});
-}};
-</script>"""
 
 
 @pytest.fixture(scope="module")
@@ -88,38 +70,7 @@ def test_names_from_files_cannot_write_the_page(outcomes):
 @pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(outcomes, verdict, width, tmp_path: Path):
-    (tmp_path / "report.html").write_text(html(outcomes[verdict]))
-    (tmp_path / "viewer.html").write_text(VIEWER.format(width=width))
-    log = tmp_path / "net.json"
-    done = subprocess.run(
-        [
-            str(BROWSER),
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-background-networking",
-            "--disable-component-update",
-            "--no-first-run",
-            "--allow-file-access-from-files",
-            "--enable-logging=stderr",
-            f"--user-data-dir={tmp_path / 'profile'}",
-            f"--log-net-log={log}",
-            f"--window-size={max(width, 500)},1000",
-            "--virtual-time-budget=3000",
-            "--dump-dom",
-            (tmp_path / "viewer.html").as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=90,
-        check=True,
-    )
-    assert not re.search(r"CONSOLE.*(error|Error)", done.stderr), done.stderr
-    found = re.search(r'data-result="([^"]*)"', done.stdout)
-    assert found, done.stdout[-500:]
-    result = json.loads(found.group(1).replace("&quot;", '"'))
+    result = looked_at(html(outcomes[verdict]), width, tmp_path)
     assert result["wide"] <= width
     assert result["first"] < 500
     assert result["small"] == 0
-    requests = set(re.findall(r'"url":"(https?://[^"]*)"', log.read_text())) if log.exists() else set()
-    assert not {url for url in requests if "google" not in url and "gvt" not in url}, requests

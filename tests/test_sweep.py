@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.sweep import Store, each, hired, swept
 from rigtwin.sweep.cluster import _same
@@ -294,6 +295,33 @@ def test_a_cluster_gives_the_same_answers_and_may_lose_a_worker(cluster, tmp_pat
         assert [store[key] for key in store.keys()] == list(range(60))  # noqa: SIM118
     assert processes[0].wait() == -signal.SIGKILL
     assert done == 60
+
+
+STUDY = """
+experiment = "active"
+roads = 1
+held_out = 6
+evaluations = 8
+minimise = "ride"
+[set]
+"timing.duration" = 1.5
+"timing.timestep" = 1e-3
+[parameters]
+"controller.skyhook_damping" = [50.0, 1500.0]
+"""
+
+
+def test_tune_and_reproduce_say_the_same_on_a_cluster(cluster, tmp_path, capsys):
+    address, _ = cluster
+    (tmp_path / "study.toml").write_text(STUDY)
+    for name, workers in (("here", ["--workers", "1"]), ("there", ["--cluster", address])):
+        assert main(["tune", str(tmp_path / "study.toml"), "--out", str(tmp_path / name), *workers]) == 0
+        arguments = ["reproduce", "table-3.5", "--seeds", "1", "--folder", str(tmp_path / f"{name}-thesis")]
+        assert main([*arguments, "--json", str(tmp_path / f"{name}.json"), *workers]) == 0
+    capsys.readouterr()
+    for file in ("tuned.toml", "candidates.csv", "held-out.csv", "index.html", "best.mcap"):
+        assert (tmp_path / "here" / file).read_bytes() == (tmp_path / "there" / file).read_bytes()
+    assert (tmp_path / "here.json").read_text() == (tmp_path / "there.json").read_text()
 
 
 def test_a_failing_job_on_a_cluster_is_one_line(cluster):

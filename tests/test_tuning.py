@@ -30,6 +30,7 @@ from rigtwin.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.tuning.scenario import APART, diagnosed, drawn, nominal
 from rigtwin.tuning.search import Search, Tried, best, front
 from rigtwin.tuning.study import Study, find, parsed, shipped
+from tests.browser import BROWSER, looked_at
 
 SMALL = """
 title = "a small study"
@@ -444,6 +445,10 @@ def test_a_study_from_end_to_end(tmp_path, capsys):
         )
         == 0
     )
+
+    if BROWSER is not None:
+        for width in (1280, 390):
+            assert looked_at(page, width, tmp_path)["wide"] <= width
 
     # Again, with two workers, from nothing: the same answers to the byte; and from what is kept: no run more.
     again = tmp_path / "again"

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from rigtwin.configuration import parameters
 from rigtwin.console import table
 from rigtwin.tuning.judged import Change, Comparison, Spread
 from rigtwin.tuning.outcome import NOMINAL, TUNED_NOMINAL, Outcome
+from rigtwin.tuning.study import Constraint
 
 HEADER = ("measure", "unit", "before", "5 to 95 %", "after", "5 to 95 %", "change", "95 % of the median", "no worse in")
 
@@ -45,17 +48,22 @@ def remarks(of: Comparison) -> list[str]:
 
 def sentence(outcome: Outcome) -> str:
     """The answer in one sentence."""
-    objectives = [outcome.found.of(measure.name) for measure in outcome.study.minimise if outcome.found.changes]
-    if not objectives:
+    if not outcome.found.changes:
         return f"Every held-out run of one of the two tripped on the {outcome.rig}: nothing can be compared."
-    parts = [f"{each.measure.title} {' '.join(change(each)[:1])} [{change(each)[1]}]" for each in objectives]
-    held = [
-        f"{constraint.measure.title} {change(each)[0]} [{change(each)[1]}]"
-        for constraint in outcome.study.constraints
-        for each in [outcome.found.of(constraint.measure.name)]
-    ]
-    beside = f"; held: {', '.join(held)}" if held else ""
-    return f"{', '.join(parts)} on {outcome.found.runs} held-out scenarios{beside}."
+    objectives = [outcome.found.of(measure.name) for measure in outcome.study.minimise]
+    gained = " and ".join(f"{each.measure.title} {change(each)[0]} [{change(each)[1]}]" for each in objectives)
+    held = [kept(outcome, constraint) for constraint in outcome.study.constraints]
+    beside = f", with {', '.join(held)}" if held else ""
+    return f"On {outcome.found.runs} held-out scenarios {gained}{beside}."
+
+
+def kept(outcome: Outcome, constraint: Constraint) -> str:
+    """What became of a constraint on held-out scenarios: the change against the baseline, or the figure beside its bound."""
+    each = outcome.found.of(constraint.measure.name)
+    if not math.isnan(constraint.share):
+        return f"{each.measure.title} {change(each)[0]} [{change(each)[1]}]"
+    bound = f"{'at least' if each.measure.more else 'at most'} {number(constraint.bound)}"
+    return f"{each.measure.title} {number(each.after.median)} {each.measure.unit} ({bound})"
 
 
 def wrong(outcome: Outcome) -> list[str]:
