@@ -1,67 +1,38 @@
-"""A second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the rig and says so in
-the recording."""
+"""The loop's side of a second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the
+rig and says so in the recording."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-import select
-import signal
-import sys
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from typing import Any
 
-import numpy as np
-
-from rigtwin.arrays import Array
-from rigtwin.daq.table import ChannelTable
 from rigtwin.errors import RigtwinError
-from rigtwin.loop import BLOCK
-from rigtwin.realtime import PRIORITY, monotonic
-from rigtwin.session.recorder import FIELDS, ROW, SESSION, Keeper
-from rigtwin.supervisor import Cause, Phase, Transition
+from rigtwin.realtime import monotonic
+from rigtwin.session.recorder import ROW
+from rigtwin.session.watched import (
+    ALIVE,
+    BEAT,
+    GROUND,
+    NUMBERS,
+    PREPARED,
+    READ,
+    RING,
+    STRUCTURE,
+    WATCHED,
+    WRITTEN,
+    Watched,
+    parts,
+)
+from rigtwin.session.watchman import guard
+from rigtwin.supervisor import Transition
 
-WRITE = 0.1
-"""s between two blocks of the recording."""
-LOOK = 2.5e-4
-"""s between two looks at the loop."""
 STARTED = 30.0
 """s within which the guardian must be there."""
-GONE = 1.0
-"""s within which a killed process must be gone."""
-RING = 8192
-"""Ticks that the shared memory holds for the recording: seconds of them."""
 ABSENT = 1.0
 """s after which a guardian that does not look any more is missed."""
-_BEAT, _GROUND, _STRUCTURE, _WATCHED, _WRITTEN, _READ, _PREPARED, _ALIVE, _NUMBERS = range(9)
-"""Numbers in the shared memory, before the ticks: time of the last tick, positions held, whether there is anything to watch,
-ticks written by the loop and read by the guardian, whether it could stop the rig, when it last looked."""
-
-
-def _parts(memory: Any) -> tuple[Array, Array]:
-    """The numbers, and the ring of ticks."""
-    whole = np.frombuffer(memory)
-    return whole[:_NUMBERS], whole[_NUMBERS:].reshape(RING, ROW)
-
-
-@dataclass(frozen=True)
-class Watched:
-    """What the guardian has to know. recording: arguments of rigtwin.recording.Writer; metadata: records added at once;
-    table: of the card, None for a rig that needs no stopping; patience: s without a tick before it acts; hold: s before it
-    takes the pressure off; live: port of a live view on this computer, 0 for none."""
-
-    recording: dict[str, Any]
-    metadata: dict[str, dict[str, str]]
-    table: ChannelTable | None
-    patience: float
-    hold: float
-    live: int = 0
-    phases: tuple[Phase, ...] = field(default=(Phase.ARMED, Phase.RAMPING, Phase.RUNNING, Phase.STOPPING))
 
 
 class Guardian:
@@ -72,11 +43,11 @@ class Guardian:
         self._watched, self._finishing = watched, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
-        memory = context.RawArray("d", _NUMBERS + RING * ROW)
-        self._shared, self._ring = _parts(memory)
+        memory = context.RawArray("d", NUMBERS + RING * ROW)
+        self._shared, self._ring = parts(memory)
         self._pipe, theirs = context.Pipe()
         arguments = (watched, theirs, memory, os.getpid())
-        self._process = context.Process(target=_guard, args=arguments, name="rigtwin guardian")
+        self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
             self._process.start()
             theirs.close()
@@ -92,17 +63,17 @@ class Guardian:
 
     def beat(self, ground: float, structure: float) -> None:
         shared, now = self._shared, time.monotonic()
-        shared[_GROUND], shared[_STRUCTURE], shared[_BEAT] = ground, structure, now
-        if now - shared[_ALIVE] > ABSENT:
+        shared[GROUND], shared[STRUCTURE], shared[BEAT] = ground, structure, now
+        if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
 
     def tick(self, row: tuple[float, ...]) -> None:
-        written = int(self._shared[_WRITTEN])
-        if written - self._shared[_READ] >= RING:
+        written = int(self._shared[WRITTEN])
+        if written - self._shared[READ] >= RING:
             self.fault = self.fault or "the recording cannot keep up with the loop"
             return
         self._ring[written % RING] = row
-        self._shared[_WRITTEN] = written + 1.0
+        self._shared[WRITTEN] = written + 1.0
 
     def flush(self) -> None:
         """The other process writes by itself."""
@@ -110,25 +81,25 @@ class Guardian:
     def ready(self) -> None:
         self._send("prepare")
         end = monotonic() + STARTED
-        while self._shared[_PREPARED] == 0.0 and self.fault is None and monotonic() < end:
+        while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
             time.sleep(1e-3)
-        if self._shared[_PREPARED] == 0.0:
+        if self._shared[PREPARED] == 0.0:
             raise RigtwinError(self.fault or "the guardian process does not answer")
 
     def transition(self, transition: Transition) -> None:
-        if transition.after in self._watched.phases and self._shared[_WATCHED] == 0.0:
-            self._shared[_BEAT] = time.monotonic()
-            self._shared[_WATCHED] = 1.0
+        if transition.after in self._watched.phases and self._shared[WATCHED] == 0.0:
+            self._shared[BEAT] = time.monotonic()
+            self._shared[WATCHED] = 1.0
         self._send("transition", transition)
         if transition.after not in self._watched.phases:
-            self._shared[_WATCHED] = 0.0
+            self._shared[WATCHED] = 0.0
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
         self._send("metadata", name, values)
 
     def finish(self, reason: str) -> None:
         """Ends the recording and the other process."""
-        self._shared[_WATCHED], self._finishing = 0.0, True
+        self._shared[WATCHED], self._finishing = 0.0, True
         self._send("finish", reason)
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
@@ -155,198 +126,3 @@ class Guardian:
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-
-
-def _guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
-    """The other process."""
-    # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
-    with suppress(OSError, AttributeError):
-        os.setsid()
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    shared, ring = _parts(memory)
-    from rigtwin.recording import Writer
-
-    try:
-        writer = Writer(**watched.recording)
-        writer.reserve()
-        for name, values in watched.metadata.items():
-            writer.add_metadata(name, values)
-        view = _live(watched)
-        keeping = _Keeping(writer, pipe, watched, view, shared, ring)
-        keeping.make_ready()
-    except RigtwinError as error:
-        pipe.send(str(error))
-        return
-    shared[_ALIVE] = monotonic()
-    thread = threading.Thread(target=keeping.work, daemon=True)
-    thread.start()
-    with suppress(OSError, AttributeError):
-        # Of this thread alone: writing the recording must never be in the loop's way.
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
-    pipe.send("ready")
-    died = _died_or_hung(owner, shared, watched, keeping)
-    if died is not None:
-        keeping.stop_rig(died, shared)
-    thread.join(1.0)
-    keeping.finish(died)
-
-
-def _live(watched: Watched) -> Callable[[str, Array], None] | None:
-    if watched.live == 0:
-        return None
-    from rigtwin.session.live import live_view
-
-    return live_view(watched.live)
-
-
-def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping) -> Cause | None:
-    """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
-    handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
-    try:
-        while not keeping.done.is_set():
-            shared[_ALIVE] = monotonic()
-            if handle is not None:
-                dead = bool(select.select([handle], [], [], LOOK)[0])
-            else:
-                time.sleep(LOOK)
-                dead = os.getppid() != owner
-            if dead:
-                return Cause("process", "the controller process died") if shared[_WATCHED] else None
-            if watched.table is not None and shared[_WATCHED] and monotonic() - shared[_BEAT] > watched.patience:
-                with suppress(ProcessLookupError):
-                    os.kill(owner, signal.SIGKILL)
-                if handle is not None and not watched.table.address:
-                    # A driver on this computer keeps the lines until the process is gone altogether.
-                    select.select([handle], [], [], GONE)
-                waited = f"{1e3 * watched.patience:.3g} ms"
-                return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
-        return None
-    finally:
-        if handle is not None:
-            os.close(handle)
-
-
-class _Keeping:
-    """Writes what the loop sends, on a thread of its own."""
-
-    def __init__(
-        self,
-        writer: Any,
-        pipe: Connection,
-        watched: Watched,
-        view: Callable[[str, Array], None] | None,
-        shared: Array,
-        ring: Array,
-    ) -> None:
-        self._shared, self._ring = shared, ring
-        self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
-        self._last: Transition | None = None
-        self._reason: str | None = None
-        self._resort: Any = None
-        self._cause = Cause("process", "")
-        self._time, self._said = 0.0, False
-        self.done = threading.Event()
-
-    def work(self) -> None:
-        try:
-            while self._reason is None:
-                if self._pipe.poll(WRITE):
-                    kind, *content = self._pipe.recv()
-                    getattr(self, f"_{kind}")(*content)
-                self._drain()
-                if self._keeper.fault is not None and not self._said:
-                    self._said = True
-                    self._pipe.send(self._keeper.fault)
-        except (EOFError, OSError):
-            self._drain()
-        if self._reason is not None:
-            self._drain()
-            self.done.set()
-
-    def _drain(self) -> None:
-        """Writes what the loop has put into the shared memory."""
-        shared = self._shared
-        while (first := int(shared[_READ])) < (last := int(shared[_WRITTEN])):
-            last = min(last, first + BLOCK, (first // RING + 1) * RING)
-            rows = self._ring[first % RING : first % RING + last - first].copy()
-            shared[_READ] = float(last)
-            self._keeper.block(rows)
-            self._time = float(rows[-1, 0])
-            if self._view is not None:
-                self._view(SESSION, rows[:, : len(FIELDS)])
-
-    def make_ready(self) -> None:
-        """Everything that takes time, before there is anything to watch."""
-        if self._watched.table is not None:
-            from rigtwin.daq.last_resort import LastResort
-
-            self._resort = LastResort(self._watched.table)
-
-    def _prepare(self) -> None:
-        if self._resort is not None:
-            try:
-                self._resort.prepare()
-            except RigtwinError as error:
-                self._pipe.send(str(error))
-                return
-        self._shared[_PREPARED] = 1.0
-
-    def _transition(self, transition: Transition) -> None:
-        self._last = transition
-        self._drain()
-        self._keeper.transition(transition)
-
-    def _metadata(self, name: str, values: dict[str, str]) -> None:
-        with suppress(RigtwinError):
-            self._writer.add_metadata(name, values)
-
-    def _finish(self, reason: str) -> None:
-        self._reason = reason
-
-    def stop_rig(self, cause: Cause, shared: Array) -> None:
-        """Force off now, pressure off after the hold."""
-        said = cause.reason
-        resort = self._resort
-        if resort is not None:
-            failed = _tried_often(lambda: resort.force_off((shared[_GROUND], shared[_STRUCTURE])))
-            if failed is None:
-                time.sleep(self._watched.hold)
-            failed = _tried_often(resort.pressure_off) or failed
-            if failed is not None:
-                said = f"{said}; and {failed}: stop the rig by hand"
-            resort.close()
-        self._cause = Cause(cause.name, said)
-        print(f"rigtwin: {said}", file=sys.stderr, flush=True)
-
-    def finish(self, died: Cause | None) -> None:
-        """Closes the recording with what it has to say."""
-        if died is None:
-            self._writer.finish(self._reason or "the loop ended without a word")
-            return
-        before = self._last.after if self._last is not None else Phase.IDLE
-        cause, now = self._cause, self._time if self._last is None else max(self._time, self._last.time)
-        if before != Phase.STOPPING:
-            self._keeper.transition(Transition(now, before, Phase.STOPPING, cause))
-        self._keeper.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))
-        with suppress(RigtwinError):
-            self._writer.finish(cause.reason)
-
-
-def _tried_often(act: Callable[[], None]) -> str | None:
-    """What is wrong with it after some tries, or None."""
-    failed = None
-    for _ in range(TRIES):
-        try:
-            act()
-        except RigtwinError as error:
-            failed = str(error)
-            time.sleep(0.02)
-        else:
-            return None
-    return failed
-
-
-TRIES = 25
-"""Of a call that has to succeed: half a second of them."""

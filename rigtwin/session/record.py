@@ -21,8 +21,9 @@ from rigtwin.realtime import Lateness, Pacer, described, in_real_time
 from rigtwin.recording import Writer
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
 from rigtwin.rig import DrivenRig
-from rigtwin.session.guardian import Guardian, Watched
+from rigtwin.session.guardian import Guardian
 from rigtwin.session.recorder import Keeper
+from rigtwin.session.watched import Watched
 from rigtwin.supervised import Ended, Update, supervise
 
 LONGEST = 1.0
