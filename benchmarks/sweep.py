@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -79,21 +83,36 @@ def overhead(folder: Path) -> None:
             begin = time.perf_counter()
             swept(store, workers, nothing, asked(6.0, TRIVIAL))
             rows.append((str(count), f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
-    try:
-        from distributed import LocalCluster
-    except ImportError:
-        print(table(rows))
-        return
     with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
-        hired(None, cluster.scheduler_address) as workers,
+        cluster(folder) as address,
+        hired(None, address) as workers,
         Store(folder / "overhead-cluster.sqlite") as store,
     ):
         swept(store, workers, nothing, asked(6.0, 50, 10**6))
         begin = time.perf_counter()
         swept(store, workers, nothing, asked(6.0, TRIVIAL))
-        rows.append(("cluster of 2", f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
+        rows.append((f"cluster of {workers.capacity}", f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
     print(table(rows))
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[str]:
+    """The address of a scheduler with two workers, a process each, on this computer."""
+    file = folder / "scheduler.json"
+    common = ["--scheduler-file", str(file), "--no-dashboard", "--host", "127.0.0.1"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", *common]
+    processes = [subprocess.Popen(begin, env=environment, **quiet)]
+    begin = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *common]
+    processes += [subprocess.Popen(begin, env=environment, **quiet) for _ in range(2)]
+    try:
+        time.sleep(10.0)
+        yield json.loads(file.read_text())["address"]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 def resident(process: int) -> float:

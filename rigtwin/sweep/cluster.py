@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
@@ -26,8 +28,28 @@ def _same(digest: str, function: Callable[[Any], Any], argument: Any) -> Any:
     return function(argument)
 
 
+class _Given:
+    """A job at the cluster. What it came to is fetched with that of others, since each fetch is milliseconds."""
+
+    def __init__(self, future: Any) -> None:
+        self.future = future
+        self.fetched: list[Any] = []
+
+    def result(self) -> Any:
+        return self.fetched[0] if self.fetched else self.future.result()
+
+    def cancel(self) -> None:
+        self.future.cancel()
+
+    def add_done_callback(self, fn: Callable[[Any], Any], /) -> None:
+        self.future.add_done_callback(lambda _: fn(self))
+
+
 class Cluster:
     """Raises RigtwinError if the package is missing, nobody answers, or it has no workers."""
+
+    ahead = 16
+    """A job is tens of milliseconds on its way."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -46,6 +68,7 @@ class Cluster:
             ) from None
         self._run = uuid4().hex
         self._given = 0
+        self._ready: deque[_Given] = deque()
         if not self.capacity:
             self._client.close()
             raise RigtwinError(f"the cluster at {address} has no workers; start some: dask worker {address} --nthreads 1")
@@ -56,11 +79,24 @@ class Cluster:
 
     def submit(self, function: Callable[[Any], Any], argument: Any) -> Any:
         self._given += 1
-        return self._client.submit(
-            _same, source_digest(), function, argument, key=f"rigtwin-{self._run}-{self._given}", pure=False
-        )
+        key = f"rigtwin-{self._run}-{self._given}"
+        return _Given(self._client.submit(_same, source_digest(), function, argument, key=key, pure=False))
 
     def next(self, finished: SimpleQueue[Any]) -> Any:
+        if not self._ready:
+            self._ready.append(self._waited(finished))
+            with suppress(Empty):
+                while True:
+                    self._ready.append(finished.get_nowait())
+            good = [one for one in self._ready if one.future.status == "finished"]
+            with suppress(Exception):
+                # What cannot be fetched together says why when it is asked for alone.
+                for one, result in zip(good, self._client.gather([one.future for one in good]), strict=True):
+                    one.fetched.append(result)
+        return self._ready.popleft()
+
+    def _waited(self, finished: SimpleQueue[Any]) -> _Given:
+        """The next job that is done."""
         alone = 0.0
         while True:
             before = time.monotonic()

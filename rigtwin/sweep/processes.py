@@ -34,6 +34,7 @@ def _begin() -> None:
 class Processes:
     """A number of processes. One that dies breaks the pool, which is then made anew."""
 
+    ahead = 3
     lost: tuple[type[BaseException], ...] = (BrokenProcessPool,)
 
     def __init__(self, capacity: int) -> None:

@@ -12,8 +12,6 @@ from typing import Any, Protocol
 
 from rigtwin.errors import RigtwinError
 
-AHEAD = 3
-"""Jobs given out for each worker, so that none waits for the next."""
 MOST_LOSSES = 3
 """Times that a worker may die over one job before the job is to blame."""
 MOST_WORKERS = 1024
@@ -28,8 +26,10 @@ class Future(Protocol):
 
 
 class Workers(Protocol):
-    """capacity: jobs that are done at a time; lost: the exceptions that mean a worker died, not that its job failed."""
+    """capacity: jobs that are done at a time; ahead: given out for each of them, so that none waits for the next; lost: the
+    exceptions that mean a worker died, not that its job failed."""
 
+    ahead: int
     lost: tuple[type[BaseException], ...]
 
     @property
@@ -59,8 +59,9 @@ class _Done:
 
 
 class Here:
-    """This process, one job after the other."""
+    """This process, one job after the other; what is done is handed on before the next begins."""
 
+    ahead = 1
     lost: tuple[type[BaseException], ...] = ()
     capacity = 1
 
@@ -115,8 +116,7 @@ def each(workers: Workers, function: Callable[[Any], Any], jobs: Iterable[tuple[
         waiting[future] = job
         future.add_done_callback(finished.put)
 
-    # One at a time in this process: what is done is handed on before the next begins.
-    ahead = AHEAD * workers.capacity if workers.capacity > 1 else 1
+    ahead = workers.ahead * workers.capacity
     try:
         for job in islice(coming, ahead):
             give(job)
@@ -128,7 +128,8 @@ def each(workers: Workers, function: Callable[[Any], Any], jobs: Iterable[tuple[
             except workers.lost:
                 losses[key] += 1
                 if losses[key] >= MOST_LOSSES:
-                    raise RigtwinError(f"a worker died {MOST_LOSSES} times over {key}: out of memory, or killed") from None
+                    why = "out of memory, killed, or it could not start"
+                    raise RigtwinError(f"a worker died {MOST_LOSSES} times over {key}: {why}") from None
                 give((key, argument))
                 continue
             losses.pop(key, None)
