@@ -91,7 +91,8 @@ class Cluster:
             good = [one for one in self._ready if one.future.status == "finished"]
             with suppress(Exception):
                 # What cannot be fetched together says why when it is asked for alone.
-                for one, result in zip(good, self._client.gather([one.future for one in good]), strict=True):
+                results: Any = self._client.gather([one.future for one in good])
+                for one, result in zip(good, results, strict=True):
                     one.fetched.append(result)
         return self._ready.popleft()
 
