@@ -62,6 +62,11 @@ def _encoded(record: McapRecord) -> bytes:
     return builder.end()
 
 
+def twin_values(seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str) -> dict[str, str]:
+    """What a recording keeps of a twin that makes it, as metadata TWIN_RECORD."""
+    return {"seed": str(seed), "parameters": json.dumps(parameters), "effects": json.dumps(effects), "version": version}
+
+
 class Writer:
     """A recording in the making. Use as a context manager; leaving it finishes the file, also after an exception.
 
@@ -111,10 +116,7 @@ class Writer:
 
     def add_twin(self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str) -> None:
         """Says how a twin makes this recording, so that it can be made again."""
-        self.add_metadata(
-            TWIN_RECORD,
-            {"seed": str(seed), "parameters": json.dumps(parameters), "effects": json.dumps(effects), "version": version},
-        )
+        self.add_metadata(TWIN_RECORD, twin_values(seed, parameters, effects, version))
 
     def reserve(self) -> None:
         """Keeps room in the file for what has to be said when the disk is full: metadata that still fits is put there."""

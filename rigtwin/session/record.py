@@ -18,7 +18,7 @@ from rigtwin.daq.terminals import Terminals
 from rigtwin.daq.virtual import OnDemand, VirtualCard, Wired
 from rigtwin.effects import applied
 from rigtwin.realtime import Lateness, Pacer, described, in_real_time
-from rigtwin.recording import Writer
+from rigtwin.recording import Writer, twin_values
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
 from rigtwin.rig import DrivenRig
 from rigtwin.session.guardian import Guardian
@@ -68,16 +68,9 @@ def on_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, V
 
 def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     """What a recording says beyond the test: the channel table, and how a twin made it."""
-    import json
-
     told = {CARD_RECORD: {"table": written(test.table)}}
     if virtual:
-        told[TWIN_RECORD] = {
-            "seed": str(test.seed),
-            "parameters": json.dumps(flattened(test.configuration)),
-            "effects": json.dumps(tuple(test.effects)),
-            "version": __version__,
-        }
+        told[TWIN_RECORD] = twin_values(test.seed, flattened(test.configuration), test.effects, __version__)
     return told
 
 
