@@ -4,7 +4,7 @@
     environment("active", actions=Actuators(), interval=1)   it is the controller: plate position and motor voltage
 
 An episode is one test of an experiment; each takes the next seed, so another road and other noise. A trip of a safety limit
-ends it with discount 0 and a penalty, the test's end with discount 1. With the action `rest` it is the experiment to the bit.
+ends it with discount 0 and a penalty, the test's end with discount 1. A schedule at `rest` is the experiment to the bit.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import dm_env
 import numpy as np
 from dm_env import specs
 
-from controllers import Commands, Controller, Demand, Measurements, State, controller, initial_state, update
+from controllers import Commands, Controller, Demand, Measurements, Settings, State, controller, initial_state, update
 from controllers.quantity import Quantity, fields
 from rigtwin.arrays import Array
 from rigtwin.configuration import Configuration
@@ -52,7 +52,7 @@ class Actions(Protocol):
         ...
 
     def rest(self, configuration: Configuration) -> Array:
-        """The action that leaves the experiment as it is."""
+        """The action that changes nothing."""
         ...
 
     def act(
@@ -63,21 +63,21 @@ class Actions(Protocol):
 
 
 class Schedule:
-    """The agent changes settings of the controller that runs: name → (low, high), in the setting's unit.
+    """The agent changes settings of the controller that runs: name → (low, high), in the setting's unit."""
 
-    By default the suspension's damping, Ns/m, and its preload, N: a semi-active and an active suspension.
-    """
-
-    def __init__(self, bounds: Mapping[str, tuple[float, float]] | None = None) -> None:
+    def __init__(self, bounds: Mapping[str, tuple[float, float]]) -> None:
         """Raises RigtwinError for a setting that is none or no number, or bounds beyond its own."""
-        self.bounds = dict(bounds or {"suspension_damping": (10.0, 500.0), "preload": (100.0, 300.0)})
-        from controllers import Settings
-
+        self.bounds = dict(bounds)
         known = fields(Settings)
-        for name, (low, high) in self.bounds.items():
+        if not self.bounds:
+            raise RigtwinError("actions: expected at least one setting with its bounds")
+        for name, ends in self.bounds.items():
             meaning = known.get(name)
             if not isinstance(meaning, Quantity):
                 raise RigtwinError(f"action {name!r}: expected a setting of the controller that is a number")
+            if not isinstance(ends, tuple | list) or len(ends) != 2:
+                raise RigtwinError(f"action {name}: {ends!r}; expected its bounds, (low, high)")
+            low, high = ends
             if not meaning.low <= low < high <= meaning.high:
                 allowed = f"{meaning.low:g} to {meaning.high:g} {meaning.unit}"
                 raise RigtwinError(f"action {name} from {low:g} to {high:g}: expected low below high within {allowed}")
@@ -94,6 +94,18 @@ class Schedule:
     ) -> tuple[State, Commands]:
         changed = dict(zip(self.bounds, action.tolist(), strict=True))
         return update(controlling._replace(settings=controlling.settings._replace(**changed)), state, measured, demand)
+
+
+def suspension(settings: Settings) -> Schedule:
+    """The suspension's damping, Ns/m, from a fifth to ten times what it is, and its preload, N, half as much more or less: a
+    semi-active and an active suspension."""
+    factors = {"suspension_damping": (0.2, 10.0), "preload": (0.5, 1.5)}
+    bounds = {}
+    for name, (low, high) in factors.items():
+        there, meaning = getattr(settings, name), fields(Settings)[name]
+        assert isinstance(meaning, Quantity)
+        bounds[name] = (low * there, min(high * there, meaning.high))
+    return Schedule(bounds)
 
 
 class Actuators:
@@ -132,11 +144,12 @@ class Environment(dm_env.Environment):
     ) -> None:
         """demands: of (configuration, seed), shape (ticks, 3), as an experiment has them; seed: of the first episode; interval:
         ticks a step. Raises RigtwinError for figures that make no sense."""
-        if seed < 0 or interval < 1 or not all(figure > 0.0 for figure in reward):
+        whole = all(isinstance(number, int) and not isinstance(number, bool) for number in (seed, interval))
+        if not (whole and seed >= 0 and interval >= 1 and isinstance(reward, Reward) and all(one > 0.0 for one in reward)):
             given = f"seed {seed}, interval {interval}, {reward}"
-            raise RigtwinError(f"{given}: expected seed 0 or more, interval 1 or more, figures above 0")
+            raise RigtwinError(f"{given}: expected seed 0 or more, interval 1 or more ticks, a Reward of figures above 0")
         self.configuration, self.interval, self.reward = configuration, interval, reward
-        self.actions: Actions = Schedule() if actions is None else actions
+        self.actions: Actions = suspension(configuration.controller) if actions is None else actions
         self.trip = Trip.NONE
         self._demands, self._next_seed = demands, seed
         self._controlling = controller(configuration.controller, configuration.timing.period)
@@ -155,7 +168,7 @@ class Environment(dm_env.Environment):
         }
 
     def rest(self) -> Array:
-        """The action that leaves the experiment as it is."""
+        """The action that leaves the experiment as it is; of Actuators, the one that it starts with."""
         return self.actions.rest(self.configuration)
 
     def reset(self) -> dm_env.TimeStep:
@@ -177,6 +190,8 @@ class Environment(dm_env.Environment):
         if self._over:
             return self.reset()
         action = np.asarray(self.action_spec().validate(np.asarray(action, dtype=np.float64)))
+        if not np.all(np.isfinite(action)):
+            raise ValueError(f"action {action} for {self.action_spec().name}: expected finite numbers")
         cost, first = 0.0, self._tick
         while self._tick < min(first + self.interval, len(self._asked)) and self.trip == Trip.NONE:
             cost += self._ticked(action)

@@ -48,12 +48,19 @@ class Posterior:
         return overridden(configuration, self.changes)
 
     def drawn(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
-        """A twin as it may be: each value found normal about what was found, cut off at its bounds."""
+        """A twin as it may be: each value found normal about what was found, either side as wide as its interval, cut off at
+        its bounds."""
         configuration = self.at_best(configuration)
         for key, (low, high) in self.intervals.items():
-            spread = (high - low) / (2.0 * NORMAL_95)
-            configuration = shifted_within(configuration, key, spread * random.standard_normal())
+            there, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
+            configuration = shifted_within(configuration, key, amount * (high - there if amount > 0.0 else there - low))
         return configuration
+
+
+def value_of(configuration: Configuration, key: str) -> float:
+    """The number `group.name`."""
+    group, _, name = key.partition(".")
+    return float(getattr(groups(configuration)[group], name))
 
 
 def shifted_within(configuration: Configuration, key: str, amount: float) -> Configuration:
@@ -61,7 +68,7 @@ def shifted_within(configuration: Configuration, key: str, amount: float) -> Con
     group, _, name = key.partition(".")
     meaning = fields(type(groups(configuration)[group]))[name]
     assert isinstance(meaning, Quantity)
-    value = getattr(groups(configuration)[group], name) + amount
+    value = value_of(configuration, key) + amount
     return overridden(configuration, {group: {name: min(max(value, meaning.low), meaning.high)}})
 
 
@@ -85,22 +92,33 @@ def load_posterior(path: Path) -> Posterior:
 
 def _parsed(tables: Mapping[str, Any]) -> Posterior:
     changes = values_of(tables)
-    configuration = overridden(Configuration(), changes)
+    configuration = _of_rig("it", changes)
     table = tables.get(POSTERIOR, {})
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{POSTERIOR} = {table!r}: expected a table, as rigtwin diagnose --save-twin writes it")
     for key in table:
         if key not in ("probability", "intervals", "otherwise"):
             raise RigtwinError(f"unknown {POSTERIOR}.{key}; there are probability, intervals, otherwise")
-    others = table.get("otherwise", [])
+    intervals, others = table.get("intervals", {}), table.get("otherwise", [])
+    if not isinstance(intervals, Mapping):
+        raise RigtwinError(f"{POSTERIOR}.intervals = {intervals!r}: expected a table of component.parameter = [low, high]")
     if not isinstance(others, list) or not all(isinstance(other, Mapping) for other in others):
         raise RigtwinError(f"{POSTERIOR}.otherwise: expected tables, [[{POSTERIOR}.otherwise]]")
     return Posterior(
         changes,
-        {key: _interval(configuration, key, ends) for key, ends in dict(table.get("intervals", {})).items()},
+        {key: _interval(configuration, key, ends) for key, ends in intervals.items()},
         _probability(table.get("probability", 1.0)),
         tuple(_otherwise(other) for other in others),
     )
+
+
+def _of_rig(where: str, changes: Changes) -> Configuration:
+    """The nominal rig with changes, which must be of its components alone."""
+    configuration = overridden(Configuration(), changes)
+    for group in changes:
+        if group not in configuration.plant._fields:
+            raise RigtwinError(f"{where} changes {group}; a rig is described by {', '.join(configuration.plant._fields)} alone")
+    return configuration
 
 
 def _probability(value: object) -> float:
@@ -111,12 +129,17 @@ def _probability(value: object) -> float:
 
 def _interval(configuration: Configuration, key: str, ends: object) -> tuple[float, float]:
     group, _, name = key.partition(".")
-    if group not in configuration.plant._fields or not hasattr(getattr(configuration.plant, group), name):
+    known = fields(type(getattr(configuration.plant, group))) if group in configuration.plant._fields else {}
+    if not isinstance(known.get(name), Quantity):
         raise RigtwinError(f"{POSTERIOR}.intervals: unknown parameter {key!r}; expected component.parameter of the rig")
-    numbers = ends if isinstance(ends, list) and len(ends) == 2 else [math.nan, math.nan]
-    if not all(isinstance(end, int | float) and not isinstance(end, bool) for end in numbers) or not numbers[0] <= numbers[1]:
-        raise RigtwinError(f"{POSTERIOR}.intervals: {key} = {ends!r}; expected [low, high]")
-    return float(numbers[0]), float(numbers[1])
+    try:
+        low, high = (float(end) for end in ends if not isinstance(end, bool | str))  # type: ignore[union-attr]
+    except (TypeError, ValueError, OverflowError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low <= value_of(configuration, key) <= high):
+        there = value_of(configuration, key)
+        raise RigtwinError(f"{POSTERIOR}.intervals: {key} = {ends!r}; expected [low, high] about its value, {there:g}")
+    return low, high
 
 
 def _otherwise(table: Mapping[str, Any]) -> Otherwise:
@@ -125,5 +148,8 @@ def _otherwise(table: Mapping[str, Any]) -> Otherwise:
         raise RigtwinError(
             f"{POSTERIOR}.otherwise: expected effect, probability and changes, found {', '.join(table) or 'nothing'}"
         )
-    overridden(Configuration(), changes)
-    return Otherwise(str(table["effect"]), _probability(table.get("probability", 0.0)), changes)
+    effect = str(table["effect"])
+    if not effect.isprintable():
+        raise RigtwinError(f"{POSTERIOR}.otherwise: effect = {effect!r}; expected a name of one line")
+    _of_rig(f"{POSTERIOR}.otherwise {effect}", changes)
+    return Otherwise(effect, _probability(table.get("probability", 0.0)), changes)

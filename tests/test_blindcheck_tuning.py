@@ -20,8 +20,8 @@ from rigtwin.sweep.workers import Here
 from rigtwin.tuning.bench import Bench
 from rigtwin.tuning.judged import comparison
 from rigtwin.tuning.measures import Trial
+from rigtwin.tuning.reading import parsed
 from rigtwin.tuning.run import LIMITS, TRIP
-from rigtwin.tuning.study import parsed
 
 
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
@@ -113,7 +113,7 @@ def test_what_is_better_is_counted_by_its_interval():
     better, worse = [9.0 + 0.1 * n for n in range(8)], [11.0 + 0.1 * n for n in range(8)]
     mixed = [9.0, 11.0] * 4
     printed = text(study, [case(0, better), case(1, worse), case(2, mixed), case(3, mixed, trips=2.0)])
-    assert "better for the diagnosis on 1 of 4, worse on 1, no difference to be told on 2" in printed
+    assert "better for the diagnosis on 1 of 4, worse on 1, no difference to be told on 1, tripped on 1" in printed
     assert "tripped" in printed
 
 

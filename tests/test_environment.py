@@ -126,6 +126,8 @@ def test_an_agent_can_do_something_about_it():
         ({"skyhook": (0.0, 1.0)}, "expected a setting"),
         ({"kp": (1.0, 0.5)}, "low below high within 0 to 20"),
         ({"kp": (0.0, 50.0)}, "low below high within 0 to 20"),
+        ({"kp": 3.0}, "expected its bounds"),
+        ({}, "at least one setting"),
     ],
 )
 def test_mistakes_in_actions_are_said(bounds, says):
@@ -142,3 +144,8 @@ def test_mistakes_are_said():
     env.reset()
     with pytest.raises(ValueError, match="suspension_damping"):
         env.step(np.array([1e6, 200.0]))
+    with pytest.raises(ValueError, match="expected finite numbers"):
+        env.step(np.array([np.nan, 200.0]))
+    for name in ("car", "truck", "motorcycle", "boeing-707"):
+        heavy = environment(name)
+        heavy.action_spec().validate(heavy.rest())

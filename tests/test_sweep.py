@@ -106,6 +106,16 @@ def test_mistakes_of_a_store_are_one_line(tmp_path):
         Store(tmp_path / "file" / "s.sqlite")
 
 
+def test_a_damaged_result_is_one_line(tmp_path):
+    with Store(tmp_path / "s.sqlite", "one") as store:
+        store["a"] = {"curve": np.arange(5.0)}
+    with closing(sqlite3.connect(tmp_path / "s.sqlite")) as base:
+        base.execute("UPDATE results SET result = substr(result, 1, 20)")
+        base.commit()
+    with Store(tmp_path / "s.sqlite", "one") as store, pytest.raises(RigtwinError, match="or damaged; remove it"):
+        store["a"]
+
+
 def test_what_was_done_is_not_done_again(tmp_path):
     ran: list[int] = []
 

@@ -26,10 +26,11 @@ from rigtwin.tuning.bench import Bench, Worth, quantile
 from rigtwin.tuning.judged import comparison, median_interval
 from rigtwin.tuning.measures import MEASURES, Trial
 from rigtwin.tuning.parameter import Parameter, values
+from rigtwin.tuning.reading import find, parsed
 from rigtwin.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.tuning.scenario import APART, diagnosed, drawn, nominal
-from rigtwin.tuning.search import Search, Tried, best, front
-from rigtwin.tuning.study import Study, find, parsed, shipped
+from rigtwin.tuning.search import Search, Tried, best, bound_of, front
+from rigtwin.tuning.study import Constraint, Study, shipped
 from tests.browser import BROWSER, looked_at
 
 SMALL = """
@@ -205,6 +206,12 @@ def test_every_study_that_comes_along_can_be_read():
         ({"held_out": 5}, "expected a whole number from 6"),
         ({"roads": True}, "expected a whole number"),
         ({"quantile": 1.5}, "expected a number from 0 to 1"),
+        ({"title": "two\nlines"}, "expected text of one line"),
+        ({"judge": {"a\nb": {"motor.coulomb": 1}}}, "expected text of one line"),
+        ({"set": {"duration": 2.0}}, "set: duration = 2.0: expected group.name"),
+        ({"judge": {"odd": 3}}, "judge: odd = 3: expected a table"),
+        ({"vary": {"rail.viscous": 0.5}}, "it is 0 in this rig"),
+        ({"minimise": ["ride", "ride"]}, "one objective, or two others"),
     ],
 )
 def test_mistakes_in_a_study_are_one_line(changes, says):
@@ -266,6 +273,23 @@ def test_a_rig_is_drawn_as_uncertain_as_it_is():
     assert min(each.plant.motor.coulomb for each in drawn(study, diagnosed(wide), 50, 0)) == 0.0
 
 
+def test_an_interval_may_be_wider_on_one_side():
+    study = parsed("s", TABLES)
+    lopsided = replace(POSTERIOR, intervals={"motor.coulomb": (23.0, 30.0)})
+    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, diagnosed(lopsided), 600, 0)])
+    assert np.median(frictions) == pytest.approx(24.0, abs=0.25)
+    assert np.mean(frictions < 23.0) == pytest.approx(0.025, abs=0.015)
+    assert np.mean(frictions > 30.0) == pytest.approx(0.025, abs=0.015)
+
+
+def test_what_was_diagnosed_is_not_varied_again():
+    study = parsed("s", {**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
+    certain = replace(POSTERIOR, intervals={"motor.coulomb": (23.99, 24.01)})
+    rigs = drawn(study, diagnosed(certain), 20, 0)
+    assert max(abs(each.plant.motor.coulomb - 24.0) for each in rigs) < 0.05
+    assert len({each.plant.rail.coulomb for each in rigs}) == 20
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -278,6 +302,15 @@ def test_a_rig_is_drawn_as_uncertain_as_it_is():
         ("[posterior]\notherwise = 3", "expected tables"),
         ("[[posterior.otherwise]]\nprobability = 0.1", "expected effect"),
         ("[moon]\nmass = 1", "unknown group 'moon'"),
+        ("[posterior]\nintervals = 3", "expected a table of component.parameter"),
+        ('[posterior]\nintervals = "abc"', "expected a table of component.parameter"),
+        ('[posterior.intervals]\n"motor.count" = [1, 2]', "unknown parameter 'motor.count'"),
+        ('[posterior.intervals]\n"motor.coulomb" = [-inf, inf]', r"expected \[low, high\] about its value, 14"),
+        ('[posterior.intervals]\n"motor.coulomb" = [100, 200]', r"expected \[low, high\] about its value, 14"),
+        ('[posterior.intervals]\n"motor.coulomb" = [1, 2, 3]', r"expected \[low, high\]"),
+        ("[timing]\nduration = 3", "a rig is described by"),
+        ('[[posterior.otherwise]]\neffect = "kp"\nchanges.controller.kp = 3', "a rig is described by"),
+        ('[[posterior.otherwise]]\neffect = "a\\nb"', "a name of one line"),
     ],
 )
 def test_mistakes_in_a_calibrated_twin_are_one_line(text, says, tmp_path):
@@ -336,8 +369,53 @@ def test_a_bound_may_be_the_baselines(tmp_path):
     assert best(search).worth.figures["road_holding"] <= 0.9 * there
 
 
+def test_there_is_no_share_of_a_baseline_below_zero():
+    worth = Worth({"stability_margin": -0.23}, 0.5, 0.0)
+    margin = MEASURES["stability_margin"]
+    with pytest.raises(RigtwinError, match="of which there is no share"):
+        bound_of(Constraint(margin, math.nan, 0.9), worth)
+    assert bound_of(Constraint(margin, math.nan, 1.0), worth) == -0.23
+
+
+def test_what_cannot_be_met_together_is_said(tmp_path):
+    with pytest.raises(RigtwinError, match=r"the nearest fails at (ride|road_holding)"):
+        best(searching(tmp_path, {"constraints": {"road_holding": 2.05, "ride": 1.05}}))
+
+
+def test_parameters_that_do_nothing_are_said(tmp_path):
+    @dataclass(frozen=True)
+    class Deaf(Known):
+        def searched(self, candidates, scenarios) -> list[Worth]:
+            return [Worth({"ride": 1.0}, 0.5, 0.0) for _ in candidates]
+
+    study = parsed("s", {**TABLES, "evaluations": 10})
+    with pytest.raises(RigtwinError, match=r"controller.skyhook_damping make no difference in active"):
+        best(Search(Deaf(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+
+
+def test_what_is_not_a_number_is_not_allowed(tmp_path):
+    @dataclass(frozen=True)
+    class Lost(Known):
+        def searched(self, candidates, scenarios) -> list[Worth]:
+            return [Worth({"ride": math.nan}, 0.5, 0.0) for _ in candidates]
+
+    study = parsed("s", {**TABLES, "evaluations": 10})
+    with pytest.raises(RigtwinError, match="the nearest fails at trips"):
+        best(Search(Lost(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+
+
+@pytest.mark.parametrize("evaluations", [5, 20, 100])
+def test_a_search_tries_about_as_many_as_it_may(evaluations, tmp_path):
+    search = searching(tmp_path, {"evaluations": evaluations})
+    best(search)
+    assert len(search.tried) <= 1.5 * evaluations
+    both = searching(tmp_path / "both", {"evaluations": 60, "minimise": ["ride", "road_holding"], "points": 4})
+    front(both)
+    assert len(both.tried) <= 90
+
+
 def test_nothing_allowed_is_said(tmp_path):
-    with pytest.raises(RigtwinError, match=r"none of .* candidates meets every constraint, hardest 'road_holding'"):
+    with pytest.raises(RigtwinError, match=r"none of .* candidates meets every constraint; the nearest fails at road_holding"):
         best(searching(tmp_path, {"constraints": {"road_holding": 1.5}}))
 
 
@@ -374,6 +452,11 @@ def test_a_quantile_is_on_the_worse_side():
     assert math.isnan(quantile(MEASURES["ride"], [1.0, math.nan], 0.5))
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_too_few_have_no_interval(count):
+    assert all(map(math.isnan, median_interval(np.arange(float(count)))))
+
+
 @pytest.mark.parametrize("count", [6, 16, 32])
 def test_the_interval_of_a_median_holds_it_as_often_as_it_says(count):
     random = np.random.default_rng(count)
@@ -401,6 +484,16 @@ def test_a_comparison_is_paired_and_leaves_trips_out():
     assert margin.median == pytest.approx(0.5)
     assert margin.better == pytest.approx(2 / 3)
     assert not margin.relative
+
+
+def test_a_change_of_nothing_is_in_its_unit():
+    def rows(values: list[float]) -> list[dict[str, float]]:
+        return [{"travel": value, TRIP: 0.0, LIMITS: 0.1} for value in values]
+
+    one, other = rows([0.0] * 6), rows([0.1] * 6)
+    change = comparison((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).of("travel")
+    assert not change.relative
+    assert change.median == pytest.approx(0.1)
 
 
 def small(folder: Path, text: str = SMALL) -> Path:
@@ -476,6 +569,30 @@ def test_a_study_of_a_calibrated_twin_says_what_it_is_worth(tmp_path, capsys):
     assert "twin with viscous@motor instead" in printed
     assert "point 1 against before" in printed
     assert {"front.png", "tuned-1.toml"} <= {each.name for each in (tmp_path / "out").iterdir()}
+
+
+def test_settings_that_should_not_be_used_are_said_and_end_with_another_code(tmp_path, capsys):
+    """The bounds leave nothing but what is worse than before; a judged rig breaks its limit."""
+    text = SMALL.replace("[50.0, 1500.0]", "[1.0, 20.0]").replace("limits = 0.9", "limits = 0.9\nroad_holding = 100.0")
+    text += '\n[judge."$x_{$ no tyre to speak of"]\n"tyre.stiffness" = 500000.0\n'
+    assert main(["tune", str(small(tmp_path, text)), "--out", str(tmp_path / "out"), "--workers", "2"]) == 4
+    printed = capsys.readouterr().out
+    assert "but no objective is certainly better than before" in printed
+    assert "controller.skyhook_damping is 200 before, outside the bounds 1 to 20" in printed
+    assert "# but no objective is certainly better" in (tmp_path / "out" / "tuned.toml").read_text()
+    assert "But no objective is certainly better" in (tmp_path / "out" / "index.html").read_text()
+
+
+def test_a_test_without_a_road_is_said_to_be_always_the_same(tmp_path, capsys):
+    text = SMALL.replace('"active"', '"drop"').replace("skyhook_damping", "suspension_damping").replace("1500.0", "90.0")
+    main(["tune", str(small(tmp_path, text)), "--out", str(tmp_path / "out"), "--workers", "2"])
+    assert "drop is the same test whatever its seed" in capsys.readouterr().out
+
+
+def test_settings_given_at_once_are_checked_with_the_study(tmp_path, capsys):
+    arguments = ["tune", str(small(tmp_path)), "--out", str(tmp_path / "out"), "--set", "timing.duration=1.5"]
+    assert main(arguments) == 1
+    assert "from = 1 s: expected at least a second before the test's end at 1.5 s" in capsys.readouterr().err
 
 
 def test_a_study_that_is_interrupted_keeps_its_runs(tmp_path, monkeypatch):

@@ -42,11 +42,11 @@ def _diagnoses(parsed: Namespace, workers: Workers) -> int:
 def _tuning(parsed: Namespace, workers: Workers) -> int:
     from rigtwin.blindcheck.tuning import Case, checked, document, text
     from rigtwin.tuning.bench import Bench
-    from rigtwin.tuning.study import find
+    from rigtwin.tuning.reading import find
 
     study = find(parsed.tune)
-    if len(study.minimise) != 1:
-        raise RigtwinError(f"--tune {parsed.tune}: expected a study with one objective")
+    if len(study.minimise) != 1 or study.minimise[0].more:
+        raise RigtwinError(f"--tune {parsed.tune}: expected a study with one objective that is of the test itself")
     cases = RIGS if parsed.cases is None else parsed.cases
     total = (cases + 1) * (study.evaluations + 1) * study.roads + cases * (1 + 3 * study.held_out)
     with (

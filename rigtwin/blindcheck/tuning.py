@@ -145,17 +145,22 @@ def text(study: Study, cases: list[Case]) -> str:
     """All cases as a table, and how many are better for the diagnosis."""
     objective = study.minimise[0]
     rows = [("rig", "withheld", "tuned on nominal", "on calibrated", "change", "95 % of the median", "against before")]
-    better = worse = 0
+    better = worse = tripped = 0
     for case in cases:
-        if not case.against_nominal.changes:
-            rows.append((str(case.number + 1), case.defect, "tripped", "", "", "", ""))
+        trips = [*case.against_nominal.trips, case.against_before.trips[0]]
+        if max(trips) > 0.0:
+            tripped += 1
+            shares = " / ".join(f"{100.0 * share:.0f} %" for share in trips)
+            said = f"trips on nominal / calibrated / before: {shares}"
+            rows.append((str(case.number + 1), case.defect, said, "", "", "", ""))
             continue
         one, begun = case.against_nominal.of(objective.name), case.against_before.of(objective.name)
-        better, worse = better + (one.high < 0.0), worse + (one.low > 0.0)
+        better, worse = better + one.improved, worse + (one.low > 0.0)
         figures = f"{one.before.median:.4g} {objective.unit}", f"{one.after.median:.4g} {objective.unit}"
         rows.append((str(case.number + 1), case.defect, *figures, *change(one), change(begun)[0]))
     said = f"{objective.title} on the rigs themselves: better for the diagnosis on {better} of {len(cases)}, worse on {worse}"
-    return f"{table(rows)}\n{said}, no difference to be told on {len(cases) - better - worse}"
+    left = len(cases) - better - worse - tripped
+    return f"{table(rows)}\n{said}, no difference to be told on {left}, tripped on {tripped}"
 
 
 def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:

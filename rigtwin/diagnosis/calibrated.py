@@ -80,6 +80,6 @@ def save(path: Path, outcome: Outcome) -> None:
     if outcome.evidence is None:
         raise RigtwinError(f"{path} not written: the data cannot be diagnosed")
     try:
-        path.write_text(toml(outcome))
+        path.write_text(toml(outcome), encoding="utf-8")
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None

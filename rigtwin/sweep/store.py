@@ -64,16 +64,23 @@ class Store:
         return RigtwinError(f"cannot use {self.path}: {error}")
 
     def __contains__(self, key: str) -> bool:
-        query = "SELECT 1 FROM results WHERE context = ? AND key = ?"
-        return self._base.execute(query, (self._context, key)).fetchone() is not None
+        return bool(self._rows("SELECT 1 FROM results WHERE context = ? AND key = ?", self._context, key))
+
+    def _rows(self, query: str, *values: str) -> list[Any]:
+        try:
+            return self._base.execute(query, values).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise self._fault(error) from None
 
     def __getitem__(self, key: str) -> Any:
         """The result of that key. Raises KeyError if there is none."""
-        query = "SELECT result FROM results WHERE context = ? AND key = ?"
-        row = self._base.execute(query, (self._context, key)).fetchone()
-        if row is None:
+        rows = self._rows("SELECT result FROM results WHERE context = ? AND key = ?", self._context, key)
+        if not rows:
             raise KeyError(key)
-        return json.loads(row[0], object_hook=_decoded)
+        try:
+            return json.loads(rows[0][0], object_hook=_decoded)
+        except (ValueError, EOFError):
+            raise self._fault(sqlite3.DatabaseError("malformed")) from None
 
     def __setitem__(self, key: str, result: object) -> None:
         """Raises RigtwinError if it cannot be written, such as on a full disk."""
@@ -85,11 +92,11 @@ class Store:
             raise self._fault(error) from None
 
     def keys(self) -> Iterator[str]:
-        for (key,) in self._base.execute("SELECT key FROM results WHERE context = ? ORDER BY key", (self._context,)):
+        for (key,) in self._rows("SELECT key FROM results WHERE context = ? ORDER BY key", self._context):
             yield key
 
     def __len__(self) -> int:
-        return int(self._base.execute("SELECT COUNT(*) FROM results WHERE context = ?", (self._context,)).fetchone()[0])
+        return int(self._rows("SELECT COUNT(*) FROM results WHERE context = ?", self._context)[0][0])
 
     def close(self) -> None:
         self._base.close()

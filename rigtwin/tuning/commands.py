@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from dataclasses import replace
 from pathlib import Path
 
 from tqdm import tqdm
 
-from rigtwin.configuration import from_assignments
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
 from rigtwin.posterior import Posterior, load_posterior
@@ -17,19 +15,21 @@ from rigtwin.sweep import Store, hired
 from rigtwin.tuning.bench import Bench
 from rigtwin.tuning.folder import PAGE, RUNS, SETTINGS, write
 from rigtwin.tuning.outcome import tuned
-from rigtwin.tuning.study import Study, find, shipped
-from rigtwin.tuning.text import text
+from rigtwin.tuning.reading import find
+from rigtwin.tuning.study import Study, shipped
+from rigtwin.tuning.text import concerns, text
 
 
 def tune(parsed: Namespace) -> int:
-    """Tunes, judges, and writes the folder; a second run goes on where the first was stopped."""
+    """Tunes, judges, and writes the folder; a second run goes on where the first was stopped. Returns 4 if something speaks
+    against the settings that were found."""
     if parsed.study is None:
         print(_listing())
         return 0
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
-    study = find(parsed.study).resized(roads=parsed.roads, held_out=parsed.held_out, evaluations=parsed.evaluations)
-    study = replace(study, configuration=from_assignments(study.configuration, parsed.set))
+    numbers = {"roads": parsed.roads, "held_out": parsed.held_out, "evaluations": parsed.evaluations}
+    study = find(parsed.study, parsed.set, **numbers)
     posterior = None if parsed.twin is None else load_posterior(parsed.twin)
     folder = parsed.out or Path("tuning") / study.name
     if folder.exists() and not folder.is_dir():
@@ -45,7 +45,7 @@ def tune(parsed: Namespace) -> int:
     write(folder, outcome, twin)
     print(text(outcome))
     print(f"\nlook at {folder / PAGE}\nrigtwin run {study.experiment} --config {folder / SETTINGS}")
-    return 0
+    return 4 if concerns(outcome) else 0
 
 
 def _runs(study: Study, posterior: Posterior | None) -> int:

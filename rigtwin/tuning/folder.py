@@ -38,8 +38,13 @@ def write(folder: Path, outcome: Outcome, twin: Configuration) -> list[Path]:
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # Of an earlier study nothing stays that this one does not write again.
+        for old in (*folder.glob("tuned*.toml"), *(folder / f"{name}.png" for name in CAPTIONS)):
+            old.unlink(missing_ok=True)
         for name, content in pages.items():
-            (folder / name).write_text(content, encoding="utf-8")
+            temporary = folder / f".{name}.new"
+            temporary.write_text(content, encoding="utf-8")
+            temporary.replace(folder / name)
             written.append(folder / name)
     except OSError as error:
         raise RigtwinError(f"cannot write into {folder}: {error.strerror}") from None

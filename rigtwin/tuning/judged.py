@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,7 +12,7 @@ from scipy.stats import binom
 from controllers import Settings
 from rigtwin.arrays import Array
 from rigtwin.safety import Trip
-from rigtwin.tuning.bench import Bench
+from rigtwin.tuning.bench import Bench, quantile
 from rigtwin.tuning.measures import Measure
 from rigtwin.tuning.run import LIMITS, TRIP
 from rigtwin.tuning.scenario import Scenario
@@ -31,8 +32,9 @@ class Spread:
 
 @dataclass(frozen=True)
 class Change:
-    """How a measure changed in the same scenario, in % of before, or in its unit where it can pass zero. median with its 95 %
-    interval; better: share of scenarios in which it did not get worse."""
+    """How a measure changed in the same scenario, in % of before, or in its unit where it can be zero. median with its 95 %
+    interval, not numbers below six runs; better: share of scenarios in which it did not get worse; worth: the study's quantile
+    of it after."""
 
     measure: Measure
     before: Spread
@@ -42,6 +44,12 @@ class Change:
     high: float
     better: float
     relative: bool
+    worth: float
+
+    @property
+    def improved(self) -> bool:
+        """Whether its interval lies on the better side."""
+        return self.low > 0.0 if self.measure.more else self.high < 0.0
 
 
 @dataclass(frozen=True)
@@ -68,11 +76,12 @@ def spread(values: Array) -> Spread:
 
 
 def median_interval(values: Array, confidence: float = 0.95) -> tuple[float, float]:
-    """Of the median of whatever the values are drawn from: the order statistics that the binomial distribution says."""
+    """Of the median of whatever the values are drawn from: the order statistics that the binomial distribution says. Not
+    numbers where even the extremes do not hold it so often."""
     ordered, count = np.sort(values), len(values)
     rank = int(binom.ppf((1.0 - confidence) / 2.0, count, 0.5))
-    # Between the rank-th from below and from above lies the median with at least the confidence, or all of them.
-    rank = max(rank, 1)
+    if rank < 1:
+        return math.nan, math.nan
     return float(ordered[rank - 1]), float(ordered[count - rank])
 
 
@@ -81,26 +90,35 @@ def compared(
 ) -> Comparison:
     """Both settings, each with its name, in every scenario."""
     first, second = bench.runs(bench.study.configuration, [before[1], after[1]], scenarios)
-    return comparison(bench.study.measures, rig, (before[0], first), (after[0], second))
+    return comparison(bench.study.measures, rig, (before[0], first), (after[0], second), bench.study.quantile)
 
 
 def comparison(
-    measures: Sequence[Measure], rig: str, before: tuple[str, Sequence[Figures]], after: tuple[str, Sequence[Figures]]
+    measures: Sequence[Measure],
+    rig: str,
+    before: tuple[str, Sequence[Figures]],
+    after: tuple[str, Sequence[Figures]],
+    share: float = 0.5,
 ) -> Comparison:
-    """Of runs of both settings, each with its name, in the same scenarios."""
+    """Of runs of both settings, each with its name, in the same scenarios. share: quantile that the settings are worth."""
     (against, first), (settings, second) = before, after
-    fine = [a[TRIP] == Trip.NONE and b[TRIP] == Trip.NONE for a, b in zip(first, second, strict=True)]
+    fine = [all(_lived(row, measures) for row in pair) for pair in zip(first, second, strict=True)]
     changes = []
     for measure in measures if any(fine) else ():
         one, other = (
             np.array([row[measure.name] for row, ok in zip(rows, fine, strict=True) if ok]) for rows in (first, second)
         )
-        relative = not measure.more
+        relative = not measure.more and bool(np.all(one > 0.0))
         change = 100.0 * (other / one - 1.0) if relative else other - one
         worse = change < 0.0 if measure.more else change > 0.0
-        low, high = median_interval(change)
+        interval, worth = median_interval(change), quantile(measure, other, share)
         better = float(np.mean(~worse))
-        changes.append(Change(measure, spread(one), spread(other), float(np.median(change)), low, high, better, relative))
+        middle = float(np.median(change))
+        changes.append(Change(measure, spread(one), spread(other), middle, *interval, better, relative, worth))
     trips = tuple(float(np.mean([row[TRIP] != Trip.NONE for row in rows])) for rows in (first, second))
     limits = max(row[LIMITS] for row in second)
     return Comparison(rig, settings, against, tuple(changes), (trips[0], trips[1]), limits, int(sum(fine)))
+
+
+def _lived(row: Figures, measures: Sequence[Measure]) -> bool:
+    return row[TRIP] == Trip.NONE and all(math.isfinite(row[measure.name]) for measure in measures)

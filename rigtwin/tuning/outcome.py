@@ -24,7 +24,8 @@ TUNED, BEFORE, TUNED_NOMINAL = "tuned", "before", "tuned on the nominal twin"
 class Outcome:
     """rig: what was tuned on; tried: every candidate, in the order tried; front: with two objectives those that none beats,
     thinned to the study's number of points, else the best alone; chosen: the one to be used, of a front the one nearest to the
-    best in both; comparisons: on held-out scenarios; on_front: each point of a front with the settings begun with, likewise."""
+    best in both; comparisons: on held-out scenarios; on_front: each point of a front with the settings begun with, likewise;
+    alike: whether nothing but noise differs between scenarios."""
 
     study: Study
     seed: int
@@ -35,6 +36,7 @@ class Outcome:
     chosen: Tried
     comparisons: tuple[Comparison, ...]
     on_front: tuple[Comparison, ...]
+    alike: bool = False
 
     @property
     def settings(self) -> Settings:
@@ -62,8 +64,8 @@ def tuned(
     study = bench.study
     rig, name = (nominal, NOMINAL) if posterior is None else (diagnosed(posterior), CALIBRATED)
     stage(f"tuning on the {name}")
-    search, points = _searched(bench, rig, seed)
-    chosen = _nearest(study, points)
+    search, every = _searched(bench, rig, seed)
+    chosen, points = _nearest(search, every), _thinned(every, study.points)
     after = (TUNED, settings_of(study, chosen))
     rivals = [(BEFORE, study.reference)]
     if posterior is not None:
@@ -80,20 +82,30 @@ def tuned(
         scenarios = drawn(study, rig, study.held_out, APART)
         for number, point in enumerate(points, start=1):
             on_front.append(compared(bench, name, scenarios, rivals[0], (f"point {number}", settings_of(study, point))))
-    tried = tuple(search.tried.values())
-    return Outcome(study, seed, name, search.baseline, tried, points, chosen, tuple(comparisons), tuple(on_front))
+    tried, same = tuple(search.tried.values()), _alike(study, rig)
+    both = tuple(comparisons), tuple(on_front)
+    return Outcome(study, seed, name, search.baseline, tried, points, chosen, *both, same)
 
 
 def searched(bench: Bench, rig: Rig, seed: int) -> Settings:
     """Tuned on a rig, and not judged. Raises RigtwinError if no candidate meets the constraints."""
-    return settings_of(bench.study, _nearest(bench.study, _searched(bench, rig, seed)[1]))
+    return settings_of(bench.study, _nearest(*_searched(bench, rig, seed)))
 
 
 def _searched(bench: Bench, rig: Rig, seed: int) -> tuple[Search, tuple[Tried, ...]]:
     search = Search(bench, drawn(bench.study, rig, bench.study.roads, 0), seed)
     if len(bench.study.minimise) == 1:
         return search, (best(search),)
-    return search, _thinned(front(search), bench.study.points)
+    return search, front(search)
+
+
+def _alike(study: Study, rig: Rig) -> bool:
+    """Whether no road, no tolerance and nothing that varies tells one scenario from another."""
+    import experiments
+
+    demands = experiments.find(study.experiment).demands
+    one, other = drawn(study, rig, 2, APART)
+    return np.array_equal(demands(study.searched, 0), demands(study.searched, APART)) and one.plant == other.plant
 
 
 def _thinned(points: tuple[Tried, ...], most: int) -> tuple[Tried, ...]:
@@ -103,11 +115,13 @@ def _thinned(points: tuple[Tried, ...], most: int) -> tuple[Tried, ...]:
     return tuple(points[index] for index in np.round(np.linspace(0, len(points) - 1, most)).astype(int).tolist())
 
 
-def _nearest(study: Study, points: tuple[Tried, ...]) -> Tried:
-    """Of a front the point nearest to the best in both objectives, each in shares of its range on the front."""
-    figures = np.array([[point.figure(measure) for measure in study.minimise] for point in points])
-    spans = np.maximum(np.ptp(figures, axis=0), 1e-300)
-    return points[int(np.argmin(np.linalg.norm((figures - figures.min(axis=0)) / spans, axis=1)))]
+def _nearest(search: Search, points: tuple[Tried, ...]) -> Tried:
+    """Of a front the point nearest to the best in both objectives, each in shares of what the baseline has."""
+    measures = search.study.minimise
+    figures = np.array([[point.figure(measure) for measure in measures] for point in points])
+    before = np.abs([search.baseline.figures[measure.name] for measure in measures])
+    scales = np.where(np.isfinite(before) & (before > 0.0), before, np.maximum(np.ptp(figures, axis=0), 1e-300))
+    return points[int(np.argmin(np.linalg.norm((figures - figures.min(axis=0)) / scales, axis=1)))]
 
 
 def _rigs(study: Study, rig: Rig, name: str, posterior: Posterior | None) -> dict[str, tuple[Rig, Changes]]:
@@ -115,5 +129,7 @@ def _rigs(study: Study, rig: Rig, name: str, posterior: Posterior | None) -> dic
     rigs: dict[str, tuple[Rig, Changes]] = {name: (rig, NONE)}
     if posterior is not None:
         rigs[NOMINAL] = nominal, NONE
-        rigs |= {f"twin with {other.effect} instead": (nominal, other.changes) for other in posterior.otherwise}
+        for number, other in enumerate(posterior.otherwise):
+            twice = any(one.effect == other.effect for one in posterior.otherwise[:number])
+            rigs[f"twin with {other.effect} instead{f' ({number + 1})' if twice else ''}"] = nominal, other.changes
     return rigs | {f"rig with {label}": (rig, changes) for label, changes in study.judge.items()}

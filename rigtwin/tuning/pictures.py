@@ -23,6 +23,11 @@ def _sheet(columns: int, width: float = 5.2, height: float = 3.4) -> tuple[Figur
     return figure, axes
 
 
+def plain(words: str) -> str:
+    """Words that matplotlib takes as they are, and not for a formula."""
+    return words.replace("$", r"\$")
+
+
 def _label(measure: Measure) -> str:
     return f"{measure.title}, {measure.unit}"
 
@@ -101,7 +106,12 @@ def front(outcome: Outcome) -> Figure:
         )
     right.axhline(0.0, color=OTHER, linewidth=0.8)
     right.axvline(0.0, color=OTHER, linewidth=0.8)
-    right.set(xlabel=f"change of {one.title}, %", ylabel=f"change of {other.title}, %", title="held out, 95 % intervals")
+    units = [
+        "%" if any(each.of(measure.name).relative for each in outcome.on_front if each.changes) else measure.unit
+        for measure in (one, other)
+    ]
+    labels = [f"change of {measure.title}, {unit}" for measure, unit in zip((one, other), units, strict=True)]
+    right.set(xlabel=labels[0], ylabel=labels[1], title="held out, 95 % intervals")
     return figure
 
 
@@ -117,7 +127,7 @@ def held_out(outcome: Outcome) -> Figure:
         for number, comparison in enumerate(comparisons):
             change = comparison.of(measure.name)
             ends = [[change.median - change.low], [change.high - change.median]]
-            label = f"{comparison.rig}, against {comparison.against}" if measure is relative[0] else None
+            label = plain(f"{comparison.rig}, against {comparison.against}") if measure is relative[0] else None
             axis.errorbar(
                 change.median, place, xerr=ends, fmt="o", color=palette[number % len(palette)], markersize=4, label=label
             )

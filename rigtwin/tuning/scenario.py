@@ -27,38 +27,46 @@ class Scenario:
     plant: Plant
 
 
-Rig = Callable[[Configuration, np.random.Generator], Configuration]
-"""Draws a rig: of a configuration and random numbers, the configuration with what is known of this rig."""
+@dataclass(frozen=True)
+class Rig:
+    """What is known of a rig. draw: of a configuration and random numbers, the configuration with a rig as it may be; known:
+    `component.parameter` of what that has drawn, which is not varied again."""
+
+    draw: Callable[[Configuration, np.random.Generator], Configuration]
+    known: frozenset[str] = frozenset()
 
 
-def nominal(configuration: Configuration, _: np.random.Generator) -> Configuration:
-    """The rig as the study has it."""
-    return configuration
+nominal = Rig(lambda configuration, _: configuration)
+"""The rig as the study has it."""
 
 
 def diagnosed(posterior: Posterior) -> Rig:
     """The rig of a diagnosis, each value as uncertain as that left it."""
-    return posterior.drawn
+    return Rig(posterior.drawn, frozenset(posterior.intervals))
 
 
 def drawn(study: Study, rig: Rig, count: int, first: int, certain: Changes = NONE) -> list[Scenario]:
     """Scenarios with seeds from `first` on, each drawn from its seed alone, so that more of them leave the others as they are.
 
-    Tolerances and varied parameters are uniform within their bounds, about what is known of the rig; certain: what has a value
-    for certain.
+    Tolerances and varied parameters are uniform about the rig, cut off at the parameters' bounds; certain: what has a value for
+    certain.
     """
     tolerances = find(SUSPENSION_RIG).tolerances if study.tolerances else ()
     found = []
     for seed in range(first, first + count):
         random = np.random.default_rng([seed, 3])
-        configuration = rig(study.configuration, random)
+        configuration = rig.draw(study.configuration, random)
         for tolerance in tolerances:
             width = study.tolerances * tolerance.width(configuration.plant)
             key = f"{tolerance.group}.{tolerance.parameter}"
-            configuration = shifted_within(configuration, key, width * random.uniform(-1.0, 1.0))
+            amount = width * random.uniform(-1.0, 1.0)
+            if key not in rig.known:
+                configuration = shifted_within(configuration, key, amount)
         for key, share in study.vary.items():
             group, _, name = key.partition(".")
             value = float(getattr(getattr(configuration.plant, group), name))
-            configuration = shifted_within(configuration, key, value * share * random.uniform(-1.0, 1.0))
+            amount = value * share * random.uniform(-1.0, 1.0)
+            if key not in rig.known:
+                configuration = shifted_within(configuration, key, amount)
         found.append(Scenario(seed, overridden(configuration, certain).plant))
     return found

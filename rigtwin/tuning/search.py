@@ -24,6 +24,8 @@ from rigtwin.tuning.study import Constraint, Study
 
 PER_PARAMETER, FEWEST = 5, 8
 """Candidates of a generation for each parameter, and at least."""
+LEAST = 5
+"""Candidates of a generation that scipy's search needs."""
 CONVERGED = 2e-3
 """Spread of a generation's objective, as a share of it, at which the search ends."""
 TRIPPED = 10.0
@@ -74,10 +76,13 @@ class Search:
 
     def _violations(self, worth: Worth) -> tuple[float, ...]:
         constraints = zip(self.study.constraints, self.bounds, strict=True)
+        # What is not a number without a trip is no better than one.
+        lost = worth.trips or float(not all(map(math.isfinite, worth.figures.values())))
+        scales = [abs(self.baseline.figures[each.measure.name]) for each in self.study.constraints]
         return (
-            worth.trips,
+            lost,
             worth.limits - self.study.limits,
-            *(excess(each.measure, worth, bound) for each, bound in constraints),
+            *(excess(each.measure, worth, bound, scale) for (each, bound), scale in zip(constraints, scales, strict=True)),
         )
 
     def minimised(self, objective: Measure, evaluations: int, within: tuple[Measure, float] | None = None) -> Tried | None:
@@ -86,11 +91,11 @@ class Search:
         What an earlier search tried is where this one begins.
         """
         count = len(self.study.parameters)
-        population = max(FEWEST, PER_PARAMETER * count)
+        population = max(LEAST, min(max(FEWEST, PER_PARAMETER * count), evaluations))
         random = np.random.default_rng([self.seed, len(self.tried)])
 
         def beyond(each: Tried) -> list[float]:
-            more = [] if within is None else [excess(within[0], each.worth, within[1])]
+            more = [] if within is None else [excess(within[0], each.worth, within[1], abs(within[1]))]
             return [*each.violations, *more]
 
         def told(shares: Array, of: Callable[[Tried], Sequence[float]]) -> Array:
@@ -113,7 +118,7 @@ class Search:
             [(0.0, 1.0)] * count,
             constraints=NonlinearConstraint(lambda shares: told(shares, beyond), -math.inf, 0.0),
             init=np.vstack([begun, fresh]),  # type: ignore[arg-type]
-            maxiter=max(1, round(evaluations / population) - 1),
+            maxiter=max(0, round(evaluations / population) - 1),
             tol=CONVERGED,
             rng=random,
             polish=False,
@@ -128,28 +133,41 @@ class Search:
 
 
 def bound_of(constraint: Constraint, baseline: Worth) -> float:
-    """In the measure's unit. Raises RigtwinError if it is a share of what the baseline did not live to show."""
+    """In the measure's unit. Raises RigtwinError if it is a share of what the baseline did not live to show, or of nothing."""
     if math.isnan(constraint.share):
         return constraint.bound
-    there = baseline.figures[constraint.measure.name]
-    if math.isnan(there):
-        raise RigtwinError(f"{constraint.measure.name} cannot be held to the baseline's: the baseline trips")
+    name, there = constraint.measure.name, baseline.figures[constraint.measure.name]
+    if not math.isfinite(there):
+        raise RigtwinError(f"{name} cannot be held to the baseline's: the baseline trips")
+    if constraint.share != 1.0 and there <= 0.0:
+        raise RigtwinError(f"{name} is {there:.4g} with the baseline, of which there is no share: give a number as its bound")
     return constraint.share * there
 
 
-def excess(measure: Measure, worth: Worth, bound: float) -> float:
-    """By what share of its bound a measure violates it; below 0 if it does not."""
+def excess(measure: Measure, worth: Worth, bound: float, scale: float) -> float:
+    """By how much a measure violates its bound, as a share of the bound or of what is usual; below 0 if it does not."""
     value = worth.figures[measure.name]
-    if math.isnan(value):
+    if not math.isfinite(value):
         return TRIPPED
     beyond = bound - value if measure.more else value - bound
-    return beyond / max(abs(bound), 1e-12)
+    usual = scale if math.isfinite(scale) else 0.0
+    return beyond / max(abs(bound), usual, 1e-12)
 
 
 def best(search: Search) -> Tried:
     """Of a study with one objective. Raises RigtwinError if no candidate is allowed, with what stands in the way."""
     objective = search.study.minimise[0]
-    return search.minimised(objective, search.study.evaluations) or _none(search)
+    found = search.minimised(objective, search.study.evaluations) or _none(search)
+    _sensitive(search)
+    return found
+
+
+def _sensitive(search: Search) -> None:
+    """Raises RigtwinError if the parameters make no difference to any objective."""
+    allowed = [each for each in search.tried.values() if each.allowed]
+    if len(allowed) > 1 and all(len({each.figure(m) for each in allowed}) == 1 for m in search.study.minimise):
+        names = " and ".join(parameter.key for parameter in search.study.parameters)
+        raise RigtwinError(f"{names} make no difference in {search.study.experiment}: is what they belong to switched on?")
 
 
 def front(search: Search) -> tuple[Tried, ...]:
@@ -164,6 +182,7 @@ def front(search: Search) -> tuple[Tried, ...]:
     between = search.study.points - 2
     for bound in np.linspace(low, high, between + 2)[1:-1].tolist():
         search.minimised(one, max(budget // between, 1), (other, bound))
+    _sensitive(search)
     allowed = sorted(
         (each for each in search.tried.values() if each.allowed), key=lambda each: (each.figure(one), each.figure(other))
     )
@@ -177,7 +196,7 @@ def front(search: Search) -> tuple[Tried, ...]:
 def _none(search: Search) -> Tried:
     study = search.study
     names = ["trips", "limits", *(constraint.measure.name for constraint in study.constraints)]
-    least = np.min([each.violations for each in search.tried.values()], axis=0)
-    hardest = names[int(np.argmax(least))]
-    tried = len(search.tried)
-    raise RigtwinError(f"none of {tried} candidates meets every constraint, hardest {hardest!r}: allow more, or wider bounds")
+    nearest = min(search.tried.values(), key=lambda each: sum(max(0.0, violation) for violation in each.violations))
+    missed = [name for name, violation in zip(names, nearest.violations, strict=True) if violation > 0.0]
+    told = f"the nearest fails at {' and '.join(missed)}: allow more, or wider bounds"
+    raise RigtwinError(f"none of {len(search.tried)} candidates meets every constraint; {told}")

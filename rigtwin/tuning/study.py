@@ -1,27 +1,19 @@
-"""What to tune, for what, and under which circumstances: a study, as a TOML file says it."""
+"""What to tune, for what, and under which circumstances."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from controllers import Settings
-from controllers.quantity import Quantity, fields
-from rigtwin.configuration import Configuration, assigned, groups, overridden, read_toml
-from rigtwin.errors import RigtwinError
-from rigtwin.tuning.measures import MEASURES, Measure
+from rigtwin.configuration import Configuration, overridden
+from rigtwin.tuning.measures import Measure
 from rigtwin.tuning.parameter import Parameter
 
 SHIPPED = Path(str(files("experiments"))) / "tuning"
-BASELINE = "baseline"
-KEYS = (
-    *("title", "experiment", "from", "roads", "held_out", "quantile", "evaluations", "points", "minimise", "report"),
-    *("set", "search", "baseline", "parameters", "constraints", "vary", "judge"),
-)
 
 
 @dataclass(frozen=True)
@@ -79,197 +71,7 @@ class Study:
         """What a search runs: perhaps shorter or coarser than what is judged."""
         return overridden(self.configuration, self.search)
 
-    def resized(self, **numbers: int | None) -> Study:
-        """With other numbers of roads, evaluations and so on, each None for the study's own. Raises RigtwinError."""
-        given = {name: _whole(name, value, *BOUNDS[name]) for name, value in numbers.items() if value is not None}
-        return replace(self, **given)
-
-
-# Fewer than six scenarios have no 95 % interval of their median.
-BOUNDS = {"roads": (1, 10_000), "held_out": (6, 10_000), "evaluations": (4, 1_000_000), "points": (2, 100)}
-
 
 def shipped() -> dict[str, Path]:
     """Name → file of the studies that come along."""
     return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
-
-
-def find(name: str) -> Study:
-    """A study by its name, or by the path of its file. Raises RigtwinError with what there is, or what is wrong with it."""
-    path = shipped().get(name, Path(name))
-    if path.suffix != ".toml" and not path.exists():
-        raise RigtwinError(f"unknown study {name!r}; there are {', '.join(shipped())}, or give the path of a study, F.toml")
-    return read_toml(path, lambda tables: parsed(path.stem, tables))
-
-
-def parsed(name: str, tables: Mapping[str, Any]) -> Study:
-    """A study of its TOML tables. Raises RigtwinError naming the entry and what was expected."""
-    import experiments
-
-    for key in tables:
-        if key not in KEYS:
-            raise RigtwinError(f"unknown {key!r}; there are {', '.join(KEYS)}")
-    for key in ("experiment", "minimise", "parameters"):
-        if key not in tables:
-            raise RigtwinError(f"{key} is missing")
-    experiment = experiments.find(_text("experiment", tables["experiment"]))
-    configuration = overridden(experiment.configuration, _changes("set", tables))
-    baseline, search = _changes("baseline", tables), _changes("search", tables)
-    if set(baseline) - {"controller"}:
-        raise RigtwinError(f"baseline: {next(iter(set(baseline) - {'controller'}))}: expected settings of the controller alone")
-    if set(search) - {"timing", "safety", "road"}:
-        raise RigtwinError(f"search: {next(iter(set(search) - {'timing', 'safety', 'road'}))}: expected timing, safety or road")
-    _ = overridden(configuration, search).ticks, overridden(configuration, search).substeps
-    minimise = _measures("minimise", tables["minimise"])
-    if len(minimise) not in (1, 2):
-        raise RigtwinError(f"minimise = {tables['minimise']!r}: expected one objective, or two for their front")
-    constraints, limits = _constraints(tables.get("constraints", {}))
-    first = _number("from", tables.get("from", 0.0), 0.0, 86_400.0)
-    shortest = min(configuration.timing.duration, overridden(configuration, search).timing.duration)
-    if first > shortest - 1.0:
-        raise RigtwinError(f"from = {first:g} s: expected at least a second before the test's end at {shortest:g} s")
-    vary, tolerances = _vary(tables.get("vary", {}), configuration)
-    return Study(
-        name,
-        _text("title", tables.get("title", name)),
-        experiment.name,
-        configuration,
-        search,
-        baseline,
-        _parameters(tables["parameters"], configuration),
-        minimise,
-        constraints,
-        _measures("report", tables.get("report", [])),
-        limits,
-        first,
-        _whole("roads", tables.get("roads", 16), *BOUNDS["roads"]),
-        _whole("held_out", tables.get("held_out", 32), *BOUNDS["held_out"]),
-        _number("quantile", tables.get("quantile", 0.5), 0.0, 1.0),
-        _whole("evaluations", tables.get("evaluations", 120), *BOUNDS["evaluations"]),
-        _whole("points", tables.get("points", 7), *BOUNDS["points"]),
-        tolerances,
-        vary,
-        _judge(tables.get("judge", {}), configuration),
-    )
-
-
-def _text(key: str, value: object) -> str:
-    if not isinstance(value, str) or not value.strip():
-        raise RigtwinError(f"{key} = {value!r}: expected text")
-    return value
-
-
-def _number(key: str, value: object, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise RigtwinError(f"{key} = {value!r}: expected a number from {low:g} to {high:g}")
-    return float(value)
-
-
-def _whole(key: str, value: object, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise RigtwinError(f"{key} = {value!r}: expected a whole number from {low} to {high}")
-    return value
-
-
-def _changes(key: str, tables: Mapping[str, Any]) -> dict[str, dict[str, object]]:
-    """`"group.name" = value` entries as group → name → value."""
-    table = tables.get(key, {})
-    if not isinstance(table, Mapping):
-        raise RigtwinError(f'{key} = {table!r}: expected a table of settings, such as "controller.kp" = 0.5')
-    found: dict[str, dict[str, object]] = {}
-    for name, value in table.items():
-        for own in assigned([f"{name}={value}"]):
-            for group, values in own.items():
-                found.setdefault(group, {}).update(values)
-    overridden(Configuration(), found)
-    return found
-
-
-def _measures(key: str, names: object) -> tuple[Measure, ...]:
-    listed = [names] if isinstance(names, str) else names
-    if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-        raise RigtwinError(f"{key} = {names!r}: expected names of {', '.join(MEASURES)}")
-    for name in listed:
-        if name not in MEASURES:
-            raise RigtwinError(f"{key}: unknown {name!r}; there are {', '.join(MEASURES)}")
-    return tuple(MEASURES[name] for name in dict.fromkeys(listed))
-
-
-def _quantity(key: str, configuration: Configuration) -> Quantity:
-    """The meaning of a setting that is a number. Raises RigtwinError for any other."""
-    group, _, name = key.partition(".")
-    known = groups(configuration)
-    meaning = fields(type(known[group])).get(name) if group in known else None
-    if not isinstance(meaning, Quantity):
-        raise RigtwinError(f"{key}: expected group.name of a setting that is a number; rigtwin list --settings has all")
-    return meaning
-
-
-def _parameters(table: object, configuration: Configuration) -> tuple[Parameter, ...]:
-    if not isinstance(table, Mapping) or not table:
-        raise RigtwinError(f'parameters = {table!r}: expected settings with bounds, such as "controller.kp" = [0.1, 2.0]')
-    found = []
-    for key, entry in table.items():
-        if not key.startswith("controller."):
-            raise RigtwinError(f"parameters: {key}: only the controller is tuned; expected controller.name")
-        meaning = _quantity(key, configuration)
-        bounds = entry.get("between") if isinstance(entry, Mapping) else entry
-        scale = entry.get("scale", "linear") if isinstance(entry, Mapping) else "linear"
-        if isinstance(entry, Mapping) and (set(entry) - {"between", "scale"} or scale not in ("linear", "logarithmic")):
-            raise RigtwinError(f'parameters: {key} = {dict(entry)}: expected between = [low, high], scale = "logarithmic"')
-        if not isinstance(bounds, list) or len(bounds) != 2:
-            raise RigtwinError(f"parameters: {key} = {bounds!r}: expected its bounds, [low, high]")
-        low, high = (_number(f"parameters: {key}", bound, meaning.low, meaning.high) for bound in bounds)
-        if not low < high or (scale == "logarithmic" and low <= 0.0):
-            raise RigtwinError(f"parameters: {key} = [{low:g}, {high:g}]: expected low below high, above 0 if logarithmic")
-        found.append(Parameter(key, low, high, scale == "logarithmic", meaning.unit))
-    return tuple(found)
-
-
-def _constraints(table: object) -> tuple[tuple[Constraint, ...], float]:
-    if not isinstance(table, Mapping):
-        raise RigtwinError(f'constraints = {table!r}: expected measures with bounds, such as road_holding = "baseline"')
-    found, limits = [], 0.9
-    for key, value in table.items():
-        if key == "limits":
-            limits = _number("constraints: limits", value, 0.01, 1.0)
-            continue
-        (measure,) = _measures("constraints", [key])
-        if not isinstance(value, str):
-            found.append(Constraint(measure, _number(f"constraints: {key}", value, -1e12, 1e12)))
-            continue
-        share, _, word = value.rpartition(" ")
-        try:
-            factor = float(share or 1.0)
-        except ValueError:
-            factor = math.nan
-        if word != BASELINE or not factor > 0.0 or not math.isfinite(factor):
-            raise RigtwinError(f'constraints: {key} = {value!r}: expected a number, "baseline", or such as "0.98 baseline"')
-        found.append(Constraint(measure, math.nan, factor))
-    return tuple(found), limits
-
-
-def _vary(table: object, configuration: Configuration) -> tuple[dict[str, float], float]:
-    if not isinstance(table, Mapping):
-        raise RigtwinError(f'vary = {table!r}: expected shares, such as "motor.coulomb" = 0.3')
-    found, tolerances = {}, 0.0
-    for key, value in table.items():
-        if key == "tolerances":
-            tolerances = _number("vary: tolerances", value, 0.0, 10.0)
-            continue
-        if key.partition(".")[0] not in configuration.plant._fields:
-            raise RigtwinError(f"vary: {key}: expected component.parameter of the rig, or tolerances")
-        _quantity(key, configuration)
-        found[key] = _number(f"vary: {key}", value, 0.0, 1.0)
-    return found, tolerances
-
-
-def _judge(table: object, configuration: Configuration) -> dict[str, dict[str, dict[str, object]]]:
-    if not isinstance(table, Mapping):
-        raise RigtwinError("judge: expected tables of changes of the rig, [judge.NAME]")
-    found = {}
-    for name, changes in table.items():
-        found[name] = _changes(name, {name: changes})
-        if any(group not in configuration.plant._fields for group in found[name]):
-            raise RigtwinError(f'judge: {name}: expected changes of the rig alone, such as "motor.coulomb" = 18.2')
-    return found

@@ -10,6 +10,8 @@ from rigtwin.tuning.judged import Change, Comparison, Spread
 from rigtwin.tuning.outcome import NOMINAL, TUNED_NOMINAL, Outcome
 from rigtwin.tuning.study import Constraint
 
+CLOSE = 0.02
+"""Share of a bound within which a figure counts as at it: the search goes to the bound, and other roads are other roads."""
 HEADER = ("measure", "unit", "before", "5 to 95 %", "after", "5 to 95 %", "change", "95 % of the median", "no worse in")
 
 
@@ -24,7 +26,8 @@ def spread(of: Spread) -> tuple[str, str]:
 def change(of: Change) -> tuple[str, str]:
     """The change of the median, and its interval."""
     unit = " %" if of.relative else ""
-    return f"{of.median:+.3g}{unit}", f"{of.low:+.3g} to {of.high:+.3g}{unit}"
+    interval = f"{of.low:+.3g} to {of.high:+.3g}{unit}" if math.isfinite(of.low) else "too few for an interval"
+    return f"{of.median:+.3g}{unit}", interval
 
 
 def row(of: Change) -> tuple[str, ...]:
@@ -63,7 +66,56 @@ def kept(outcome: Outcome, constraint: Constraint) -> str:
     if not math.isnan(constraint.share):
         return f"{each.measure.title} {change(each)[0]} [{change(each)[1]}]"
     bound = f"{'at least' if each.measure.more else 'at most'} {number(constraint.bound)}"
-    return f"{each.measure.title} {number(each.after.median)} {each.measure.unit} ({bound})"
+    return f"{each.measure.title} {number(each.worth)} {each.measure.unit} ({bound})"
+
+
+def concerns(outcome: Outcome) -> list[str]:
+    """What speaks against the settings as they are: on the rig that they were tuned on, and on those they are judged on."""
+    found = outcome.found
+    lines = []
+    for each in (found, *(other for other in outcome.comparisons if other is not found and other.against == found.against)):
+        before, after = each.trips
+        if after > before:
+            lines.append(f"{each.rig}: {100.0 * after:.0f} % of the runs trip, {100.0 * before:.0f} % before")
+        if each.limits > outcome.study.limits and after <= before:
+            reached, allowed = 100.0 * each.limits, 100.0 * outcome.study.limits
+            lines.append(f"{each.rig}: {reached:.0f} % of a safety limit, {allowed:.0f} % allowed")
+        if each.changes:
+            said = [_violated(each, constraint) for constraint in outcome.study.constraints]
+            lines += [f"{each.rig}: {one}" for one in said if one]
+    improved = [found.of(measure.name).improved for measure in outcome.study.minimise] if found.changes else []
+    if not any(improved):
+        lines.append(f"no objective is certainly better than {found.against}")
+    return lines
+
+
+def _violated(comparison: Comparison, constraint: Constraint) -> str | None:
+    each = comparison.of(constraint.measure.name)
+    more = each.measure.more
+    if math.isnan(constraint.share):
+        beyond = constraint.bound - each.worth if more else each.worth - constraint.bound
+        if beyond <= CLOSE * abs(constraint.bound):
+            return None
+        return f"{each.measure.title} is {number(each.worth)} {each.measure.unit}, bound {number(constraint.bound)}"
+    # In %, or in the unit, of what the baseline has in the same scenario.
+    allowed = 100.0 * (constraint.share - 1.0) if each.relative else (constraint.share - 1.0) * each.before.median
+    beyond = allowed - each.high if more else each.low - allowed
+    slack = 0.0 if each.relative else CLOSE * abs(each.before.median)
+    return f"{each.measure.title} is certainly beyond its bound: {change(each)[1]}" if beyond > slack else None
+
+
+def notes(outcome: Outcome) -> list[str]:
+    """What should be known besides."""
+    study, before = outcome.study, outcome.study.reference
+    lines = []
+    for parameter in study.parameters:
+        there = getattr(before, parameter.key.partition(".")[2])
+        if not parameter.low <= there <= parameter.high:
+            ends = f"{number(parameter.low)} to {number(parameter.high)}"
+            lines.append(f"{parameter.key} is {number(there)} before, outside the bounds {ends}: the search began at the bound")
+    if outcome.alike:
+        lines.append(f"{study.experiment} is the same test whatever its seed: only noise differs between these scenarios")
+    return lines
 
 
 def wrong(outcome: Outcome) -> list[str]:
@@ -93,7 +145,8 @@ def values(outcome: Outcome) -> list[tuple[str, ...]]:
 
 def text(outcome: Outcome) -> str:
     """Everything as plain text."""
-    blocks = [f"{outcome.study.title}\n{sentence(outcome)}", table(values(outcome))]
+    beside = [*(f"but {line}" for line in concerns(outcome)), *notes(outcome)]
+    blocks = ["\n".join([outcome.study.title, sentence(outcome), *beside]), table(values(outcome))]
     for comparison in (*outcome.comparisons, *outcome.on_front):
         lines = [
             heading(comparison),
@@ -116,6 +169,7 @@ def toml(outcome: Outcome, number_of_point: int | None = None) -> str:
     own = experiments.find(study.experiment).configuration
     lines = [f"# {study.title}", f"# tuned on the {outcome.rig}, seed {outcome.seed}, {study.roads} scenarios"]
     lines += [f"# {each.measure.title}: {change(each)[0]} [{change(each)[1]}] held out" for each in comparison.changes]
+    lines += [f"# but {line}" for line in (concerns(outcome) if number_of_point is None else ())]
     lines += [f"# rigtwin run {study.experiment} --config THIS.toml", "", "[controller]"]
     before = {key: value for key, value, _ in parameters(own) if key.startswith("controller.")}
     for name, value in settings_of(study, candidate)._asdict().items():
