@@ -36,7 +36,7 @@ demo: setup system
 	@echo "look at $(OUT)/report.html, $(OUT)/drop.png and $(OUT)/drop.mp4"
 
 test: setup system browser
-	$(BIN)/python -m pytest -n auto
+	$(BIN)/python -m pytest -n auto --dist loadgroup
 
 browser:
 	@bash scripts/browser.sh

@@ -33,6 +33,10 @@ from tests.test_fit import evidence_of, recorded
 RIG = machine_of("suspension-rig")
 
 
+SLOW = pytest.mark.slow
+"""A quarter of a minute and more each; of every sort of answer one is always tried."""
+
+
 def answered(*recordings: Recording, base: Configuration | None = None, held_out: tuple[Recording, ...] = ()) -> Outcome:
     return diagnose(RIG, recordings, base or Configuration(), held_out)
 
@@ -41,7 +45,9 @@ def names(outcome: Outcome) -> set[str]:
     return {str(effect.name) for effect in outcome.diagnosis.effects}
 
 
-@pytest.mark.parametrize("name", ["nominal-imposed", "nominal-road10", "nominal-drop"])
+@pytest.mark.parametrize(
+    "name", ["nominal-imposed", *(pytest.param(f"nominal-{one}", marks=SLOW) for one in ("road10", "drop"))]
+)
 def test_a_rig_without_defects_has_no_gap(name):
     outcome = answered(rig_recording(name))
     assert outcome.diagnosis.verdict == "no gap"
@@ -57,7 +63,7 @@ KNOWN = {
 }
 
 
-@pytest.mark.parametrize("name", KNOWN)
+@pytest.mark.parametrize("name", ["known-coulomb-motor", *(pytest.param(name, marks=SLOW) for name in list(KNOWN)[1:])])
 def test_a_known_effect_is_named_with_its_magnitude(name):
     effect, parameter, value, nominal = KNOWN[name]
     outcome = answered(rig_recording(name))

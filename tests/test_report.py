@@ -27,6 +27,8 @@ def outcomes() -> dict[str, Outcome]:
     }
 
 
+pytestmark = pytest.mark.xdist_group("report")
+"""One worker makes the four diagnoses once."""
 VERDICTS = ("explained", "unknown", "no gap", "unusable")
 
 

@@ -224,6 +224,7 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind):
         assert outcome.passed, outcome
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="Linux")
 def test_a_dead_controller_process_is_stopped_for(tmp_path):
     [fault] = drawn(1, 3, APART)
