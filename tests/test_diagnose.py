@@ -142,6 +142,7 @@ def test_what_is_not_there_cannot_be_taken_out():
         without(Configuration(), "nonsense@rail")
 
 
+@SLOW
 def test_a_model_in_the_loop_is_diagnosed_too():
     outcome = answered(recorded("road10", ("coulomb@rail=80",), 12.0))
     assert names(outcome) == {"coulomb@rail"}
@@ -152,6 +153,7 @@ def test_three_seconds_are_enough_for_a_large_effect():
     assert names(outcome) == {"gain@load_cell"}
 
 
+@SLOW
 def test_several_recordings_are_explained_together():
     effects = ("viscous@rail=150",)
     outcome = answered(recorded("imposed", effects, 6.0), recorded("road10", effects, 6.0, 8))
@@ -169,6 +171,7 @@ def test_held_out_recordings_judge_the_correction():
     assert gap.shrinkage_held_out.low <= gap.shrinkage_held_out.value <= gap.shrinkage_held_out.high
 
 
+@SLOW
 def test_a_correction_that_worsens_held_out_data_is_rejected():
     outcome = answered(recorded("imposed", ("coulomb@rail=75",)), held_out=(recorded("imposed", (), 8.0, 9),))
     assert not outcome.diagnosis.effects
@@ -243,6 +246,7 @@ def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     assert found.value == pytest.approx(value, rel=0.1)
 
 
+@SLOW
 def test_noise_that_all_sensors_share_is_the_laboratorys():
     louder = [
         f"noise@{name}={3 * getattr(Plant(), name).white}"
@@ -349,6 +353,7 @@ def test_data_that_are_not_fit_are_named_and_not_diagnosed(change):
     assert FAULTS[change] in outcome.diagnosis.faults[0]
 
 
+@SLOW
 def test_a_sensor_cut_off_is_named_and_its_ticks_left_out():
     recording = recorded("imposed", ("coulomb@rail=75",))
     cell = recording.column("/sensor", "load_cell")
