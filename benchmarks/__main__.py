@@ -18,16 +18,16 @@ import numpy as np
 from controllers import Compensator, Structure
 from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
-from rigtwin.compiling import kernel, step
-from rigtwin.configuration import Configuration, Safety, Timing
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
-from rigtwin.effects import applied
-from rigtwin.loop import BLOCK, run_compiled
+from rigtwin.machine.configuration import Configuration, Safety, Timing
+from rigtwin.machine.effects import applied
 from rigtwin.machine.library import find
-from rigtwin.plant import Simulation
-from rigtwin.runner import record
-from rigtwin.twin import Twin
+from rigtwin.numerics.compiling import kernel, step
+from rigtwin.simulation.loop import BLOCK, run_compiled
+from rigtwin.simulation.plant import Simulation
+from rigtwin.simulation.runner import record
+from rigtwin.simulation.twin import Twin
 
 DROP = EXPERIMENTS["drop"]
 CONFIGURATION = DROP.configuration

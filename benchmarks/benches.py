@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from rigtwin.blindcheck.bench_cases import Case, drawn, recorded
+from referee.bench_cases import Case, drawn, recorded
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.machine.library import find
 from rigtwin.machine.setting import nominal

@@ -10,16 +10,16 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
-from rigtwin.arrays import Array
-from rigtwin.configuration import from_assignments
-from rigtwin.daq import CARD
-from rigtwin.daq.card import Card
-from rigtwin.daq.table import load_table
-from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin
-from rigtwin.daq.virtual import VirtualCard
-from rigtwin.realtime import Pacer
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.hardware.daq.virtual import VirtualCard
+from rigtwin.hardware.realtime import Pacer
+from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
+from rigtwin.machine.configuration import from_assignments
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
-from rigtwin.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
 
 SECONDS = 20.0
 

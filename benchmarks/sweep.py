@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments import EXPERIMENTS
-from rigtwin.configuration import overridden
 from rigtwin.console import table
-from rigtwin.sweep import Store, Workers, hired, swept
-from rigtwin.tuning.run import Run, run
+from rigtwin.machine.configuration import overridden
+from rigtwin.studies.sweep import Store, Workers, hired, swept
+from rigtwin.studies.tuning.run import Run, run
 
 ROUNDS = 5
 RUNS = 48

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from rigtwin.environment import Environment, Reward, environment
+from rigtwin.studies.environment import Environment, Reward, environment
 
 BOUNDS = [(10.0, 300.0), (0.0, 1500.0), (-300.0, 300.0), (-200.0, 200.0)]
 """Damping, Ns/m; preload per structure velocity, N/(m/s), per travel velocity, N/(m/s), per travel, N/m."""

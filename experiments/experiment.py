@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
-from rigtwin.excitation import road_profile
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.signals.excitation import road_profile
 
 Progress = Callable[[int], object]
 """Called with the steps done since its last call."""

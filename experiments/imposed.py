@@ -6,9 +6,9 @@ import numpy as np
 
 from controllers import Mode, Settings
 from experiments.experiment import Experiment, random_of, time_of
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
-from rigtwin.excitation import multisine
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.signals.excitation import multisine
 
 FORCE_MEAN = 230.0
 """N; keeps the tyre pressed while the force swings."""

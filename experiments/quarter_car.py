@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from controllers import Settings, Skyhook, Structure
 from experiments.experiment import Experiment, flat_ground, road_ground
-from rigtwin.configuration import Configuration, Road, Timing
-from rigtwin.parameters import GasSpring, Plant
+from rigtwin.components.parameters import GasSpring, Plant
+from rigtwin.machine.configuration import Configuration, Road, Timing
 
 PASSIVE = Settings()
 SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controllers import Settings, Travel
 from experiments.experiment import Experiment, flat_ground, road_ground
-from rigtwin.configuration import Configuration, Road, Safety, Timing
+from rigtwin.machine.configuration import Configuration, Road, Safety, Timing
 
 CHAPTER_3 = Settings(
     travel=Travel.GROUND,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from controllers import Settings
 from experiments.experiment import Experiment, flat_ground
-from rigtwin.configuration import Configuration, Timing
-from rigtwin.parameters import Carriage, Plant, Tyre
+from rigtwin.components.parameters import Carriage, Plant, Tyre
+from rigtwin.machine.configuration import Configuration, Timing
 
 
 class Vehicle(NamedTuple):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rigtwin.blindcheck.benches import DamperTruth, damper_force, sampled, wander
+from referee.benches import DamperTruth, damper_force, sampled, wander
 
 TRUTH = DamperTruth(slip=85.0, spring=5e4, lost=2.4e-3, viscous=(640.0, 640.0))
 PERIOD, FINE, SECONDS = 2e-3, 8, 10.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from rigtwin.arrays import Array
+from rigtwin.numerics.arrays import Array
 
 
 @njit

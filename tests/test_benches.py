@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.benches import recording_of
-from rigtwin.blindcheck.bench_cases import ACTUATORS, DAMPERS, Case, drawn
-from rigtwin.blindcheck.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, sampled, wander
+from referee.bench_cases import ACTUATORS, DAMPERS, Case, drawn
+from referee.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, sampled, wander
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
-from rigtwin.diagnosis.place import travelled
+from rigtwin.diagnosis.localisation import travelled
 from rigtwin.importing.convert import convert
 from rigtwin.machine.library import SHIPPED, find
 from rigtwin.machine.setting import nominal

@@ -11,29 +11,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigtwin.blindcheck.asked import TESTS, asked
-from rigtwin.blindcheck.check import Result
-from rigtwin.blindcheck.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
-from rigtwin.blindcheck.referee import case, operator, sorts, write
-from rigtwin.blindcheck.reference_plant import Truth
-from rigtwin.blindcheck.reference_rig import Law, quiet, run
-from rigtwin.blindcheck.score import misses, rows, table, wilson
+from referee.check import Result
+from referee.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
+from referee.referee import case, operator, sorts, write
+from referee.reference_plant import Truth
+from referee.reference_rig import Law, quiet, run
+from referee.score import misses, rows, table, wilson
+from referee.test_signals import TESTS, asked
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.effects import candidates
+from rigtwin.machine.effects import candidates
 from rigtwin.machine.library import find as machine_of
-from rigtwin.parameters import Plant
 from rigtwin.recording import load
 
 KNOWN = {effect.name for effect in candidates(Plant())} | {"setting@controller"}
 
 
 def test_the_referee_imports_nothing_of_the_twin():
-    code = "import sys, rigtwin.blindcheck.referee; print('\\n'.join(sys.modules))"
+    code = "import sys, referee.referee; print('\\n'.join(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = done.stdout.split()
     own = {name for name in loaded if name.partition(".")[0] in ("rigtwin", "controllers", "experiments", "mujoco", "models")}
-    assert {name for name in own if not name.startswith("rigtwin.blindcheck")} == {"rigtwin"}
+    assert {name for name in own if not name.startswith("referee")} == {"rigtwin"}
 
 
 def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
@@ -116,7 +116,7 @@ def test_a_size_is_the_change_in_units_of_noise():
 
 
 def test_a_referees_key_is_committed_to_before_it_is_opened(tmp_path):
-    command = [sys.executable, "-m", "rigtwin.blindcheck.referee", str(tmp_path), "2", "3"]
+    command = [sys.executable, "-m", "referee.referee", str(tmp_path), "2", "3"]
     done = subprocess.run(command, input="open\n", capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
     assert lines[:2] == ["case 0", "case 1"]

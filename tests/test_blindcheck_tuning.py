@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from experiments import find
-from rigtwin.blindcheck.asked import asked
-from rigtwin.blindcheck.reference_drive import driven
-from rigtwin.blindcheck.reference_plant import Truth
-from rigtwin.blindcheck.reference_rig import run
-from rigtwin.blindcheck.tuning import Case, checked, rig, text
+from referee.reference_drive import driven
+from referee.reference_plant import Truth
+from referee.reference_rig import run
+from referee.test_signals import asked
+from referee.tuning import Case, checked, rig, text
 from rigtwin.cli import main
-from rigtwin.configuration import Configuration, overridden
-from rigtwin.runner import simulated
-from rigtwin.safety import Trip
-from rigtwin.sweep import Store
-from rigtwin.sweep.workers import Here
-from rigtwin.tuning.bench import Bench
-from rigtwin.tuning.judged import comparison
-from rigtwin.tuning.measures import Trial
-from rigtwin.tuning.reading import parsed
-from rigtwin.tuning.run import LIMITS, TRIP
+from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.safety import Trip
+from rigtwin.studies.sweep import Store
+from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.tuning.bench import Bench
+from rigtwin.studies.tuning.judged import comparison
+from rigtwin.studies.tuning.measures import Trial
+from rigtwin.studies.tuning.reading import parsed
+from rigtwin.studies.tuning.run import LIMITS, TRIP
 
 
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
@@ -82,7 +82,7 @@ STUDY = {
 
 def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, monkeypatch):
     """With what a diagnosis would say taken as given: the rig has more friction than the nominal one."""
-    import rigtwin.blindcheck.tuning as module
+    import referee.tuning as module
 
     monkeypatch.setattr(module, "calibrated", lambda _: ("more friction", "[motor]\ncoulomb = 28.0\n"))
     said: list[Case] = []

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
-from rigtwin.configuration import Configuration, Safety, read_toml
-from rigtwin.daq import CARD
-from rigtwin.daq.card import Card, CardFault, connected
-from rigtwin.daq.conversion import CODES, conversion, to_bits, to_values, to_volts
-from rigtwin.daq.last_resort import release
-from rigtwin.daq.table import ChannelTable, fit, load_table, parsed, trusted, written
-from rigtwin.daq.terminals import Terminals, WiredTwin
-from rigtwin.daq.transport import LOCAL, InProcess, serve
-from rigtwin.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
 from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.card import Card, CardFault, connected
+from rigtwin.hardware.daq.conversion import CODES, conversion, to_bits, to_values, to_volts
+from rigtwin.hardware.daq.failsafe import release
+from rigtwin.hardware.daq.table import ChannelTable, fit, load_table, parsed, trusted, written
+from rigtwin.hardware.daq.terminals import Terminals, WiredTwin
+from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
+from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
+from rigtwin.machine.configuration import Configuration, Safety, read_toml
 
 TABLE = load_table(CARD)
 PERIOD = 1e-3

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Timing
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.checks import check, longest_run
 from rigtwin.diagnosis.compare import configuration_of
-from rigtwin.effects import candidates
-from rigtwin.parameters import Plant
+from rigtwin.machine.configuration import Timing
+from rigtwin.machine.effects import candidates
 from rigtwin.recording import Recording, load
-from rigtwin.runner import record
+from rigtwin.simulation.runner import record
 from tests.conftest import RECORDINGS
 from tests.test_effects import text
 

@@ -9,14 +9,14 @@ import pytest
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Configuration, Timing, from_assignments
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
 from rigtwin.diagnosis.replays import REPLAYS
-from rigtwin.effects import applied, candidates, find
 from rigtwin.errors import RigtwinError
-from rigtwin.parameters import Plant
+from rigtwin.machine.configuration import Configuration, Timing, from_assignments
+from rigtwin.machine.effects import applied, candidates, find
 from rigtwin.recording import Recording, load
-from rigtwin.runner import record
+from rigtwin.simulation.runner import record
 from tests.conftest import rig_recording
 from tests.test_effects import text
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
-from rigtwin.converters import Disturbance, converted, sensors
-from rigtwin.noise import white_noise, without_mains
-from rigtwin.parameters import Plant
+from rigtwin.components.parameters import Plant
+from rigtwin.signals.noise import white_noise, without_mains
+from rigtwin.simulation.converters import Disturbance, converted, sensors
 
 
 def test_disturbances_have_the_sizes_of_the_table_and_do_not_depend_on_the_block():

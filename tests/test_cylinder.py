@@ -9,13 +9,13 @@ import pytest
 from scipy.signal import lsim
 
 from controllers import Mode, Settings
-from rigtwin.configuration import Configuration, Timing
-from rigtwin.cylinder import continuous
+from rigtwin.components.cylinder import continuous
+from rigtwin.components.parameters import Cylinder
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.excitation import schroeder
-from rigtwin.loop import run_compiled
-from rigtwin.parameters import Cylinder
-from rigtwin.twin import Twin
+from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.signals.excitation import schroeder
+from rigtwin.simulation.loop import run_compiled
+from rigtwin.simulation.twin import Twin
 
 NOMINAL = Cylinder()
 

@@ -10,22 +10,22 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
-from rigtwin.configuration import Configuration, from_toml, overridden
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.controller import ControllerReplay
+from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.fit import Fitter
-from rigtwin.diagnosis.freeform import located
+from rigtwin.diagnosis.localisation import region
 from rigtwin.diagnosis.next_test import proposed
-from rigtwin.diagnosis.place import region
 from rigtwin.diagnosis.sampling import outstanding
-from rigtwin.diagnosis.shrink import Blocks, gated, halves, interval, shrinkage
-from rigtwin.effects import find, without
+from rigtwin.diagnosis.unknown_input import located
 from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Configuration, from_toml, overridden
+from rigtwin.machine.effects import find, without
 from rigtwin.machine.library import find as machine_of
-from rigtwin.machine.predictor import Motion
-from rigtwin.parameters import Plant
-from rigtwin.posterior import load_posterior
+from rigtwin.machine.posterior import load_posterior
+from rigtwin.models.predictor import Motion
 from rigtwin.recording import Recording
 from tests.conftest import rig_recording
 from tests.test_fit import evidence_of, recorded

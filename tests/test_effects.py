@@ -10,19 +10,19 @@ import pytest
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
-from rigtwin.actuator import actuator, conditioned, holding
-from rigtwin.configuration import Configuration, Timing
-from rigtwin.converters import sampled, sensing
-from rigtwin.effects import KINDS, applied, candidates, find
+from rigtwin.components.conditioning import actuator, conditioned, holding
+from rigtwin.components.friction import breakaway, friction, gap_at
+from rigtwin.components.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
 from rigtwin.errors import RigtwinError
-from rigtwin.friction import breakaway, friction, gap_at
-from rigtwin.loop import run, run_compiled
-from rigtwin.model import build, handles
-from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
-from rigtwin.plant import contacts, drive, touch
+from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.machine.effects import KINDS, applied, candidates, find
 from rigtwin.recording import load
-from rigtwin.runner import record
-from rigtwin.twin import Twin
+from rigtwin.simulation.converters import sampled, sensing
+from rigtwin.simulation.loop import run, run_compiled
+from rigtwin.simulation.mechanics import build, handles
+from rigtwin.simulation.plant import contacts, drive, touch
+from rigtwin.simulation.runner import record
+from rigtwin.simulation.twin import Twin
 
 EFFECTS = {effect.name: effect for effect in candidates(Plant())}
 IMPOSED = EXPERIMENTS["imposed"]

@@ -9,11 +9,11 @@ import pytest
 from dm_env import StepType, test_utils
 
 from experiments import find
-from rigtwin.configuration import Configuration, overridden
-from rigtwin.environment import Actuators, Environment, Reward, Schedule, environment
 from rigtwin.errors import RigtwinError
-from rigtwin.runner import simulated
-from rigtwin.safety import Trip
+from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.safety import Trip
+from rigtwin.studies.environment import Actuators, Environment, Reward, Schedule, environment
 
 
 def short(name: str, seconds: float = 0.5, **changes: dict[str, object]) -> Configuration:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.configuration import Road
 from rigtwin.errors import RigtwinError
-from rigtwin.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
+from rigtwin.machine.configuration import Road
+from rigtwin.signals.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
 
 TIME = np.arange(45_000) * 1e-3
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
@@ -15,9 +16,8 @@ from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
 from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.diagnosis.trials import TRIALS
-from rigtwin.effects import KINDS, applied, find
+from rigtwin.machine.effects import KINDS, applied, find
 from rigtwin.machine.library import find as machine_of
-from rigtwin.parameters import Plant
 from rigtwin.recording import Recording
 
 RIG = machine_of("suspension-rig")

@@ -9,7 +9,7 @@ import pytest
 
 from controllers import Compensator, Settings
 from controllers.friction import ERRORS, HISTORY, NO_ERRORS, NO_VELOCITIES, REST, expected, observed, pushed, risen, stepped
-from rigtwin.noise import rms
+from rigtwin.signals.noise import rms
 
 PERIOD = 1e-3
 THESIS = Settings(compensator=Compensator.ONE_STEP)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numba import njit
 
+from rigtwin.components.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
 from rigtwin.errors import RigtwinError
-from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
 
 SPRING = GasSpring(167_285.0, 0.673, 1.4)
 

@@ -8,12 +8,12 @@ from scipy.integrate import solve_ivp
 
 from experiments import find
 from experiments.thesis.trial import trial
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.compare import compare, configuration_of
-from rigtwin.emulated import ideal
-from rigtwin.machine.quarter_car import Reduced
+from rigtwin.machine.configuration import Configuration
+from rigtwin.models.quarter_car import Reduced
 from rigtwin.recording import load
-from rigtwin.runner import record, simulated
+from rigtwin.simulation.ideal import ideal
+from rigtwin.simulation.runner import record, simulated
 
 
 def settings_of_the_test() -> Configuration:

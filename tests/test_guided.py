@@ -8,14 +8,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from rigtwin.machine.following import followed
-from rigtwin.machine.guided import Inertia, carried, limits, slid
+from rigtwin.components.parts import Guide, PositionActuator
 from rigtwin.machine.library import find
 from rigtwin.machine.machine import Machine
-from rigtwin.machine.replaying import Setup, predictor
-from rigtwin.noise import smoothed
-from rigtwin.parts import Guide, PositionActuator
+from rigtwin.models.following import followed
+from rigtwin.models.guided import Inertia, carried, limits, slid
+from rigtwin.models.replaying import Setup, predictor
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import smoothed
 from tests.described import described, recording_of
 
 PERIOD = 1e-3

@@ -9,14 +9,14 @@ import pytest
 
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Configuration, Timing, from_assignments
 from rigtwin.errors import RigtwinError
-from rigtwin.excitation import schroeder
-from rigtwin.loop import Block, run, run_compiled
+from rigtwin.machine.configuration import Configuration, Timing, from_assignments
 from rigtwin.recording import load
-from rigtwin.runner import record
-from rigtwin.safety import Trip
-from rigtwin.twin import Twin
+from rigtwin.signals.excitation import schroeder
+from rigtwin.simulation.loop import Block, run, run_compiled
+from rigtwin.simulation.runner import record
+from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.twin import Twin
 
 SHORT = Timing(duration=1.0)
 

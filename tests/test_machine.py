@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from rigtwin.cli import main
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import possible
 from rigtwin.diagnosis.trials import searched, trials
-from rigtwin.effects import find as effect_of
 from rigtwin.machine.description import examined, load
+from rigtwin.machine.effects import find as effect_of
 from rigtwin.machine.library import find, shipped
 from rigtwin.machine.setting import from_assignments, nominal, overridden, without
-from rigtwin.parameters import Plant
 from tests.described import MJCF, TOML, described, recording_of
 
 

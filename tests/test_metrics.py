@@ -7,10 +7,10 @@ import pytest
 
 from experiments.thesis.trial import trial
 from experiments.thesis.validation import TABLE_3_5
-from rigtwin.configuration import Timing
-from rigtwin.metrics import tracked, tracking
+from rigtwin.machine.configuration import Timing
 from rigtwin.recording import load
-from rigtwin.runner import record
+from rigtwin.simulation.metrics import tracked, tracking
+from rigtwin.simulation.runner import record
 
 
 def test_table_3_5_within_a_factor_of_two():

@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, dlsim
 
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Configuration
-from rigtwin.cylinder import continuous
+from rigtwin.components.cylinder import continuous
+from rigtwin.components.parameters import Carriage, Motor, Plant, Rail, Tyre
 from rigtwin.diagnosis.component import replay_carriage
-from rigtwin.model import MECHANICS, SCENE, build
-from rigtwin.parameters import Carriage, Motor, Plant, Rail, Tyre
+from rigtwin.machine.configuration import Configuration
+from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
 from tests.reference import coulomb_carriage
 
 STEP = 2.5e-4

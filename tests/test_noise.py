@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.noise import band, motion, rms, white_noise, without_mains
+from rigtwin.signals.noise import band, motion, rms, white_noise, without_mains
 
 TIME = np.arange(20_000) * 1e-3
 

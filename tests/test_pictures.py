@@ -10,8 +10,8 @@ import pytest
 from matplotlib.image import imread
 
 from rigtwin.errors import RigtwinError
-from rigtwin.plot import draw
-from rigtwin.video import FRAMES_PER_SECOND, SCENE_HEIGHT, film
+from rigtwin.render.plot import draw
+from rigtwin.render.video import FRAMES_PER_SECOND, SCENE_HEIGHT, film
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])

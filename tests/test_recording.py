@@ -20,9 +20,9 @@ from mcap.writer import Writer as OtherWriter
 from mcap_protobuf.decoder import DecoderFactory
 from scipy.io import loadmat
 
-from rigtwin.channels import CHANNELS, topic_fields
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Writer, load
+from rigtwin.recording.channels import CHANNELS, topic_fields
 from rigtwin.recording.export import export
 from tests.conftest import EXAMPLE, rig_recording
 
@@ -191,7 +191,7 @@ import sys, time
 import numpy as np
 from pathlib import Path
 from rigtwin.recording import Writer
-from rigtwin.loop import BLOCK
+from rigtwin.simulation.loop import BLOCK
 with Writer(Path(sys.argv[1]), "killed", 1e-3, {}) as writer:
     tick = 0
     block = []

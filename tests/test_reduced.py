@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.configuration import Configuration, Safety
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.trial import swings
 from rigtwin.diagnosis.trials import TRIALS, trials
-from rigtwin.effects import Effect, candidates
-from rigtwin.loop import run_compiled
+from rigtwin.machine.configuration import Configuration, Safety
+from rigtwin.machine.effects import Effect, candidates
 from rigtwin.machine.library import find as machine_of
-from rigtwin.machine.quarter_car import Disturbances, Reduced, motor_friction, sliding
-from rigtwin.parameters import Plant
+from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.recording import Recording
-from rigtwin.twin import Twin
+from rigtwin.simulation.loop import run_compiled
+from rigtwin.simulation.twin import Twin
 from tests.test_fit import recorded
 
 SECONDS = 4.0

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.report import bars, html, plots
+from rigtwin.machine.configuration import Configuration
 from tests.browser import BROWSER, looked_at
 from tests.test_diagnose import RIG, drifting, spoilt
 from tests.test_fit import recorded

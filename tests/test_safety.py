@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
-from rigtwin.compiling import kernel
-from rigtwin.configuration import Safety
-from rigtwin.safety import Trip, explained, judged, watching, watching_compiled, within
+from rigtwin.machine.configuration import Safety
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.safety import Trip, explained, judged, watching, watching_compiled, within
 
 PERIOD = 1e-3
 REST = Measurements(0.0, -0.004, 0.0, 200.0)

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 
 from experiments import EXPERIMENTS
 from experiments import find as experiment
-from rigtwin.configuration import Configuration, overridden
-from rigtwin.runner import simulated, unlimited
-from rigtwin.stability.sampled_loop import closed_loop, decay, mechanics
+from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.studies.stability.sampled_loop import closed_loop, decay, mechanics
 
 SENSORS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
 FREE = {name: {"white": 0.0, "hum": 0.0, "resolution": 0.0} for name in SENSORS} | {

@@ -16,18 +16,18 @@ import pytest
 
 from controllers import Measurements
 from rigtwin.cli import main
-from rigtwin.configuration import Configuration, from_assignments
-from rigtwin.daq import CARD
-from rigtwin.daq.calibration import FORCE, at_rest, bumps, responses, signed, spanned, zeroed
-from rigtwin.daq.table import load_table, written
-from rigtwin.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.errors import RigtwinError
-from rigtwin.realtime import Pacer, in_real_time, machine_lacks, monotonic, sleep_until
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.calibration import FORCE, at_rest, bumps, responses, signed, spanned, zeroed
+from rigtwin.hardware.daq.table import load_table, written
+from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.hardware.realtime import Pacer, in_real_time, machine_lacks, monotonic, sleep_until
+from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
+from rigtwin.hardware.session.plan import planned
+from rigtwin.hardware.session.record import Test, record_in_real_time
+from rigtwin.machine.configuration import Configuration, from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
-from rigtwin.session.dry_run import digest, enter, ledger, passed, predicted
-from rigtwin.session.plan import planned
-from rigtwin.session.record import Test, record_in_real_time
 
 TABLE = load_table(CARD)
 SHORT = ["--set", "timing.duration=1", "--set", "safety.ramp=0.3", "--set", "safety.hold=0.1"]
@@ -131,7 +131,7 @@ def test_mistakes_are_said_before_anything_moves(card, capsys, arguments, said, 
 
 
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
-    from rigtwin.session import commands
+    from rigtwin.cli import session_commands as commands
 
     monkeypatch.setattr(commands, "on_card", lambda _: None)
     monkeypatch.chdir(tmp_path)
@@ -218,12 +218,12 @@ def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):
 
 @pytest.mark.parametrize("signs", list(itertools.product((1, -1), repeat=7))[::9])
 def test_every_wrong_sign_is_found(signs):
-    from rigtwin.daq.card import Card
-    from rigtwin.daq.transport import InProcess
-    from rigtwin.daq.virtual import OnDemand, VirtualCard
-    from rigtwin.session.recorder import NUMBER, SENSORS
-    from rigtwin.supervised import supervise
-    from rigtwin.supervisor import COMPLETED
+    from rigtwin.hardware.daq.card import Card
+    from rigtwin.hardware.daq.transport import InProcess
+    from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
+    from rigtwin.hardware.session.recorder import NUMBER, SENSORS
+    from rigtwin.hardware.supervised import supervise
+    from rigtwin.hardware.supervisor import COMPLETED
 
     turned = [
         line._replace(scaling=line.scaling._replace(sign=float(sign))) for line, sign in zip(TABLE.lines, signs, strict=True)
@@ -293,7 +293,7 @@ def test_zero_and_span():
 
 
 def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
-    from rigtwin.daq.table import trusted
+    from rigtwin.hardware.daq.table import trusted
 
     wiring = replace(TABLE, inputs=(*TABLE.inputs[:3], TABLE.inputs[3]._replace(
         scaling=TABLE.inputs[3].scaling._replace(sign=-1.0, offset=12.5))))  # fmt: skip
@@ -410,8 +410,8 @@ def test_without_its_guardian_the_session_stops(tmp_path, number, said):
 def test_the_live_view_is_served_on_this_computer_only():
     import socket
 
-    from rigtwin.channels import topic_fields
-    from rigtwin.session.live import live_view
+    from rigtwin.hardware.session.live import live_view
+    from rigtwin.recording.channels import topic_fields
 
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -14,8 +14,8 @@ from experiments.thesis.friction_tests import compensated, errors
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
-from rigtwin.runner import record
-from rigtwin.spikes import BOUNDS, calibrated, lagged, reversals
+from rigtwin.simulation.runner import record
+from rigtwin.studies.friction_spikes import BOUNDS, calibrated, lagged, reversals
 
 
 @pytest.fixture(scope="module")

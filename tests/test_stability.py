@@ -13,14 +13,14 @@ from numpy.polynomial import Polynomial
 from scipy.linalg import expm
 
 from experiments.vehicles import VEHICLES
+from rigtwin.cli.stability_commands import arguments, stability
 from rigtwin.errors import RigtwinError
-from rigtwin.stability.commands import arguments, stability
-from rigtwin.stability.critical import critical_delay, critical_lag
-from rigtwin.stability.delayed import rightmost_delay_root
-from rigtwin.stability.locus import BODY, WHEEL, Locus, Setting, mode
-from rigtwin.stability.loop import LOOPS, bound, delayed, lag_roots, lagged, single_mass
-from rigtwin.stability.mapping import Axis, around, draw, stability_map
-from rigtwin.stability.models import (
+from rigtwin.studies.stability.critical import critical_delay, critical_lag
+from rigtwin.studies.stability.delayed import rightmost_delay_root
+from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, Setting, mode
+from rigtwin.studies.stability.loop import LOOPS, bound, delayed, lag_roots, lagged, single_mass
+from rigtwin.studies.stability.mapping import Axis, around, draw, stability_map
+from rigtwin.studies.stability.models import (
     MODELS,
     Lags,
     ideal_quarter_car,
@@ -31,7 +31,7 @@ from rigtwin.stability.models import (
     single_mass_structure,
     single_mass_suspension,
 )
-from rigtwin.stability.vehicle import QuarterCar, SingleMass
+from rigtwin.studies.stability.vehicle import QuarterCar, SingleMass
 
 CHOSEN = QuarterCar(500.0, 0.0, 50.0, 500.0, 100.0, 50.0)
 TABLE_6_2 = QuarterCar(50_000.0, 0.0, 34.0, 1000.0, 50.0, 25.0)

@@ -15,20 +15,20 @@ import pytest
 from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
-from rigtwin.configuration import from_assignments
-from rigtwin.daq import CARD
-from rigtwin.daq.table import load_table
-from rigtwin.daq.terminals import WiredTwin
 from rigtwin.errors import RigtwinError
-from rigtwin.faults.campaign import drawn, last_words, tried
-from rigtwin.faults.kinds import KINDS
-from rigtwin.faults.processes import tried as tried_apart
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.daq.terminals import WiredTwin
+from rigtwin.hardware.faults.campaign import drawn, last_words, tried
+from rigtwin.hardware.faults.kinds import KINDS
+from rigtwin.hardware.faults.processes import tried as tried_apart
+from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure
+from rigtwin.hardware.session.stops import stop_requests
+from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
+from rigtwin.machine.configuration import from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
-from rigtwin.safety import Trip
-from rigtwin.session.record import Test, on_virtual_card, record_at_leisure
-from rigtwin.session.stops import stop_requests
-from rigtwin.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
+from rigtwin.simulation.safety import Trip
 
 TABLE = load_table(CARD)
 HERE = [kind for kind in KINDS if kind.place != "process"]
@@ -181,7 +181,7 @@ def test_any_key_stops():
 
     main, other = pty.openpty()
     code = (
-        "import time\nfrom rigtwin.session.stops import stop_requests\n"
+        "import time\nfrom rigtwin.hardware.session.stops import stop_requests\n"
         "with stop_requests() as asked:\n print('ready', flush=True)\n"
         " while asked() is None: time.sleep(0.01)\n print(asked.__name__, 'stopped', flush=True)\n"
     )
@@ -327,7 +327,7 @@ def test_a_rig_that_takes_no_output_any_more_is_stopped_its_own_way(tmp_path):
 
 
 def test_lateness_of_a_recording():
-    from rigtwin.realtime import EDGES, Lateness
+    from rigtwin.hardware.realtime import EDGES, Lateness
 
     lateness = Lateness(10)
     for late in (1e-7, 3e-6, 2e-3, 0.2):

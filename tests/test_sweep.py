@@ -17,9 +17,9 @@ import pytest
 
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.sweep import Store, each, hired, swept
-from rigtwin.sweep.cluster import _same
-from rigtwin.sweep.workers import Here
+from rigtwin.studies.sweep import Store, each, hired, swept
+from rigtwin.studies.sweep.cluster import _same
+from rigtwin.studies.sweep.workers import Here
 
 
 def square(number: int) -> dict[str, float]:
@@ -199,7 +199,7 @@ def test_wrong_workers_are_one_line():
 SWEEP = """
 import sys
 from pathlib import Path
-from rigtwin.sweep import Store, hired, swept
+from rigtwin.studies.sweep import Store, hired, swept
 from tests.test_sweep import slow
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from experiments.thesis.study import Conclusion, Drawing, Study, sheet
 from experiments.thesis.work import done
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.sweep.workers import Here
+from rigtwin.studies.sweep.workers import Here
 
 
 @pytest.mark.parametrize(

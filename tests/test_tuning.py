@@ -16,21 +16,21 @@ import pytest
 from controllers import Settings
 from experiments import find as experiment
 from rigtwin.cli import main
-from rigtwin.configuration import Configuration, from_toml, overridden
 from rigtwin.errors import RigtwinError
-from rigtwin.posterior import Otherwise, Posterior, load_posterior, written
+from rigtwin.machine.configuration import Configuration, from_toml, overridden
+from rigtwin.machine.posterior import Otherwise, Posterior, load_posterior, written
 from rigtwin.recording import load
-from rigtwin.sweep import Store
-from rigtwin.sweep.workers import Here
-from rigtwin.tuning.bench import Bench, Worth, quantile
-from rigtwin.tuning.judged import comparison, median_interval
-from rigtwin.tuning.measures import MEASURES, Trial
-from rigtwin.tuning.parameter import Parameter, values
-from rigtwin.tuning.reading import find, parsed
-from rigtwin.tuning.run import LIMITS, TRIP, Run, run
-from rigtwin.tuning.scenario import APART, diagnosed, drawn, nominal
-from rigtwin.tuning.search import Search, Tried, best, bound_of, front
-from rigtwin.tuning.study import Constraint, Study, shipped
+from rigtwin.studies.sweep import Store
+from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.tuning.bench import Bench, Worth, quantile
+from rigtwin.studies.tuning.judged import comparison, median_interval
+from rigtwin.studies.tuning.measures import MEASURES, Trial
+from rigtwin.studies.tuning.parameter import Parameter, values
+from rigtwin.studies.tuning.reading import find, parsed
+from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
+from rigtwin.studies.tuning.scenario import APART, diagnosed, drawn, nominal
+from rigtwin.studies.tuning.search import Search, Tried, best, bound_of, front
+from rigtwin.studies.tuning.study import Constraint, Study, shipped
 from tests.browser import BROWSER, looked_at
 
 SMALL = """
@@ -119,8 +119,8 @@ def test_a_run_that_trips_has_no_measures():
 
 
 def test_errors_are_those_of_the_thesis_tables():
-    from rigtwin.metrics import tracking
-    from rigtwin.runner import record
+    from rigtwin.simulation.metrics import tracking
+    from rigtwin.simulation.runner import record
 
     configuration = overridden(Configuration(), {"timing": {"duration": 3.0}})
     found = run(Run("drop", configuration, 4, 0.0, tuple(MEASURES)))
@@ -596,7 +596,7 @@ def test_settings_given_at_once_are_checked_with_the_study(tmp_path, capsys):
 
 
 def test_a_study_that_is_interrupted_keeps_its_runs(tmp_path, monkeypatch):
-    import rigtwin.tuning.bench as module
+    import rigtwin.studies.tuning.bench as module
 
     made = 0
 

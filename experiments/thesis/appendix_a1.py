@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from experiments.thesis import judges, resemblance, shapes
 from experiments.thesis.appendix_a import LAGS, LIGHT, QUICK, RATIOS, SLOW, STIFF, TYRES, WHEELS, case, instead, misprint, says
 from experiments.thesis.loci import Case, locus
-from rigtwin.stability.locus import BODY, WHEEL
+from rigtwin.studies.stability.locus import BODY, WHEEL
 
 
 def _a1_1() -> tuple[Case, ...]:

@@ -20,7 +20,7 @@ from experiments.thesis.appendix_a import (
     says,
 )
 from experiments.thesis.loci import Case, locus
-from rigtwin.stability.locus import BODY, WHEEL
+from rigtwin.studies.stability.locus import BODY, WHEEL
 
 A2_9 = (
     "at low ratios every pole is near its ideal one, as the thesis goes on to say of the wheel hop; the body hop's damping has "

@@ -21,7 +21,7 @@ from experiments.thesis.appendix_a import (
     says,
 )
 from experiments.thesis.loci import Case, locus
-from rigtwin.stability.locus import BODY, WHEEL
+from rigtwin.studies.stability.locus import BODY, WHEEL
 
 
 def _a3_1() -> tuple[Case, ...]:

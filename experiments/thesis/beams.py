@@ -17,11 +17,11 @@ from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial
-from rigtwin.configuration import Configuration
-from rigtwin.emulated import ideal
-from rigtwin.plot import COLOURS, SENSED
-from rigtwin.runner import simulated
-from rigtwin.safety import Trip
+from rigtwin.machine.configuration import Configuration
+from rigtwin.render.plot import COLOURS, SENSED
+from rigtwin.simulation.ideal import ideal
+from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.safety import Trip
 
 WITHIN = 1.5
 TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}

@@ -13,8 +13,8 @@ from experiments.thesis.reproduction import Chapter, cut, document, gallery, pag
 from experiments.thesis.work import done
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.plot import checked_ending, save
-from rigtwin.sweep import hired
+from rigtwin.render.plot import checked_ending, save
+from rigtwin.studies.sweep import hired
 
 MOST_SEEDS = 1000
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from controllers.friction import MOTOR_LAG
 from experiments.thesis.study import Drawing, Result, sheet
-from rigtwin.arrays import Array
-from rigtwin.plot import ASKED, COLOURS, SENSED
+from rigtwin.numerics.arrays import Array
+from rigtwin.render.plot import ASKED, COLOURS, SENSED
 
 IN_TIME, LATE = 0.9e-3, 15e-3
 """s from the first step to the second: when the error has gone, and when the loop has turned it round."""

@@ -17,14 +17,14 @@ from experiments.experiment import time_of
 from experiments.thesis.identification import hydraulic
 from experiments.thesis.study import Result
 from experiments.thesis.trial import Trial, trial
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration, Timing
-from rigtwin.excitation import fade_in
-from rigtwin.noise import rms
+from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
-from rigtwin.runner import record, simulated
-from rigtwin.spikes import BOUNDS, Calibration, calibrated, detections, lagged
-from rigtwin.twin import Twin
+from rigtwin.signals.excitation import fade_in
+from rigtwin.signals.noise import rms
+from rigtwin.simulation.runner import record, simulated
+from rigtwin.simulation.twin import Twin
+from rigtwin.studies.friction_spikes import BOUNDS, Calibration, calibrated, detections, lagged
 
 LOOPS: dict[str, dict[str, float]] = {"fitted": {"kp": 1.0, "ki": 190.0}, "nominal": {"kp": 0.3, "ki": 10.0}}
 """Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows Table 3.5, `fitted` those with

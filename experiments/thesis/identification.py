@@ -13,12 +13,12 @@ from experiments.experiment import time_of
 from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import seeded
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration, Safety, Timing
-from rigtwin.excitation import schroeder
-from rigtwin.plot import ASKED, SENSED
-from rigtwin.runner import simulated
-from rigtwin.spikes import lagged
+from rigtwin.machine.configuration import Configuration, Safety, Timing
+from rigtwin.numerics.arrays import Array
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.signals.excitation import schroeder
+from rigtwin.simulation.runner import simulated
+from rigtwin.studies.friction_spikes import lagged
 
 Response = NDArray[np.complex128]
 

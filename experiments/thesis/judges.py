@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from rigtwin.stability.locus import BODY, WHEEL, Crossing, Locus
+from rigtwin.studies.stability.locus import BODY, WHEEL, Crossing, Locus
 
 Judge = Callable[[Locus], tuple[bool, str]]
 TOGETHER = 1e-6

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from controllers.quantity import Quantity
-from rigtwin.arrays import Array
-from rigtwin.gas_spring import GasSpring, spring_force, stiffness
+from rigtwin.components.gas_spring import GasSpring, spring_force, stiffness
+from rigtwin.numerics.arrays import Array
 
 _TABLE = "thesis Table 3.1"
 _LIFT = "the wings carry the aircraft at touch-down and let go within a second, assumed"

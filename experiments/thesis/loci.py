@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from experiments.thesis.entry import Entry, statement
 from experiments.thesis.study import Drawing, sheet
-from rigtwin.stability.locus import Locus, Setting
-from rigtwin.stability.vehicle import QuarterCar
+from rigtwin.studies.stability.locus import Locus, Setting
+from rigtwin.studies.stability.vehicle import QuarterCar
 
 ARBITRARY = QuarterCar(500.0, 0.0, 50.0, 500.0, 100.0, 50.0)
 """The values that the thesis keeps while others are varied, `chosen arbitrarily` (Tables 5.3, 5.7, A1.1 to A3.5)."""

@@ -17,9 +17,9 @@ from experiments.thesis.loci import (
 )
 from experiments.thesis.quarter_car_statements import SMALL_LAG, SUSPENSION_LAG, statements, structure_lag
 from experiments.thesis.study import Conclusion, Result, Study, span
-from rigtwin.stability.locus import BODY, WHEEL, Locus, mode
-from rigtwin.stability.models import MODELS, poles
-from rigtwin.stability.vehicle import QuarterCar
+from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, mode
+from rigtwin.studies.stability.models import MODELS, poles
+from rigtwin.studies.stability.vehicle import QuarterCar
 
 STRUCTURE_LAG = 0.06895
 """s, of Tables 5.7 to 5.12: critical for the first column of each."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from experiments.thesis.entry import Entry, statement
 from experiments.thesis.loci import ARBITRARY, locus, of_damping_ratio, of_tyre_stiffness
-from rigtwin.stability.critical import Critical, critical_lag
-from rigtwin.stability.locus import WHEEL, Locus, Setting, mode
-from rigtwin.stability.loop import LOOPS
-from rigtwin.stability.vehicle import QuarterCar
+from rigtwin.studies.stability.critical import Critical, critical_lag
+from rigtwin.studies.stability.locus import WHEEL, Locus, Setting, mode
+from rigtwin.studies.stability.loop import LOOPS
+from rigtwin.studies.stability.vehicle import QuarterCar
 
 SUSPENSION_LAG = 0.2
 """s, critical for suspension MIL (Table 5.6)."""

@@ -15,10 +15,10 @@ from experiments.quarter_car import ROAD_CHAPTER_7
 from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial, vehicle
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
-from rigtwin.emulated import ideal
-from rigtwin.plot import ASKED, COLOURS, SENSED
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.simulation.ideal import ideal
 
 IDEAL = COLOURS["other"]
 WITHIN = 1.5

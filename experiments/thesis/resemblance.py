@@ -6,8 +6,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from experiments.thesis.judges import OSCILLATES, TOGETHER, Judge, listed
-from rigtwin.stability.locus import BODY, WHEEL, Locus
-from rigtwin.stability.models import ideal_quarter_car, ideal_single_mass, poles
+from rigtwin.studies.stability.locus import BODY, WHEEL, Locus
+from rigtwin.studies.stability.models import ideal_quarter_car, ideal_single_mass, poles
 
 ALIKE = 0.1
 """Of an ideal pole's distance from the origin: how far a pole may be from it and still resemble it."""

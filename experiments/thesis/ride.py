@@ -9,10 +9,10 @@ from controllers.skyhook import semi_active_damping
 from experiments.thesis.entry import Entry, band, factor
 from experiments.thesis.study import Drawing, Result, sheet
 from experiments.thesis.trial import BODY, SHOWN, Trial, body_acceleration, curves, errors, over_seeds
-from rigtwin.arrays import Array
-from rigtwin.noise import rms
-from rigtwin.plot import ASKED, COLOURS, SENSED
-from rigtwin.structure_motion import states, wing
+from rigtwin.numerics.arrays import Array
+from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.signals.noise import rms
+from rigtwin.simulation.structure_motion import states, wing
 
 SHOWN_SEED = 0
 OFFSET = "the same 0.06 m (58 %) in every table: an offset of the zero"

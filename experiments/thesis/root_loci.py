@@ -12,8 +12,8 @@ from experiments.thesis.appendix_a import FILTER_LAG, PRINTED_LAG, TYRES, WHEELS
 from experiments.thesis.entry import Entry, digits, statement
 from experiments.thesis.loci import ARBITRARY, Variation, damping, drawing, of_damping_ratio
 from experiments.thesis.study import Conclusion, Result, Study, span
-from rigtwin.stability.critical import critical_lag
-from rigtwin.stability.loop import LOOPS
+from rigtwin.studies.stability.critical import critical_lag
+from rigtwin.studies.stability.loop import LOOPS
 
 CAPTION = (
     "Grey: the ideal quarter car. Coloured: with the lag, from dark at the start of the sweep to light at its end. "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from experiments.thesis.judges import BEYOND, OSCILLATES, Judge, listed
-from rigtwin.stability.locus import Locus
+from rigtwin.studies.stability.locus import Locus
 
 
 def asymptote(end: str) -> Judge:

@@ -13,10 +13,10 @@ from experiments.thesis.entry import Entry, digits, number, statement
 from experiments.thesis.landing import Landing, touch_down
 from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
 from experiments.vehicles import VEHICLES, configuration
-from rigtwin.arrays import Array
-from rigtwin.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
-from rigtwin.parameters import Cylinder, Motor
-from rigtwin.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
+from rigtwin.components.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
+from rigtwin.components.parameters import Cylinder, Motor
+from rigtwin.numerics.arrays import Array
+from rigtwin.studies.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
 
 BOEING = Landing()
 UNITS = {name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)}

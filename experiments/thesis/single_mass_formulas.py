@@ -12,10 +12,10 @@ from scipy.optimize import root_scalar
 
 from experiments.thesis.entry import Entry, digits, statement
 from experiments.thesis.study import Drawing, sheet
-from rigtwin.stability.critical import critical_lag
-from rigtwin.stability.loop import single_mass
-from rigtwin.stability.models import single_mass_structure, single_mass_suspension
-from rigtwin.stability.vehicle import SingleMass
+from rigtwin.studies.stability.critical import critical_lag
+from rigtwin.studies.stability.loop import single_mass
+from rigtwin.studies.stability.models import single_mass_structure, single_mass_suspension
+from rigtwin.studies.stability.vehicle import SingleMass
 
 MASS = SingleMass(50.0, 500.0, 100.0)
 """§5.1.4."""

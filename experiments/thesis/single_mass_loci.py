@@ -8,7 +8,7 @@ from dataclasses import replace
 from experiments.thesis import judges, resemblance, shapes
 from experiments.thesis.judges import Judge
 from experiments.thesis.loci import Case, Claim, Panel, locus, of_damping_ratio, of_lag, of_natural_frequency
-from rigtwin.stability.locus import BODY
+from rigtwin.studies.stability.locus import BODY
 
 MODEL = "single-mass"
 LAGS = {ratio: of_lag(ratio) for ratio in (1.0, 0.5)}

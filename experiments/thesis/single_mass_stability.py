@@ -13,8 +13,8 @@ from experiments.thesis.loci import ARBITRARY, damping, drawing
 from experiments.thesis.single_mass_formulas import FILTER, MASS, SOFT, bode, formulas, region
 from experiments.thesis.single_mass_loci import CASES
 from experiments.thesis.study import Conclusion, Result, Study, span
-from rigtwin.stability.models import poles, single_mass_structure, single_mass_suspension
-from rigtwin.stability.vehicle import SingleMass
+from rigtwin.studies.stability.models import poles, single_mass_structure, single_mass_suspension
+from rigtwin.studies.stability.vehicle import SingleMass
 
 TABLE_5_1 = {
     0.01: (("-100", "-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i"), ("-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i")),

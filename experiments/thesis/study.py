@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from experiments.thesis.entry import Entry
-from rigtwin.arrays import Array
+from rigtwin.numerics.arrays import Array
 
 Result = Mapping[str, Array | float]
 """Of one job: name → array or number."""

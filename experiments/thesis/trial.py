@@ -11,14 +11,14 @@ from scipy.signal import butter, sosfiltfilt
 from experiments import find
 from experiments.thesis.entry import Entry, digits
 from experiments.thesis.study import Job, Result
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
-from rigtwin.emulated import Ideal, ideal
 from rigtwin.errors import RigtwinError
-from rigtwin.metrics import tracked
-from rigtwin.noise import rms
-from rigtwin.runner import Ran, simulated
-from rigtwin.safety import Trip, explained
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import rms
+from rigtwin.simulation.ideal import Ideal, ideal
+from rigtwin.simulation.metrics import tracked
+from rigtwin.simulation.runner import Ran, simulated
+from rigtwin.simulation.safety import Trip, explained
 
 BODY = 3.0
 """Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the twin's friction limit cycle,

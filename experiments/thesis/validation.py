@@ -11,7 +11,7 @@ from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import curves, errors, over_seeds, seeded, trial
-from rigtwin.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, COLOURS, SENSED
 
 IDEAL = COLOURS["other"]
 WITHIN = 2.0

@@ -13,10 +13,10 @@ from controllers import Settings
 from experiments.thesis.entry import Entry, digits, statement
 from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet, span
 from experiments.vehicles import VEHICLES
-from rigtwin.stability.critical import Critical, critical_delay, critical_lag
-from rigtwin.stability.loop import LOOPS
-from rigtwin.stability.models import Lags, ideal_quarter_car, rig, rightmost
-from rigtwin.stability.vehicle import QuarterCar
+from rigtwin.studies.stability.critical import Critical, critical_delay, critical_lag
+from rigtwin.studies.stability.loop import LOOPS
+from rigtwin.studies.stability.models import Lags, ideal_quarter_car, rig, rightmost
+from rigtwin.studies.stability.vehicle import QuarterCar
 
 LAG = 0.01
 """s, of each of the four filters (§6.2)."""

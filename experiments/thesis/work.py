@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from experiments.thesis.study import Result, Study
-from rigtwin.sweep import Store, Workers, swept
+from rigtwin.studies.sweep import Store, Workers, swept
 
 
 def job(which: tuple[str, int, str]) -> Result:

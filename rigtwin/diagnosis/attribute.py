@@ -15,9 +15,9 @@ import numpy as np
 
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values, without_each
-from rigtwin.diagnosis.growth import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
+from rigtwin.diagnosis.stepwise import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
 from rigtwin.diagnosis.trials import searched
-from rigtwin.effects import Effect
+from rigtwin.machine.effects import Effect
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from rigtwin.configuration import Configuration, flattened
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.effects import NAMES
 from rigtwin.errors import RigtwinError
-from rigtwin.posterior import Otherwise, Posterior, written
+from rigtwin.machine.configuration import Configuration, flattened
+from rigtwin.machine.effects import NAMES
+from rigtwin.machine.posterior import Otherwise, Posterior, written
 
 GROUPS = {component: group for group, component in NAMES.items()}
 """What a component is called among the parameters, where that is not its name in effects."""

@@ -10,14 +10,14 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from controllers.force import MOTOR_CONSTANT
-from rigtwin.arrays import Array
-from rigtwin.channels import SUSPENSION_RIG
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.diagnosis.runs import FLAT, longest_run
-from rigtwin.noise import rms, smallest_step, white_noise
-from rigtwin.plant import deflected
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.signals.noise import rms, smallest_step, white_noise
+from rigtwin.signals.runs import FLAT, longest_run
+from rigtwin.simulation.plant import deflected
 
 SHORTEST = 200
 """Ticks below which a noise floor cannot be estimated."""

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from controllers import Measurements
-from rigtwin.configuration import Configuration, overridden
 from rigtwin.diagnosis.checks import SHORTEST
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 from rigtwin.diagnosis.residual import Residual, single
 from rigtwin.errors import RigtwinError
-from rigtwin.noise import white_noise, without_mains
+from rigtwin.machine.configuration import Configuration, overridden
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import white_noise, without_mains
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,14 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rigtwin.actuator import Actuator, ActuatorState, actuator, conditioned, holding
-from rigtwin.arrays import Array
-from rigtwin.compiling import forward, integrate, kernel
-from rigtwin.configuration import Configuration
-from rigtwin.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
-from rigtwin.model import Handles, build, handles
-from rigtwin.parameters import Carriage, Cylinder, GasSpring, Motor, Plant, Rail
-from rigtwin.plant import Contacts, brace, contacts, deflected, drive, motor_force, touch, true_measurements
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
+from rigtwin.components.parameters import Carriage, Cylinder, GasSpring, Motor, Plant, Rail
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import forward, integrate, kernel
+from rigtwin.simulation.mechanics import Handles, build, handles
+from rigtwin.simulation.plant import Contacts, brace, contacts, deflected, drive, motor_force, touch, true_measurements
 
 FIXED = 1e6
 """kg; a carriage this heavy goes where it is driven."""

@@ -23,11 +23,11 @@ from controllers import (
     update,
 )
 from controllers.quantity import Quantity, fields
-from rigtwin.arrays import Array
-from rigtwin.compiling import kernel
 from rigtwin.diagnosis.residual import rounding
-from rigtwin.noise import rms
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import rms
 
 EXACT = 20.0
 """Roundings of a recorded command within which a replay is exact."""

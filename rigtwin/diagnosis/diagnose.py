@@ -13,11 +13,11 @@ from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
+from rigtwin.diagnosis.cross_validation import Judged, judged, power, with_effects
+from rigtwin.diagnosis.data_checks import faults_of
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import (
     Diagnosis,
@@ -31,20 +31,20 @@ from rigtwin.diagnosis.finding import (
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.fitness import faults_of
 from rigtwin.diagnosis.formula_replay import formula_deviation
-from rigtwin.diagnosis.freeform import Disturbed, located
 from rigtwin.diagnosis.leftover import leftovers, missed, steps
 from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
+from rigtwin.diagnosis.localisation import placed
 from rigtwin.diagnosis.next_test import Test, proposed
-from rigtwin.diagnosis.place import placed
 from rigtwin.diagnosis.sampling import Sampled, outstanding
-from rigtwin.diagnosis.shrink import Judged, judged, power, with_effects
 from rigtwin.diagnosis.text import sentence
-from rigtwin.effects import Effect, find, title
+from rigtwin.diagnosis.unknown_input import Disturbed, located
 from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.effects import Effect, find, title
 from rigtwin.machine.machine import Machine
-from rigtwin.machine.replaying import Setup, setup_of
+from rigtwin.models.replaying import Setup, setup_of
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
 SURE = 0.98

@@ -17,16 +17,16 @@ from numpy.fft import rfft, rfftfreq
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from rigtwin.arrays import Array
-from rigtwin.compiling import kernel
-from rigtwin.configuration import Configuration
-from rigtwin.diagnosis.runs import FLAT, longest_run
+from rigtwin.machine.configuration import Configuration
 from rigtwin.machine.machine import Machine
-from rigtwin.machine.predictor import Predictor
-from rigtwin.machine.replaying import Setup, predictor
 from rigtwin.machine.tolerance import Tolerance
-from rigtwin.noise import smallest_step, white_noise, without_mains
+from rigtwin.models.predictor import Predictor
+from rigtwin.models.replaying import Setup, predictor
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import smallest_step, white_noise, without_mains
+from rigtwin.signals.runs import FLAT, longest_run
 
 HIGHEST = 150.0
 """Hz; above it no component moves and lines would only add noise."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from rigtwin.channels import SUSPENSION_RIG
+from rigtwin.recording.channels import SUSPENSION_RIG
 
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
 

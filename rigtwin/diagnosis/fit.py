@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.arrays import Array
+from rigtwin.components.parts import Guide
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.joint_trials import Scales, scales
 from rigtwin.diagnosis.trial import Trials, swings
 from rigtwin.diagnosis.trials import trials
-from rigtwin.effects import Effect
-from rigtwin.parts import Guide
+from rigtwin.machine.effects import Effect
+from rigtwin.numerics.arrays import Array
 
 PRIOR = 1.0
 """χ² that a tolerance costs at its half width."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from rigtwin.arrays import Array
 from rigtwin.diagnosis.controller import EXACT, LATE, Deviation
 from rigtwin.diagnosis.residual import rounding
 from rigtwin.machine.machine import Machine
-from rigtwin.machine.replaying import Setup
-from rigtwin.noise import rms
+from rigtwin.models.replaying import Setup
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import rms
 
 SETTLED = 5
 """Ticks after which blocks that remember the past have forgotten how they began."""

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from rigtwin.components.parts import ForceActuator, ForceSensor, Guide, Mass, PositionActuator, PositionSensor, VelocitySensor
 from rigtwin.diagnosis.trial import Swing, Trials
-from rigtwin.effects import Effect
-from rigtwin.machine.predictor import Motion
-from rigtwin.parts import ForceActuator, ForceSensor, Guide, Mass, PositionActuator, PositionSensor, VelocitySensor
+from rigtwin.machine.effects import Effect
+from rigtwin.models.predictor import Motion
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import numpy as np
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
 from rigtwin.diagnosis.fit import Fit, Fitter, possible, without_each
-from rigtwin.diagnosis.freeform import Disturbed
-from rigtwin.diagnosis.place import placed
-from rigtwin.noise import rms
+from rigtwin.diagnosis.localisation import placed
+from rigtwin.diagnosis.unknown_input import Disturbed
+from rigtwin.signals.noise import rms
 
 OUTSTANDING = 1.3
 """Times its noise from which a signal has something left, if that is more than no model is held to."""

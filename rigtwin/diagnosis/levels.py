@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from controllers import Measurements
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
+from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
 from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
-from rigtwin.noise import rms, spectrum
-from rigtwin.parameters import Plant
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.runner import simulated, unlimited
+from rigtwin.signals.noise import rms, spectrum
+from rigtwin.simulation.runner import simulated, unlimited
 
 COMPONENTS = ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder")
 """Replays whose levels are reported."""

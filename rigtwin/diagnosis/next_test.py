@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.channels import SUSPENSION_RIG
-from rigtwin.configuration import Configuration, flattened
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit, Space
+from rigtwin.machine.configuration import Configuration, flattened
 from rigtwin.machine.machine import Machine
 from rigtwin.recording import Recording
-from rigtwin.runner import simulated, unlimited
+from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.simulation.runner import simulated, unlimited
 
 SEED = 1
 """Of the tests that are tried on the twin, and of the one proposed."""

@@ -9,20 +9,20 @@ from functools import cached_property
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.arrays import Array
-from rigtwin.configuration import Configuration
-from rigtwin.converters import seen, unseen
+from rigtwin.components.gas_spring import spring_force
 from rigtwin.diagnosis.checks import check
 from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
 from rigtwin.errors import RigtwinError
-from rigtwin.gas_spring import spring_force
-from rigtwin.loop import run
-from rigtwin.noise import Motion, band, motion, rms, white_noise, without_mains
-from rigtwin.plant import deflected
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.replay import Replay
-from rigtwin.runner import simulated, unlimited
+from rigtwin.signals.noise import Motion, band, motion, rms, white_noise, without_mains
+from rigtwin.simulation.converters import seen, unseen
+from rigtwin.simulation.loop import run
+from rigtwin.simulation.plant import deflected
+from rigtwin.simulation.replay import Replay
+from rigtwin.simulation.runner import simulated, unlimited
 
 RESOLVED_OVER = 0.03
 """s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""

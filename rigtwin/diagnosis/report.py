@@ -13,13 +13,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from rigtwin import __version__
-from rigtwin.arrays import Array
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.finding import Diagnosis
 from rigtwin.diagnosis.text import number
 from rigtwin.errors import RigtwinError
-from rigtwin.noise import spectrum
+from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import spectrum
 
 BEFORE, AFTER, FLOOR = "#c2410c", "#0f766e", "#94a3b8"
 BINS = 24

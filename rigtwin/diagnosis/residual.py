@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigtwin.arrays import Array
-from rigtwin.noise import band, rms
+from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import band, rms
 
 SIGNIFICANT_DIGITS = 8
 """Digits to which recordings in text keep a command; a controller that agrees to them is exact."""

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.arrays import Array
-from rigtwin.noise import rms, smallest_step, white_noise, without_mains
-from rigtwin.parameters import LoadCell, Lvdt
+from rigtwin.components.parameters import LoadCell, Lvdt
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
 
 OUTSTANDING = 1.6
 """Times its nominal value, and times what the other sensors have more than nominal, from which a sensor's noise, hum or bit

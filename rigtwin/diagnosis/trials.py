@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from rigtwin.components.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
 from rigtwin.diagnosis.joint_trials import JOINT_TRIALS, Scales
 from rigtwin.diagnosis.trial import SHARES, Swing, Trials
-from rigtwin.effects import Effect
-from rigtwin.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+from rigtwin.machine.effects import Effect
 
 TYPES = (Carriage, Rail, Tyre, Motor, Cylinder, Lvdt, LoadCell, Computer)
 """Components whose nominal values are those of the suspension rig, and so are these trials."""

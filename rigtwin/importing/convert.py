@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.mapping import Map, Source, load
 from rigtwin.importing.table import Columns, read
 from rigtwin.importing.units import is_unit, unit_of
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 
 FLAT = 8

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.arrays import Array
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.units import is_unit
+from rigtwin.numerics.arrays import Array
 
 SEPARATORS = (";", "\t", ",", "|", " ")
 """In the order in which they are preferred where several would do."""

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from controllers.quantity import Quantity, fields
-from rigtwin import parameters, parts
-from rigtwin.effects import KINDS
+from rigtwin.components import parameters, parts
+from rigtwin.machine.effects import KINDS
 from rigtwin.machine.machine import Component
 from rigtwin.machine.mechanism import Mechanism
 from rigtwin.machine.mistakes import Mistakes, near
@@ -49,7 +49,7 @@ COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 QUARTER_CAR = ("carriage", "rail", "tyre", "motor", "cylinder", "cylinder", "lvdt", "lvdt", "lvdt", "load cell")
 QUARTER_CAR_NAMES = tuple(name for name in parameters.Plant._fields if name not in ("gas_spring", "computer", "mains"))
-"""Components of a quarter car between two cylinders, which has a faster solver of its own (rigtwin.machine.quarter_car)."""
+"""Components of a quarter car between two cylinders, which has a faster solver of its own (rigtwin.models.quarter_car)."""
 
 
 class Components:

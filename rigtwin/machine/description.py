@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
-from rigtwin import parameters
+from rigtwin.components import parameters
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.components import MOVING, Components
 from rigtwin.machine.machine import Control, Machine

@@ -9,7 +9,7 @@ from typing import Any
 
 from controllers.formula import Formula
 from controllers.quantity import Quantity
-from rigtwin.effects import Effect, candidates
+from rigtwin.machine.effects import Effect, candidates
 from rigtwin.machine.tolerance import Tolerance
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
@@ -92,7 +92,7 @@ class Control:
 
 @dataclass(frozen=True)
 class Machine:
-    """The whole description. plant: a NamedTuple of components, as rigtwin.parts and rigtwin.parameters define them; rough:
+    """The whole description. plant: a NamedTuple of components, as rigtwin.components.parts and rigtwin.components.parameters define them; rough:
     whether its nominal values are only a start; form: share of a signal that no model is held to, None for
     the usual one."""
 

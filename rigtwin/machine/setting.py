@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from controllers.quantity import Quantity, fields
-from rigtwin.configuration import assigned, checked, read_toml, values_of
-from rigtwin.effects import find
 from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import assigned, checked, read_toml, values_of
+from rigtwin.machine.effects import find
 from rigtwin.machine.machine import Machine
-from rigtwin.machine.replaying import Setup
+from rigtwin.models.replaying import Setup
 
 
 def nominal(machine: Machine) -> Setup:

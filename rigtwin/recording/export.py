@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from rigtwin.channels import channels_of
 from rigtwin.errors import RigtwinError
+from rigtwin.recording.channels import channels_of
 from rigtwin.recording.reader import Recording
 
 

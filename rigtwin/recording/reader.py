@@ -19,9 +19,9 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
-from rigtwin.arrays import Array
-from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,

@@ -9,13 +9,13 @@ import numpy as np
 from google.protobuf import descriptor_pb2
 from numpy.typing import NDArray
 
-from rigtwin.channels import CHANNELS
+from rigtwin.recording.channels import CHANNELS
 
 WRITTEN_FORMAT = "1"
 """Format number in the metadata of the recordings that this version reads and writes."""
 RECORD = "rigtwin"
 """Name of the metadata record that says what the test was."""
-TWIN_RECORD = "rigtwin.twin"
+TWIN_RECORD = "rigtwin.simulation.twin"
 """Name of the metadata record that says how a twin made the recording."""
 END_RECORD = "rigtwin.end"
 """Name of the metadata record that says why the test ended."""

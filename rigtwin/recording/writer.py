@@ -37,9 +37,9 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from rigtwin.arrays import Array
-from rigtwin.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
 from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, descriptor, tags, type_name
 
 _MESSAGE = [

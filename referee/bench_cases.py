@@ -1,0 +1,121 @@
+"""Draws benches for the referee: what is in them, and what each should be called."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from referee.benches import (
+    ActuatorTruth,
+    Array,
+    DamperTruth,
+    actuator_position,
+    damper_force,
+    sampled,
+    wander,
+)
+
+SECONDS = 20.0
+"""s, of each recording."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """machine: actuator or damper; names: of the effects that are in it, kinds, none for a null; truth: with their sizes."""
+
+    machine: str
+    names: frozenset[str]
+    truth: ActuatorTruth | DamperTruth
+    period: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What its sensors read. first: command or displacement m; second: position m or force N; shape (ticks,)."""
+
+    first: Array
+    second: Array
+
+
+ACTUATORS = ("none", "lag", "two_lags", "delay", "lag delay", "resonance", "lag gain", "lag rate_limit", "lag deadband")
+DAMPERS = (
+    "none",
+    "viscous",
+    "coulomb",
+    "coulomb compliance",
+    "coulomb backlash",
+    "coulomb compliance backlash",
+    "viscous coulomb",
+    "viscous viscous_asymmetry",
+    "viscous drag",
+    "viscous stiffness offset",
+    "viscous coulomb compliance",
+)
+
+
+def drawn(number: int, seed: int) -> Case:
+    """The case of that number: every sort in turn, its sizes at random."""
+    random = np.random.default_rng([seed, number])
+    period = float(random.choice([5e-4, 1e-3, 2e-3]))
+    if number % 2:
+        sort = DAMPERS[number // 2 % len(DAMPERS)]
+        return Case("damper", frozenset(sort.split()) - {"none"}, _damper(sort, random), period, number)
+    sort = ACTUATORS[number // 2 % len(ACTUATORS)]
+    return Case("actuator", frozenset(sort.split()) - {"none"}, _actuator(sort, random), period, number)
+
+
+def _spread(random: np.random.Generator, low: float, high: float) -> float:
+    return float(math.exp(random.uniform(math.log(low), math.log(high))))
+
+
+def _actuator(sort: str, random: np.random.Generator) -> ActuatorTruth:
+    parts = sort.split()
+    lags: tuple[float, ...] = ()
+    if "lag" in parts:
+        lags = (_spread(random, 0.008, 0.05),)
+    if "two_lags" in parts:
+        first = _spread(random, 0.015, 0.05)
+        lags = (first, first * random.uniform(0.25, 0.8))
+    return ActuatorTruth(
+        lags=lags,
+        late=_spread(random, 0.006, 0.03) if "delay" in parts else 0.0,
+        own=(_spread(random, 3.0, 15.0), float(random.uniform(0.15, 0.7))) if "resonance" in parts else None,
+        scale=float(1.0 + random.choice([-1, 1]) * random.uniform(0.02, 0.1)) if "gain" in parts else 1.0,
+        fastest=float(random.uniform(0.08, 0.13)) if "rate_limit" in parts else math.inf,
+        lost=_spread(random, 5e-4, 4e-3) if "deadband" in parts else 0.0,
+    )
+
+
+def _damper(sort: str, random: np.random.Generator) -> DamperTruth:
+    parts = sort.split()
+    slip = _spread(random, 30.0, 300.0) if "coulomb" in parts else 0.0
+    out = _spread(random, 400.0, 3000.0) if "viscous" in parts else 0.0
+    back = out * random.uniform(0.3, 0.75) if "viscous_asymmetry" in parts else out
+    return DamperTruth(
+        slip=slip,
+        spring=slip / _spread(random, 8e-4, 4e-3) if "compliance" in parts else math.inf,
+        lost=_spread(random, 8e-4, 5e-3) if "backlash" in parts else 0.0,
+        viscous=(out, back),
+        rate=_spread(random, 1e3, 6e3) if "stiffness" in parts else 0.0,
+        charge=_spread(random, 40.0, 200.0) if "offset" in parts else 0.0,
+        square=_spread(random, 0.3, 1.0) * out / 0.15 if "drag" in parts else 0.0,
+    )
+
+
+def recorded(case: Case, again: int = 0) -> Recorded:
+    """A test of the bench. again: another one of the same bench."""
+    random = np.random.default_rng([case.seed, 77, again])
+    reach = float(random.uniform(0.02, 0.04))
+    if isinstance(case.truth, ActuatorTruth):
+        command = wander(random, SECONDS, case.period, reach, 0.1, 8.0)
+        position = sampled(random, actuator_position(case.truth, command, case.period), 2e-5, 1e-6)
+        return Recorded(command, position)
+    fine = 4
+    motion = wander(random, SECONDS, case.period / fine, reach, 0.1, 3.0)
+    force = damper_force(case.truth, motion, np.gradient(motion, case.period / fine))[::fine]
+    return Recorded(
+        sampled(random, motion[::fine], 5e-6, 1e-6), sampled(random, force, 0.01 * float(np.std(force)) + 0.3, 0.05)
+    )

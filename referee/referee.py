@@ -1,0 +1,151 @@
+"""The referee: draws rigs, runs them, writes recordings without a hint, commits itself to a key, and opens it when asked.
+
+Run as a process of its own: `python -m referee.referee FOLDER CASES SEED`. It answers on standard output: one line
+a case, then `commitment SHA-256`; after a line on its standard input, `salt S` and the key. It imports nothing of the twin, its
+effects or its controllers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from referee.draw import MATERIAL, Defect, effect_size, library, outside, summary, tolerated
+from referee.reference_plant import Array
+from referee.reference_rig import Law, run
+from referee.test_signals import TESTS, asked
+
+SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
+"""Of all cases."""
+COMMANDS = ("ground", "structure", "force", "voltage")
+READ = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
+
+
+def sorts(cases: int, random: np.random.Generator) -> list[str]:
+    """The sort of each case, in random order, with the shares as near as whole numbers allow."""
+    counts = {name: int(share * cases) for name, share in SHARES.items()}
+    counts["single"] += cases - sum(counts.values())
+    names = [name for name, count in counts.items() for _ in range(count)]
+    random.shuffle(names)
+    return names
+
+
+def chosen(groups: list[list[Any]], random: np.random.Generator) -> Defect:
+    """One defect: the component first, so that none is rare because it has few kinds."""
+    group = groups[int(random.integers(len(groups)))]
+    return group[int(random.integers(len(group)))]()
+
+
+def case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
+    """The key's entry of one case, and its recordings: what the operator set, commands and sensors; the second is held out."""
+    rig = tolerated(random)
+    test = str(random.choice(TESTS if sort != "pair" else TESTS[:3]))
+    law, demands = asked(test, random)
+    plain, _ = run(rig, law, demands, np.random.default_rng(0))
+    defects: list[Defect] = []
+    sizes: list[float] = []
+    while len(defects) < {"single": 1, "null": 0, "pair": 2, "outside": 1}[sort]:
+        if sort == "outside":
+            options = outside(random)
+            drawn = options[int(random.integers(len(options)))]()
+        else:
+            drawn = chosen(library(plain, random), random)
+        size = effect_size(rig, law, drawn, plain)
+        # A defect that this test does not show is asked for only where it is alone and inside the library.
+        shown = sort == "single" or size >= MATERIAL
+        if shown and drawn.component not in [other.component for other in defects]:
+            defects.append(drawn)
+            sizes.append(size)
+    truth, real = rig, law
+    for defect in defects:
+        truth, real = defect.change(truth, real)
+    recordings = [(law, *run(truth, real, demands, random))]
+    _, again = asked("imposed" if test == "tripped" else test, random)
+    recordings.append((law, *run(truth, real, again, random)))
+    entry = {
+        "sort": sort,
+        "test": test,
+        "seconds": len(recordings[0][1]) * 1e-3,
+        "bristle": truth.bristle,
+        "effects": [summary(defect, size) for defect, size in zip(defects, sizes, strict=True)],
+    }
+    return entry, recordings
+
+
+def operator(law: Law) -> dict[str, Any]:
+    """The settings as a recording keeps them."""
+    return {
+        "mode": "imposed" if law.imposed else "mil",
+        "travel": "wheel",
+        "structure": "point",
+        "compensator": "none",
+        "start": law.start,
+        "sprung_mass": law.sprung_mass,
+        "suspension_stiffness": law.stiffness,
+        "suspension_damping": law.damping,
+        "preload": law.preload,
+        "gravity": law.gravity,
+        "skyhook": "none",
+        "skyhook_damping": 0,
+        "damping_max": 500,
+        "damping_min": 10,
+        "filter_position": law.filter_position,
+        "filter_velocity": law.filter_velocity,
+        "filter_force": law.filter_force,
+        "kff": law.kff,
+        "kp": law.kp,
+        "ki": law.ki,
+        "voltage_limit": law.limit,
+    }
+
+
+def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
+    """A recording in the project's format, JSON messages."""
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start()
+        config = json.dumps({"controller": operator(law)})
+        about = {"format": "1", "machine": "suspension-rig", "experiment": "withheld", "period": "0.001", "config": config}
+        writer.add_metadata("rigtwin", about)
+        channels = []
+        for topic, names in (("/command", COMMANDS), ("/sensor", READ)):
+            properties = {name: {"type": "number"} for name in names}
+            schema = json.dumps({"type": "object", "properties": properties}).encode()
+            number = writer.register_schema(topic[1:], "jsonschema", schema)
+            channels.append((writer.register_channel(topic, "json", number), names))
+        for tick in range(len(commands)):
+            for (channel, names), row in zip(channels, (commands[tick], sensors[tick]), strict=True):
+                message = json.dumps(dict(zip(names, (float(f"{value:.9g}") for value in row), strict=True))).encode()
+                writer.add_message(channel, tick * 1_000_000, message, tick * 1_000_000)
+        writer.finish()
+
+
+def main(arguments: list[str]) -> int:
+    folder, cases, seed = Path(arguments[0]), int(arguments[1]), int(arguments[2])
+    folder.mkdir(parents=True, exist_ok=True)
+    order = sorts(cases, np.random.default_rng([seed, 0]))
+    key = []
+    for number, sort in enumerate(order):
+        # Each case has a stream of its own, so that one more case leaves the others as they are.
+        entry, recordings = case(sort, np.random.default_rng([seed, 1, number]))
+        for name, recording in zip((f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), recordings, strict=True):
+            write(folder / name, *recording)
+        key.append(entry)
+        print(f"case {number}", flush=True)
+    salt = hashlib.sha256(np.random.default_rng([seed, 2]).bytes(32)).hexdigest()
+    opened = json.dumps(key)
+    print("commitment", hashlib.sha256((salt + opened).encode()).hexdigest(), flush=True)
+    sys.stdin.readline()
+    print("salt", salt)
+    print(opened, flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

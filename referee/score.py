@@ -1,0 +1,200 @@
+"""The score of a withheld-effect check, every row of the goals with its interval."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from referee.check import Result
+
+CONFIDENT = 0.9
+"""Confidence from which a name must nearly always be right."""
+WORSE = -0.05
+"""Shrinkage on held-out data below which a correction made them worse."""
+VISIBLE = 1.1
+"""Gap in noise floors from which a shrinkage means something."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measure. value: as printed; goal: as printed; low, high: 95 % Wilson interval of a share, else None."""
+
+    measure: str
+    value: str
+    goal: str
+    low: float | None = None
+    high: float | None = None
+
+
+def wilson(hits: int, count: int) -> tuple[float, float]:
+    """The 95 % Wilson score interval of a share."""
+    if count == 0:
+        return 0.0, 1.0
+    z, share = 1.959964, hits / count
+    middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
+    half = z * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2)) / (1 + z**2 / count)
+    return middle - half, middle + half
+
+
+def _share(measure: str, hits: Sequence[bool], goal: str) -> Row:
+    if not len(hits):
+        return Row(measure, "no case", goal)
+    low, high = wilson(sum(hits), len(hits))
+    return Row(measure, f"{sum(hits)} of {len(hits)} ({100 * sum(hits) / len(hits):.1f} %)", goal, low, high)
+
+
+def names(answer: dict[str, Any]) -> list[str]:
+    """The effects that an answer names, as the key writes them."""
+    found = []
+    for effect in answer["effects"]:
+        kind = effect["kind"]
+        if kind == "setting":
+            kind = f"setting:{next(iter(effect['parameters']))}"
+        found.append(f"{kind}@{effect['component']}")
+    return found
+
+
+def truths(entry: dict[str, Any]) -> list[str]:
+    return [f"{effect['kind']}@{effect['component']}" for effect in entry["effects"]]
+
+
+def _class_of(effect: dict[str, Any]) -> set[str]:
+    return {f"{each['kind']}@{each['component']}" for each in effect["class"]} | set(names({"effects": [effect]}))
+
+
+def _error(entry: dict[str, Any], answer: dict[str, Any]) -> float:
+    """Relative error of the magnitude of a single effect that was named right."""
+    truth = entry["effects"][0]
+    value = next(iter(answer["effects"][0]["parameters"].values()))["value"]
+    nominal = truth["nominal"] or 0.0
+    return abs(value - truth["value"]) / max(abs(truth["value"] - nominal), 1e-12)
+
+
+def rows(result: Result) -> list[Row]:
+    """Every measure."""
+    pairs = list(zip(result.key, result.answers, strict=True))
+    single = [(k, a) for k, a in pairs if k["sort"] == "single" and k["effects"][0]["material"]]
+    traces = [(k, a) for k, a in pairs if k["sort"] == "single" and not k["effects"][0]["material"]]
+    null = [a for k, a in pairs if k["sort"] == "null"]
+    outside = [(k, a) for k, a in pairs if k["sort"] == "outside"]
+    double = [(k, a) for k, a in pairs if k["sort"] == "pair"]
+    right = [bool(names(a)) and names(a)[0] == truths(k)[0] for k, a in single]
+    classes = [(k, a["effects"][0]) for k, a in single if a["effects"]]
+    inside = [bool(a["effects"]) and truths(k)[0] in _class_of(a["effects"][0]) for k, a in single]
+    sizes = [len(_class_of(effect)) for _, effect in classes]
+    component = [
+        bool(a["where"] or a["effects"])
+        and k["effects"][0]["component"]
+        in {e["component"] for e in a["effects"][:1]} | {w["component"] for w in a["where"][:1]}
+        for k, a in single
+    ]
+    flagged = [a["verdict"] in ("unknown", "partly explained") for _, a in outside]
+    placed = [bool(a["where"]) and a["where"][0]["component"] == k["effects"][0]["component"] for k, a in outside]
+    both = [set(truths(k)) <= set(names(a)) for k, a in double]
+    wrong = [bool(set(names(a)) - set(truths(k))) for k, a in double]
+    errors = [_error(k, a) for (k, a), hit in zip(single, right, strict=True) if hit]
+    judged = [a["gap"] for _, a in pairs if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE]
+    apart = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in judged]
+    worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in judged)
+    sure = [
+        name in truths(k)
+        for k, a in pairs
+        for name, effect in zip(names(a), a["effects"], strict=True)
+        if effect["confidence"] >= CONFIDENT
+    ]
+    seconds = [a["seconds"] for _, a in pairs]
+    size = f"{np.mean(sizes):.2f}" if sizes else "no case"
+    return [
+        _share("top-1 right, material single effects", right, ">= 95 %"),
+        _share("truth inside the reported class", inside, ">= 97 %"),
+        Row("mean class size", size, "<= 1.3"),
+        _share("component right", component, ">= 97 %"),
+        _share("false alarms on nulls", [a["verdict"] != "no gap" for a in null], "<= 2 in 60"),
+        _share("effect not in the library: flagged", flagged, ">= 90 %"),
+        _share("effect not in the library: component right", placed, ">= 90 %"),
+        _share("both of two effects", both, ">= 80 %"),
+        _share("a wrong name among them", wrong, "<= 5 %"),
+        Row("magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"),
+        Row("predicted - achieved shrinkage, median / 90th percentile", _plain(apart), "<= 0.03 / <= 0.10"),
+        Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(judged)}", "0"),
+        _share(f"right when confidence >= {CONFIDENT}", sure, ">= 97 %"),
+        _share("immaterial single effects: no wrong name", [not set(names(a)) - set(truths(k)) for k, a in traces], "none set"),
+        Row("seconds a record in the check, median / largest", _span(seconds), "<= 15 s for 30 s alone"),
+        *_baselines(result, single),
+    ]
+
+
+def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]]]) -> list[Row]:
+    found = []
+    counts = Counter(truths(k)[0] for k, _ in single)
+    if counts:
+        name, hits = counts.most_common(1)[0]
+        low, high = wilson(hits, len(single))
+        value = f"{hits} of {len(single)} ({100 * hits / len(single):.1f} %)"
+        found.append(Row(f"baseline, always {name}: top-1 right", value, "", low, high))
+    if result.crude:
+        tried = [(result.key[number], name) for number, name in result.crude.items()]
+        hits = [name == truths(k)[0] for k, name in tried if k["sort"] == "single" and k["effects"][0]["material"]]
+        alarms = [name != "none" for k, name in tried if k["sort"] == "null"]
+        found.append(_share("baseline, black box: top-1 right", hits, ""))
+        found.append(_share("baseline, black box: false alarms on nulls", alarms, ""))
+    return found
+
+
+def _percentiles(values: Sequence[float]) -> str:
+    return f"{100 * np.median(values):.1f} % / {100 * np.quantile(values, 0.9):.1f} %" if len(values) else "no case"
+
+
+def _plain(values: Sequence[float]) -> str:
+    return f"{np.median(values):.3f} / {np.quantile(values, 0.9):.3f}" if len(values) else "no case"
+
+
+def _span(values: Sequence[float]) -> str:
+    return f"{np.median(values):.1f} / {max(values):.1f}" if len(values) else "no case"
+
+
+def misses(result: Result) -> list[str]:
+    """Every case that was not answered right, a line each: what was there and what was said."""
+    lines = []
+    for number, (entry, answer) in enumerate(zip(result.key, result.answers, strict=True)):
+        truth, said = truths(entry), names(answer)
+        if entry["sort"] == "outside":
+            there = bool(answer["where"]) and answer["where"][0]["component"] == entry["effects"][0]["component"]
+            right = answer["verdict"] in ("unknown", "partly explained") and there
+        else:
+            right = set(truth) == set(said) and answer["verdict"] in ("explained", "no gap")
+        if not right:
+            sizes = ", ".join("any" if e["size"] is None else f"{e['size']:.2f}" for e in entry["effects"])
+            place = answer["where"][0]["component"] if answer["where"] else "-"
+            said_so = " + ".join(said) or answer["verdict"]
+            lines.append(
+                f"{number:03d} {entry['sort']}, {entry['test']}: {' + '.join(truth) or 'nothing'} (size {sizes or '-'}) -> "
+                f"{said_so} [{answer['verdict']}, at {place}]"
+            )
+    return lines
+
+
+def table(result: Result) -> str:
+    """The score as text."""
+    lines = [f"seed {result.seed}, {len(result.key)} cases, commitment {result.commitment}", ""]
+    for row in rows(result):
+        interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]" if row.low is not None and row.high is not None else ""
+        lines.append(f"{row.measure:58s} {row.value:24s} {interval:16s} {row.goal}".rstrip())
+    lines += ["", "not answered right:", *misses(result)]
+    return "\n".join(lines)
+
+
+def document(result: Result) -> dict[str, Any]:
+    """The score for other programs."""
+    return {
+        "seed": result.seed,
+        "cases": len(result.key),
+        "commitment": result.commitment,
+        "rows": [asdict(row) for row in rows(result)],
+        "misses": misses(result),
+    }

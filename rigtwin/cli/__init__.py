@@ -1,0 +1,75 @@
+"""The command line. Parsing only; each command's work is imported when it is asked for, so that help is instant."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from rigtwin.cli.arguments import diagnosing, recordings, studying, testing
+from rigtwin.cli.arguments.shared import added
+from rigtwin.errors import RigtwinError
+
+OVERVIEW = """\
+The digital twin of a hybrid suspension rig, and the tool that says why the twin and the rig disagree.
+
+a first session:
+  rigtwin list                                  what can be run
+  rigtwin run drop --out drop.mcap              run it on the twin, record it
+  rigtwin info drop.mcap                        what is in a recording
+  rigtwin plot drop.mcap -o drop.png            look at it
+  rigtwin video drop.mcap -o drop.mp4           watch it
+  rigtwin compare rig.mcap                      where a recording of the rig and the twin disagree
+  rigtwin diagnose rig.mcap --html why.html     why
+
+on the real rig: docs/rig.md
+your own machine: docs/tutorial.md
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter)
+    top.add_argument("--version", action="store_true", help="print the version and stop")
+    command = added(top.add_subparsers(dest="command", metavar="command"))
+    for group in (testing, recordings, diagnosing, studying):
+        group.add(command)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a test that tripped,
+    130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that cannot show a sign gets a question mark, not the end of the program.
+            stream.reconfigure(errors="replace")
+    parser = _parser()
+    parsed = parser.parse_args(arguments)
+    if parsed.version:
+        print(f"rigtwin {import_module('rigtwin').__version__}")
+        return 0
+    if parsed.command is None:
+        parser.error("a command is missing; rigtwin --help lists them")
+    try:
+        return import_module("rigtwin.cli.commands").COMMANDS[parsed.command](parsed)
+    except RigtwinError as error:
+        print(f"rigtwin: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 1
+    except OSError as error:
+        print(f"rigtwin: {error.strerror or error}", file=sys.stderr)
+        return 1
+    except MemoryError:
+        print("rigtwin: not enough memory for that; make the test shorter", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("rigtwin: interrupted", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

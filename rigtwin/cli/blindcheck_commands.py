@@ -1,0 +1,64 @@
+"""`rigtwin blindcheck`: the withheld-effect check, and the check that tuning on a diagnosis pays."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+
+from tqdm import tqdm
+
+from rigtwin.console import writable, write_json
+from rigtwin.errors import RigtwinError
+from rigtwin.studies.sweep import Store, Workers, hired
+
+RIGS = 8
+"""Of a check of tuning, unless said."""
+CASES = 200
+
+
+def blindcheck(parsed: Namespace) -> int:
+    """Runs the check that was asked for and prints its score."""
+    if (parsed.cases is not None and parsed.cases < 1) or parsed.seed < 0:
+        raise RigtwinError("--cases must be at least 1, --seed at least 0")
+    if parsed.json is not None:
+        writable(parsed.json)
+    with hired(parsed.workers, parsed.cluster) as workers:
+        return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
+
+
+def _diagnoses(parsed: Namespace, workers: Workers) -> int:
+    from referee.check import check
+    from referee.score import document, table
+
+    cases = CASES if parsed.cases is None else parsed.cases
+    with tqdm(total=2 * cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar:
+        result = check(parsed.folder, cases, parsed.seed, parsed.baselines, workers, bar.update)
+    print(table(result))
+    if parsed.json is not None:
+        write_json(parsed.json, document(result))
+    return 0
+
+
+def _tuning(parsed: Namespace, workers: Workers) -> int:
+    from referee.tuning import Case, checked, document, text
+    from rigtwin.studies.tuning.bench import Bench
+    from rigtwin.studies.tuning.reading import find
+
+    study = find(parsed.tune)
+    if len(study.minimise) != 1 or study.minimise[0].more:
+        raise RigtwinError(f"--tune {parsed.tune}: expected a study with one objective that is of the test itself")
+    cases = RIGS if parsed.cases is None else parsed.cases
+    total = (cases + 1) * (study.evaluations + 1) * study.roads + cases * (1 + 3 * study.held_out)
+    with (
+        Store(parsed.folder / f"tuning-{study.name}.sqlite") as store,
+        tqdm(total=total, disable=None, unit="run", leave=False, file=sys.stderr) as bar,
+    ):
+
+        def said(case: Case) -> None:
+            bar.write(f"rig {case.number + 1}: withheld {case.defect}; diagnosed: {case.found}", file=sys.stdout)
+
+        found = checked(Bench(study, store, workers, bar.update), cases, parsed.seed, bar.set_description, said)
+    print(text(study, found))
+    if parsed.json is not None:
+        write_json(parsed.json, document(study, found))
+    return 0

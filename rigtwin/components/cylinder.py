@@ -1,0 +1,80 @@
+"""Hydraulic cylinders under position control: H(s) scaled to unit static gain, sampled exactly for a held command, then a
+limit of the speed. MJCF has no actuator of fourth order, so this runs beside MuJoCo and prescribes the plates' motion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import expm
+
+from controllers.compiled import compilable
+from rigtwin.components.parameters import Cylinder
+from rigtwin.numerics.arrays import Array
+
+
+class CylinderModel(NamedTuple):
+    """Sampled cylinder: z⁺ = transition·z + entry·command; y⁺ = ahead·z + direct·command; the plate follows y⁺ by at most
+    `step` metres. Shapes (4, 4), (4,), (4,), scalar, scalar."""
+
+    transition: Array
+    entry: Array
+    ahead: Array
+    direct: float
+    step: float
+
+
+class CylinderState(NamedTuple):
+    """filter: states z of H(s), shape (4,); position: of the plate in m, shape (1,). Changed in place."""
+
+    filter: Array
+    position: Array
+
+
+def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
+    """Controllable form (A, B, C) of H(s)/H(0); shapes (4, 4), (4,), (4,)."""
+    a = np.diag(np.ones(3), 1)
+    a[3] = [-cylinder.a0, -cylinder.a1, -cylinder.a2, -cylinder.a3]
+    b = np.array([0.0, 0.0, 0.0, 1.0])
+    c = np.array([cylinder.b0, cylinder.b1, cylinder.b2, 0.0]) * (cylinder.a0 / cylinder.b0)
+    return a, b, c
+
+
+@lru_cache(maxsize=64)
+def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
+    """The cylinder sampled at `timestep` (s) with its command held; not to be changed.
+
+    Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down rigs that run beside.
+    """
+    a, b, c = continuous(cylinder)
+    both = np.zeros((5, 5))
+    both[:4, :4], both[:4, 4] = a, b
+    step = expm(both * timestep)
+    transition, entry = np.ascontiguousarray(step[:4, :4]), np.ascontiguousarray(step[:4, 4])
+    return CylinderModel(transition, entry, c @ transition, float(c @ entry), cylinder.speed_limit * timestep)
+
+
+def settled(cylinder: Cylinder, position: float) -> CylinderState:
+    """At rest at `position` (m) under a command of that value."""
+    return CylinderState(np.array([position / cylinder.a0, 0.0, 0.0, 0.0]), np.array([position]))
+
+
+@compilable
+def next_position(model: CylinderModel, state: CylinderState, command: float) -> float:
+    """Plate position one timestep ahead, m; changes nothing."""
+    wanted = model.direct * command
+    for i in range(4):
+        wanted += model.ahead[i] * state.filter[i]
+    here = state.position[0]
+    return here + min(max(wanted - here, -model.step), model.step)
+
+
+@compilable
+def advance_cylinder(model: CylinderModel, state: CylinderState, command: float) -> None:
+    """One timestep, in place."""
+    state.position[0] = next_position(model, state, command)
+    z0, z1, z2, z3 = state.filter[0], state.filter[1], state.filter[2], state.filter[3]
+    for i in range(4):
+        row = model.transition[i]
+        state.filter[i] = row[0] * z0 + row[1] * z1 + row[2] * z2 + row[3] * z3 + model.entry[i] * command

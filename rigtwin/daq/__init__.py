@@ -1,6 +1,0 @@
-"""The rig behind a data acquisition card: which signal is on which line, volts, the card itself, and a virtual one."""
-
-from pathlib import Path
-
-CARD = Path(__file__).parents[2] / "machines" / "cards" / "pci-6229.toml"
-"""The packaged channel table."""

@@ -1,0 +1,188 @@
+"""How far a correction shrinks the gap, on data that it was not fitted to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import Interval
+from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
+from rigtwin.machine.effects import Effect
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+
+BLOCK = 0.5
+"""s; within it what a test leaves hangs together, so it is drawn as a whole."""
+DRAWS = 1000
+SEED = 20
+"""Of the bootstrap's draws."""
+WORSE = 1.05
+"""Times the gap without it from which a correction is rejected."""
+BETTER = 0.995
+"""The same for a rough model."""
+TAPER = 0.1
+"""s, over which a part of a recording begins and ends to count."""
+
+
+Effects = tuple[Effect, ...]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Power of what is left, in units of the sensors' white noise power, by blocks of time: with the nominal plant and with the
+    corrected one. Shape (blocks,) each."""
+
+    before: Array
+    after: Array
+
+    def joined(self, other: Blocks) -> Blocks:
+        return Blocks(np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after]))
+
+
+def power(evidence: Evidence, plant: Any) -> list[Array]:
+    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
+    found = []
+    for each, predicted in zip(evidence.lines, evidence.predicted(plant), strict=True):
+        relative = (each.measured - predicted) / each.noise[:, None]
+        found.append(np.mean(relative**2, axis=0))
+    return found
+
+
+def blocks(evidence: Evidence, before: Any, after: Any, counted: Sequence[Array]) -> Blocks:
+    """The blocks of the parts that count."""
+    pairs: tuple[list[float], list[float]] = ([], [])
+    for recording, part, each, one, other in zip(
+        evidence.recordings, counted, evidence.lines, power(evidence, before), power(evidence, after), strict=True
+    ):
+        length = max(1, round(BLOCK / recording.period))
+        weight = part * (each.fade.max(axis=0) > 0.5)
+        for start in range(0, len(one) - length + 1, length):
+            if weight[start : start + length].min() > 0.5:
+                pairs[0].append(float(np.mean(one[start : start + length])))
+                pairs[1].append(float(np.mean(other[start : start + length])))
+    return Blocks(np.array(pairs[0]), np.array(pairs[1]))
+
+
+def shrinkage(before: float, after: float) -> float:
+    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's; negative if worse."""
+    gap, left = math.sqrt(max(before - 1.0, 0.0)), math.sqrt(max(after - 1.0, 0.0))
+    return 1.0 - left / gap if gap > 0.0 else 0.0
+
+
+def interval(of: Blocks) -> Interval:
+    """The shrinkage over blocks, with its 95 % interval by drawing blocks anew."""
+    if not len(of.before):
+        return Interval(0.0, 0.0, 0.0)
+    random = np.random.default_rng(SEED)
+    drawn = random.integers(0, len(of.before), (DRAWS, len(of.before)))
+    before, after = of.before[drawn].mean(axis=1), of.after[drawn].mean(axis=1)
+    values = [shrinkage(b, a) for b, a in zip(before, after, strict=True)]
+    low, high = np.quantile(values, [0.025, 0.975])
+    return Interval(shrinkage(float(of.before.mean()), float(of.after.mean())), float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
+    halves: the fits to each half of the recordings, where they were made."""
+
+    predicted: float
+    held_out: Interval
+    kept: tuple[Effect, ...]
+    rejected: tuple[Effect, ...]
+    data: str
+    halves: tuple[Fit, ...] = ()
+    fit: Fit | None = None
+
+
+def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
+    """Two ways to count ticks: the first and the second half of every recording."""
+    first, second = [], []
+    for recording in recordings:
+        time = np.arange(recording.ticks) * recording.period
+        middle = 0.5 * recording.ticks * recording.period
+        rise = np.clip((time - middle) / TAPER + 0.5, 0.0, 1.0)
+        second.append(0.5 - 0.5 * np.cos(np.pi * rise))
+        first.append(1.0 - second[-1])
+    return first, second
+
+
+def _refitted(evidence: Evidence, fit: Fit) -> Fit:
+    return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
+
+
+def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
+    """The halves of the recordings, and the fit made again to each."""
+    parts = halves(evidence.recordings)
+    return parts, [
+        _refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts
+    ]
+
+
+def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judged:
+    """Judges a fit on evidence held out of it; without any, on each half of the recordings after a fit to the other."""
+    # Where much is left, an effect must help to stay.
+    worse = BETTER if evidence.machine.rough else WORSE
+    everything = [np.ones(recording.ticks) for recording in evidence.recordings]
+    if other is not None:
+        inside = blocks(evidence, evidence.plant, fit.plant, everything)
+        predicted = shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0
+        whole = [np.ones(recording.ticks) for recording in other.recordings]
+        data = f"{len(whole)} held-out recording{'s' if len(whole) > 1 else ''}"
+
+        def outside(plant: Any) -> Blocks:
+            return blocks(other, evidence.plant, plant, whole)
+
+        def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
+            return outside(with_effects(evidence.plant, fit, kept))
+
+        kept, rejected = gated(fit.effects, kept_outside, worse)
+        if rejected and evidence.machine.rough:
+            values = [own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept]
+            fit = Fitter(evidence).settled(Fitter(evidence).refined(kept, values))
+        apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
+        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit)
+    parts, fits = _halved(evidence, fit)
+    predictions, outcomes = [], []
+    for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
+        inside = blocks(evidence, evidence.plant, refitted.plant, own)
+        predictions.append(shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0)
+        outcomes.append((refitted, foreign))
+
+    def across(kept: tuple[Effect, ...]) -> Blocks:
+        found = [
+            blocks(evidence, evidence.plant, with_effects(evidence.plant, refitted, kept), part) for refitted, part in outcomes
+        ]
+        return found[0].joined(found[1])
+
+    kept, rejected = gated(fit.effects, across, worse)
+    data = "each half, fitted to the other"
+    return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits))
+
+
+def with_effects(plant: Any, fit: Fit, kept: Sequence[Effect]) -> Any:
+    """The plant with those of a fit's effects that are kept."""
+    pairs = [(effect, values) for effect, values in zip(fit.effects, fit.values, strict=True) if effect in kept]
+    return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
+
+
+def gated(effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE) -> tuple[Effects, Effects]:
+    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
+    of the effects."""
+    kept = effects
+    while kept:
+        left = across(kept)
+        if not len(left.after):
+            break
+        # One that is far off spoils the others' standing: the worst goes first.
+        without = {effect: across(tuple(other for other in kept if other != effect)) for effect in kept}
+        worst = min(kept, key=lambda effect: float(without[effect].after.mean()))
+        if float(left.after.mean()) <= worse * float(without[worst].after.mean()):
+            break
+        kept = tuple(other for other in kept if other != worst)
+    return kept, tuple(effect for effect in effects if effect not in kept)

@@ -1,0 +1,202 @@
+"""Effects found one after another: the best explanation gets one more, as long as that explains enough of what is left.
+
+What is found first may only resemble what is there, so two leaders are followed: the best of all, and the best with dry
+friction, without which a play, a spring or a Stribeck peak is nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from rigtwin.components.parts import Guide
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values, without_each
+from rigtwin.machine.effects import Effect
+
+PRICE = 8.0
+"""Of each parameter, in χ²: a simpler explanation is preferred."""
+WITHIN_TOLERANCE = 1.5
+"""Tolerances below which a deviation is no finding."""
+CONTAINED = {"two_lags": "lag"}
+"""Kind → the simpler one that it becomes at the end of its range."""
+SLIGHT = 1e-3
+"""Share of what is explained by which it must do better."""
+TRIED, SETTLED = 8, 3
+"""Further effects that are fitted beside a leader, and those fitted again with the tolerances taken at them."""
+REPLACED = 6
+"""Explanations with one effect replaced that are settled at most."""
+GATEWAY = "coulomb"
+"""Kind without which others do nothing."""
+SECOND = 2.0
+"""Times what a first effect must explain that each further one must."""
+NEAR = 0.2
+"""Share of what is explained that an explanation with one effect replaced may lack."""
+SECOND_ORDER = ("two_lags", "resonance")
+"""Kinds that a lag and a delay may be taken for."""
+BEHIND = ("compliance", "backlash")
+"""Kinds that hide their gateway."""
+
+
+def priced(fit: Fit) -> float:
+    return fit.misfit + PRICE * sum(len(effect.kind.parameters) for effect in fit.effects)
+
+
+def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
+    """The fits less those in which a simpler effect would do as well."""
+    misfits = {frozenset((e.kind.name, e.group) for e in fit.effects): fit.misfit for fit in tried}
+    most = max((fit.misfit for fit in tried), default=0.0)
+    found = []
+    for fit in tried:
+        names = {(e.kind.name, e.group) for e in fit.effects}
+        simpler = [
+            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)}) for kind, group in names if kind in CONTAINED
+        ]
+        enough = max(least, SLIGHT * (most - fit.misfit))
+        if not any(other in misfits and misfits[other] - fit.misfit < enough for other in simpler):
+            found.append(fit)
+    return found
+
+
+def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
+    """Whether one of the effects is no more than its declared tolerance."""
+    return any(_tolerated(effect, values[0], evidence) for effect, values in zip(fit.effects, fit.values, strict=True))
+
+
+def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
+    parameter = effect.kind.parameters[0]
+    tolerance = evidence.machine.tolerance_of(effect.group, parameter)
+    if tolerance is None:
+        return False
+    width = evidence.width(tolerance)
+    if tolerance.relative:
+        width = tolerance.half_width * abs(effect.nominal(evidence.plant)[parameter])
+    return abs(value - effect.nominal(evidence.plant)[parameter]) <= WITHIN_TOLERANCE * width
+
+
+Start = tuple[tuple[Effect, ...], Values]
+"""Effects, and values to start from."""
+Mapped = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What a search needs. search, fitter: on coarse and on fine evidence; least: χ² of a finding; more: share of what is left
+    that each further effect must explain; most: effects."""
+
+    search: Fitter
+    fitter: Fitter
+    effects: Sequence[Effect]
+    least: float
+    more: float
+    most: int
+
+
+def grown(tried: Sequence[Fit], first: Fit, growth: Growth, mapped: Mapped) -> tuple[list[Fit], list[Fit]]:
+    """(further fits, the chain of fits that leads to the best one, from its first effect on). tried: of one and two."""
+    found: list[Fit] = []
+    before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
+    level = sorted(plain([fit for fit in tried if len(fit.effects) == 2], growth.least), key=priced)
+    while level and len(level[0].effects) < growth.most:
+        following: list[Fit] = []
+        for leader in _leaders(level):
+            further = _extended(leader, growth, mapped)
+            before |= {id(fit): leader for fit in further}
+            following += further
+        found += following
+        level = sorted(plain(following, growth.least), key=priced)
+    best = min(plain([*tried, *found], growth.least), key=priced)
+    if len(best.effects) > 1:
+        replaced = _replaced(best, [*tried, *found], growth, mapped)
+        # One that came of another's chain is no step of its own.
+        before |= {id(fit): before[id(best)] for fit in replaced if id(best) in before}
+        found += replaced
+        best = min(plain([best, *replaced], growth.least), key=priced)
+        for fit in _pruned(best, growth):
+            before[id(fit)] = best
+            found.append(fit)
+            best = fit
+    chain = [best]
+    while id(chain[0]) in before:
+        chain.insert(0, before[id(chain[0])])
+    return found, chain
+
+
+def _leaders(level: Sequence[Fit]) -> list[Fit]:
+    """The best, and the best with a gateway effect if it has none."""
+    through = [fit for fit in level if any(effect.kind.name == GATEWAY for effect in fit.effects)]
+    return list({id(fit): fit for fit in (level[0], *through[:1])}.values())
+
+
+def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
+    """Fits of one effect more that explain enough of what a leader leaves."""
+    evidence = growth.fitter.evidence
+    hopes = sorted(growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised)[:TRIED]
+    found = mapped(lambda hope: growth.search.refined(hope.effects, hope.values, hope.space), hopes)
+    found += mapped(lambda start: growth.search.refined(*start), [*_through(leader, growth), *_unfolded(leader, growth)])
+    found = mapped(growth.fitter.settled, sorted(found, key=priced)[:SETTLED])
+    # What the noise of a measured motion makes of friction at its reversals is no further effect.
+    left = max(leader.misfit - evidence.expected_at(leader.plant), 0.0)
+    enough = max(SECOND * growth.least, growth.more * left)
+    accepted = []
+    for fit in found:
+        further = len(fit.effects) - len(leader.effects)
+        if leader.misfit - fit.misfit > further * enough and not within_tolerance(fit, evidence):
+            accepted.append(fit)
+    return accepted
+
+
+def _through(leader: Fit, growth: Growth) -> list[Start]:
+    """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly resembles friction alone."""
+    search, found = growth.search, []
+    for gate in growth.effects:
+        if gate.kind.name != GATEWAY or gate.of is not Guide or clashing(gate, leader.effects):
+            continue
+        for other in growth.effects:
+            if other.group != gate.group or other.kind.name not in BEHIND or len(leader.effects) + 2 > growth.most:
+                continue
+            found.append(_beside(search, leader.effects, leader.values, (gate, other)))
+    return found
+
+
+def _beside(search: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]) -> Start:
+    """A pair of effects beside others, with the best of all pairs of their starts."""
+    both = (*effects, *pair)
+    one, two = (search.trials(effect).starts for effect in pair)
+    starts = [(*values, *start) for start in product(one, two)]
+    residuals = (search.evidence.residual(with_values(search.plant, both, start)) for start in starts)
+    return both, min((search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True))[1]
+
+
+def _unfolded(leader: Fit, growth: Growth) -> list[Start]:
+    """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
+    found = []
+    for effect, rest, values in without_each(leader):
+        pair = [each for each in growth.effects if each.group == effect.group and each.kind.name in ("lag", "delay")]
+        if effect.kind.name in SECOND_ORDER and len(pair) == 2 and not any(clashing(each, rest) for each in pair):
+            found.append(_beside(growth.search, rest, values, (pair[0], pair[1])))
+    return found
+
+
+def _pruned(best: Fit, growth: Growth) -> list[Fit]:
+    """The fit with one effect after another taken out that explains nothing any more, now that the others are there."""
+    found: list[Fit] = []
+    while len(best.effects) > 1:
+        fewer = [(rest, values) for _, rest, values in without_each(best) if possible(rest, growth.fitter.plant)]
+        tries = [growth.fitter.refined(*each) for each in fewer]
+        simpler = min(tries, key=priced, default=best)
+        if simpler is best or simpler.misfit - best.misfit > growth.least:
+            break
+        best = growth.fitter.settled(simpler)
+        found.append(best)
+    return found
+
+
+def _replaced(best: Fit, tried: Sequence[Fit], growth: Growth, mapped: Mapped) -> list[Fit]:
+    """What may stand in each effect's place, now that the others are known."""
+    known = {frozenset(fit.effects) for fit in tried}
+    alike = [pair for pair in growth.search.alike(best, growth.effects) if frozenset(pair[0]) not in known]
+    others = sorted(mapped(lambda pair: growth.search.refined(*pair), alike), key=priced)
+    far = best.misfit + NEAR * max(growth.fitter.nothing.misfit - best.misfit, 0.0)
+    return mapped(growth.fitter.settled, [fit for fit in others[:REPLACED] if fit.misfit < far])

@@ -1,0 +1,108 @@
+"""Where an effect acts that nobody has a name for: which component, disturbed in any way it could be, explains most.
+
+Each component gets a set of disturbances at its place, functions of what it goes through: its motion, speed, force, the time.
+Their strengths are fitted together, linearly. A sensor's disturbance shows in that sensor alone; an actuator's moves all that
+hangs on it; a force on what moves shows wherever that motion is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.fit import Space
+from rigtwin.machine.effects import Effect
+from rigtwin.numerics.arrays import Array
+
+PRICE = 20.0
+"""Of each disturbance, in χ²."""
+ROUNDS = 4
+"""Times that a disturbance is fitted anew at what was found."""
+FOLLOWED = 6
+"""Components that are fitted so; those that come last at first stay there."""
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the disturbance goes with, the
+    strongest first."""
+
+    component: str
+    misfit: float
+    forms: tuple[str, ...]
+
+
+class _Disturbance:
+    """All forms of one component's disturbance in every recording, and what they do."""
+
+    def __init__(self, component: str, evidence: Evidence, plant: Any) -> None:
+        forms = list(zip(*(each.forms(component, plant) for each in evidence.plants), strict=True))
+        self.component, self.names = component, [same[0].name for same in forms]
+        self._evidence, self._plant = evidence, plant
+        self._enter = forms[0][0].entry
+        strength = max(each.strength(self._enter) for each in evidence.plants)
+        sizes = [float(np.sqrt(np.mean(np.concatenate([form.signal for form in same]) ** 2))) for same in forms]
+        # One row a form, one column a tick; each of the same strength.
+        self._forms = [
+            np.stack([strength / max(size, 1e-300) * same[number].signal for same, size in zip(forms, sizes, strict=True)])
+            for number in range(len(evidence.plants))
+        ]
+
+    def predicted(self, strengths: Array) -> list[Array]:
+        """The signals under the disturbance, shape (rows, ticks) for each recording."""
+        return [
+            each.disturbed(self._plant, self._enter, strengths @ forms)
+            for each, forms in zip(self._evidence.plants, self._forms, strict=True)
+        ]
+
+    def fitted(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
+        """Gauss-Newton: misfit, strengths, and what would be missing without each form."""
+        here = np.zeros(len(self.names))
+        predicted = self.predicted(here)
+        residual = self._evidence.unlike(predicted)
+        misfit, worth = space.misfit(residual), np.zeros_like(here)
+        for _ in range(rounds):
+            columns = []
+            for number in range(len(here)):
+                there = here.copy()
+                there[number] += 1.0
+                columns.append(self._evidence.whitened([b - a for a, b in zip(predicted, self.predicted(there), strict=True)]))
+            normal, gradient = space.normal_equations(np.stack(columns, axis=1), residual)
+            normal += np.diag(1e-6 * np.diag(normal) + 1e-9)
+            move = np.linalg.solve(normal, gradient)
+            gained = 0.0
+            for share in (1.0, 0.5, 0.2):
+                tried = self.predicted(here + share * move)
+                left = self._evidence.unlike(tried)
+                if (value := space.misfit(left)) < misfit:
+                    gained = misfit - value
+                    here, predicted, residual, misfit = here + share * move, tried, left, value
+                    break
+            worth = here**2 / np.diag(np.linalg.inv(normal))
+            if gained < 0.02 * misfit:
+                break
+        return misfit, here, worth
+
+
+def located(evidence: Evidence, plant: Any, effects: Sequence[Effect] = (), follow: bool = True) -> tuple[Disturbed, ...]:
+    """Every component disturbed freely, the one that explains most first. plant: with the effects that are known already;
+    follow: fit the foremost anew at what was found, as large disturbances need."""
+    space = Space(evidence, plant, None, effects)
+    disturbances = [_Disturbance(component, evidence, plant) for component in evidence.plants[0].places()]
+    found = sorted((_found(each, space, 1) for each in disturbances), key=lambda each: each.misfit)
+    if follow:
+        foremost = [each.component for each in found[:FOLLOWED]]
+        again = [_found(each, space, ROUNDS) for each in disturbances if each.component in foremost]
+        found = sorted([*again, *found[FOLLOWED:]], key=lambda each: each.misfit)
+    return tuple(found)
+
+
+def _found(disturbance: _Disturbance, space: Space, rounds: int) -> Disturbed:
+    misfit, _, worth = disturbance.fitted(space, rounds)
+    order = np.argsort(-worth)
+    forms = tuple(dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE))
+    return Disturbed(disturbance.component, misfit + PRICE * len(disturbance.names), forms)

@@ -1,0 +1,114 @@
+"""Makes a card's outputs safe when the process that owned them is dead or hangs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from rigtwin.hardware.daq.card import INPUTS, OUTPUTS, PRESSURE, CardFault, connected, translated
+from rigtwin.hardware.daq.conversion import conversion, to_volts
+from rigtwin.hardware.daq.table import ChannelTable
+
+
+class LastResort:
+    """On a gRPC device server the owner's outputs are found by their name, which can be done beforehand. A driver on this
+    computer gives them back when it sees that their owner is dead; then they are taken anew."""
+
+    def __init__(self, table: ChannelTable) -> None:
+        self._table, self._conversion = table, conversion(table.outputs)
+        self._outputs: Any = None
+        self._pressure: Any = None
+        self._tasks: list[Any] = []
+        self._values, self._volts = np.zeros(3), np.empty(3)
+        to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
+
+        connected(table.address)  # loads the driver's client, which takes a while
+
+    def prepare(self) -> None:
+        """Called once the owner has its outputs. Raises CardFault."""
+        if self._table.address:
+            with translated(f"card {self._table.device}: watching it"):
+                self._attach()
+
+    def force_off(self, positions: Sequence[float]) -> None:
+        """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
+        self._values[:2] = positions
+        to_volts(self._conversion, self._values, self._volts)
+        with translated(f"card {self._table.device}: stopping it"):
+            if self._outputs is None:
+                self._take()
+            assert self._outputs is not None
+            self._outputs.write_one_sample(self._volts)
+
+    def pressure_off(self) -> None:
+        """Raises CardFault."""
+        with translated(f"card {self._table.device}: taking its pressure off"):
+            if self._pressure is None:
+                self._take()
+            assert self._pressure is not None
+            self._pressure.write_one_sample_one_line(False)
+
+    def close(self) -> None:
+        """Gives the lines back."""
+        for task in self._tasks:
+            with suppress(Exception):
+                task.stop()
+            with suppress(Exception):
+                task.close()
+        self._tasks, self._outputs, self._pressure = [], None, None
+
+    def _attach(self) -> None:
+        from nidaqmx import Task
+        from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
+
+        channel, attach = connected(self._table.address), SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
+        assert channel is not None
+        for name in (OUTPUTS, PRESSURE, INPUTS):
+            options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
+            self._tasks.append(Task(name, grpc_options=options))
+        self._writers(started=True)
+
+    def _take(self) -> None:
+        from nidaqmx import Task
+
+        self.close()
+        channel = connected(self._table.address)
+        names = (f"{OUTPUTS}-again", f"{PRESSURE}-again")
+        if channel is None:
+            outputs, pressure = (Task(name) for name in names)
+        else:
+            from nidaqmx.grpc_session_options import GrpcSessionOptions
+
+            outputs, pressure = (Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names)
+        self._tasks = [outputs, pressure]
+        for line in self._table.outputs:
+            volts = line.scaling.range
+            outputs.ao_channels.add_ao_voltage_chan(self._table.physical(line.line), min_val=-volts, max_val=volts)
+        pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
+        self._writers(started=False)
+
+    def _writers(self, started: bool) -> None:
+        from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
+
+        self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)
+        self._pressure = DigitalSingleChannelWriter(self._tasks[1].out_stream)
+        self._outputs.verify_array_shape = self._pressure.verify_array_shape = False
+        self._outputs.auto_start = self._pressure.auto_start = not started
+
+
+def release(table: ChannelTable) -> bool:
+    """Frees what a program that died has left on a gRPC device server: motor to zero, pressure off, its tasks ended. Returns
+    whether there was anything. Raises CardFault if the outputs could not be set."""
+    resort = LastResort(table)
+    try:
+        resort.prepare()
+        left = True
+    except CardFault:
+        left = False
+    resort.pressure_off()
+    resort.force_off((0.0, 0.0))
+    resort.close()
+    return left

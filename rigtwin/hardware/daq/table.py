@@ -1,0 +1,236 @@
+"""The channel table: which signal is on which line of the card, and what a volt means there. One TOML file a card.
+
+value = sign · scale · volts + offset, in both directions.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+from controllers import Measurements
+from controllers.quantity import Quantity, fields
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Safety, checked, read_toml
+from rigtwin.recording.channels import CHANNELS
+
+Group = TypeVar("Group")
+OUTPUTS = ("ground", "structure", "voltage")
+"""Commands that go to the card, in the order of its writes. The force demanded stays inside the controller."""
+UNITS = {(channel.topic, channel.name): channel.unit for channel in CHANNELS}
+HEADROOM = 1.05
+"""A signal must be readable this far beyond its limit: one that stops at its limit can never be seen to exceed it."""
+_ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
+_DIGITAL = re.compile(r"port\d/line\d{1,2}")
+_FREE_TEXT = ("device", "address", "timing", "calibrated", "operator", "note")
+_TIMINGS = ("hardware", "software")
+
+
+class Scaling(NamedTuple):
+    """What a volt means on a line."""
+
+    scale: Annotated[float, Quantity("unit/V", 1e-9, 1e9, "calibration")]
+    offset: Annotated[float, Quantity("unit", -1e6, 1e6, "calibration")] = 0.0
+    sign: Annotated[float, Quantity("1", -1.0, 1.0, "which way the cable is connected")] = 1.0
+    range: Annotated[float, Quantity("V", 0.05, 10.0, "of the card's line, both ways")] = 10.0
+
+
+class Plausible(NamedTuple):
+    """What living sensors of one rig cannot do; see rigtwin.simulation.safety. stuck: same readings in a row. Greatest seen on the twin
+    in all experiments: 4 readings, 9.5 mm, 34 N."""
+
+    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "by chance in none of 1800 simulated tests of 45 s")] = 7.0
+    wheel: Annotated[float, Quantity("m", 1e-4, 1e9, "twice what the tyre gives in the experiments")] = 0.02
+    motor: Annotated[float, Quantity("N", 1.0, 1e9, "3 times friction, hum and noise in the experiments")] = 100.0
+
+
+class Line(NamedTuple):
+    """One signal of the rig. line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen the
+    signal move the way that it should."""
+
+    name: str
+    line: str
+    unit: str
+    scaling: Scaling
+    sign_checked: bool
+
+    @property
+    def reach(self) -> float:
+        """The greatest magnitude that fits through the line both ways."""
+        return self.scaling.range * self.scaling.scale - abs(self.scaling.offset)
+
+
+@dataclass(frozen=True)
+class ChannelTable:
+    """A card's channel table. inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
+    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty for this computer's
+    driver."""
+
+    inputs: tuple[Line, ...]
+    outputs: tuple[Line, ...]
+    pressure: str
+    plausible: Plausible
+    device: str = "Dev1"
+    address: str = ""
+    timing: str = "hardware"
+    calibrated: str = ""
+    operator: str = ""
+    note: str = ""
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        return self.inputs + self.outputs
+
+    def physical(self, line: str) -> str:
+        """The driver's name of a line."""
+        return f"{self.device}/{line}"
+
+    def of(self, safety: Safety) -> Safety:
+        """The limits with what the card knows of its sensors, or those asked for, if they are closer."""
+        return safety._replace(**{name: min(value, getattr(safety, name)) for name, value in self.plausible._asdict().items()})
+
+
+def load_table(path: Path) -> ChannelTable:
+    """Reads a channel table. Raises RigtwinError naming file and fault."""
+    return read_toml(path, parsed)
+
+
+def parsed(tables: Mapping[str, Any]) -> ChannelTable:
+    """The channel table of TOML's tables. Raises RigtwinError for anything missing, unknown or twice."""
+    known = ("card", "plausible", "inputs", "outputs")
+    for name in tables:
+        if name not in known:
+            raise RigtwinError(
+                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], [outputs.NAME]"
+            )
+    card = tables.get("card", {})
+    if not isinstance(card, Mapping):
+        raise RigtwinError("card: expected a table, [card]")
+    for key, value in card.items():
+        if key not in (*_FREE_TEXT, "pressure"):
+            raise RigtwinError(f"unknown setting card.{key}; [card] has {', '.join((*_FREE_TEXT, 'pressure'))}")
+        if not isinstance(value, str):
+            raise RigtwinError(f"card.{key} = {value!r}: expected text")
+    pressure = card.get("pressure", "")
+    if not _DIGITAL.fullmatch(pressure):
+        raise RigtwinError(f"card.pressure = {pressure!r}: expected the hydraulics' digital line, such as 'port0/line0'")
+    timing = card.get("timing", "hardware")
+    if timing not in _TIMINGS:
+        raise RigtwinError(f"card.timing = {timing!r}: expected {' or '.join(_TIMINGS)}")
+    if not re.fullmatch(r"[A-Za-z][\w-]*", card.get("device", "Dev1")):
+        raise RigtwinError(f"card.device = {card['device']!r}: expected the driver's name of the card, such as 'Dev1'")
+    inputs = _lines("inputs", tables.get("inputs", {}), Measurements._fields, "/sensor")
+    outputs = _lines("outputs", tables.get("outputs", {}), OUTPUTS, "/command")
+    taken: dict[str, str] = {}
+    for line in inputs + outputs:
+        if line.line in taken:
+            raise RigtwinError(f"{taken[line.line]} and {line.name} are both on line {line.line}; expected a line each")
+        taken[line.line] = line.name
+    texts = {key: card[key] for key in _FREE_TEXT if key in card}
+    return ChannelTable(inputs, outputs, pressure, _numbers("plausible", tables.get("plausible", {}), Plausible), **texts)
+
+
+def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"{where} = {table!r}: expected a table")
+    meanings = fields(kind)  # type: ignore[arg-type]
+    for key in table:
+        if key not in meanings:
+            raise RigtwinError(f"unknown setting {where}.{key}; there are {', '.join(meanings)}")
+    return kind(**{key: checked(f"{where}.{key}", value, meanings[key]) for key, value in table.items()})
+
+
+def _lines(group: str, tables: Any, names: tuple[str, ...], topic: str) -> tuple[Line, ...]:
+    if not isinstance(tables, Mapping):
+        raise RigtwinError(f"{group}: expected tables, such as [{group}.{names[0]}]")
+    for name in tables:
+        if name not in names:
+            raise RigtwinError(f"unknown signal [{group}.{name}]; there are {', '.join(names)}")
+    for name in names:
+        if name not in tables:
+            raise RigtwinError(f"[{group}.{name}] is missing; each of {', '.join(names)} needs its line")
+    return tuple(_line(group, name, tables[name], UNITS[topic, name]) for name in names)
+
+
+def _line(group: str, name: str, table: Any, unit: str) -> Line:
+    where = f"{group}.{name}"
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"{where} = {table!r}: expected a table with line and scale")
+    texts = ("line", "unit", "sign_checked")
+    line = table.get("line")
+    if not isinstance(line, str) or not _ANALOG[group].fullmatch(line):
+        raise RigtwinError(f"{where}.line = {line!r}: expected one such as {'ai0' if group == 'inputs' else 'ao0'!r}")
+    if table.get("unit", unit) != unit:
+        raise RigtwinError(f"{where}.unit = {table['unit']!r}: expected {unit!r}; scale is {unit}/V, offset {unit}")
+    if "scale" not in table:
+        raise RigtwinError(f"{where}.scale is missing: expected {unit} a volt")
+    scaling = _numbers(where, {key: value for key, value in table.items() if key not in texts}, Scaling)
+    if abs(scaling.sign) != 1.0:
+        raise RigtwinError(f"{where}.sign = {scaling.sign:g}: expected 1 or -1")
+    sign_checked = table.get("sign_checked", False)
+    if not isinstance(sign_checked, bool):
+        raise RigtwinError(f"{where}.sign_checked = {sign_checked!r}: expected true or false")
+    return Line(name, line, unit, scaling, sign_checked)
+
+
+def fit(table: ChannelTable, safety: Safety) -> None:
+    """Raises RigtwinError unless every limit lies within what its line can carry."""
+    limits = {
+        "ground_lvdt": ("safety.ground", safety.ground),
+        "structure_lvdt": ("safety.structure", safety.structure),
+        "suspension_lvdt": ("safety.travel", safety.travel),
+        "load_cell": ("safety.force", safety.force),
+        "ground": ("safety.ground", safety.ground),
+        "structure": ("safety.structure", safety.structure),
+    }
+    for line in table.lines:
+        key, limit = limits.get(line.name, ("", 0.0))
+        if line.reach < HEADROOM * limit and line.name in Measurements._fields:
+            raise RigtwinError(
+                f"range too small for the limit: {line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
+                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, or a smaller limit"
+            )
+        if line.reach < limit:
+            raise RigtwinError(
+                f"range too small for the limit: {line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
+                f"{key} is {limit:g} {line.unit}"
+            )
+
+
+def trusted(table: ChannelTable, today: date) -> None:
+    """Raises RigtwinError unless somebody has calibrated this table and checked every sign: needed to move a real rig."""
+    unchecked = [line.name for line in table.lines if not line.sign_checked]
+    if unchecked:
+        raise RigtwinError(f"sign not checked: {', '.join(unchecked)}; rigtwin card check moves each a little and looks")
+    try:
+        calibrated = date.fromisoformat(table.calibrated)
+    except ValueError:
+        raise RigtwinError(f"card.calibrated = {table.calibrated!r}: expected the date of calibration, 2026-01-31") from None
+    if calibrated > today:
+        raise RigtwinError(f"card.calibrated = {table.calibrated}: that is after today, {today}")
+    if not table.operator.strip():
+        raise RigtwinError("card.operator is missing: expected who calibrated it")
+
+
+def written(table: ChannelTable) -> str:
+    """The table as TOML."""
+    lines = ["[card]", f"pressure = {_quoted(table.pressure)}"]
+    lines += [f"{key} = {_quoted(getattr(table, key))}" for key in _FREE_TEXT]
+    lines += ["", "[plausible]", *(f"{key} = {value!r}" for key, value in table.plausible._asdict().items())]
+    for group, signals in (("inputs", table.inputs), ("outputs", table.outputs)):
+        for signal in signals:
+            scaling = signal.scaling
+            lines += ["", f"[{group}.{signal.name}]", f"line = {_quoted(signal.line)}", f"unit = {_quoted(signal.unit)}"]
+            lines += [f"scale = {scaling.scale!r}", f"offset = {scaling.offset!r}", f"sign = {int(scaling.sign)}"]
+            lines += [f"range = {scaling.range!r}"]
+            lines += [f"sign_checked = {str(signal.sign_checked).lower()}"]
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -1,0 +1,159 @@
+"""The twin as it looks at a card's terminals: voltages in, voltages out, and the hydraulics' pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from controllers.compiled import compilable
+from rigtwin.components.parameters import Plant
+from rigtwin.hardware.daq.conversion import Conversion, conversion, digitised, to_values, to_volts, values_of, volts_of
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.realtime import Pacer
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.converters import Sensing, sampled, sensors
+from rigtwin.simulation.plant import Machine, advance, sense
+from rigtwin.simulation.twin import Twin
+
+AHEAD = 256
+"""Ticks for which noise is drawn at a time."""
+
+
+def analogue(plant: Plant) -> Plant:
+    """The plant with sensors that have no bits: those are the card's."""
+    names = Measurements._fields
+    return plant._replace(**{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)})
+
+
+@compilable
+def _sample(machine: Machine, sensing: Sensing, disturbance: Array, inputs: Conversion, truth: Array, volts: Array) -> None:
+    true = sense(machine)
+    measured = sampled(sensing, true, disturbance)
+    for column in range(4):
+        truth[column], volts[column] = true[column], measured[column]
+    volts_of(inputs, volts, volts)
+    digitised(inputs, volts, volts)
+
+
+@kernel
+def _advanced(
+    machine: Machine,
+    sensing: Sensing,
+    disturbance: Array,
+    inputs: Conversion,
+    outputs: Conversion,
+    written: Array,
+    asked: Array,
+    truth: Array,
+    volts: Array,
+) -> None:
+    digitised(outputs, written, asked)
+    values_of(outputs, asked, asked)
+    advance(machine, asked[0], asked[1], asked[2])
+    _sample(machine, sensing, disturbance, inputs, truth, volts)
+
+
+_sampled = kernel(_sample)
+
+
+class Terminals:
+    """A rig at rest, cylinders at zero, no pressure. `wiring` says what a volt truly means on each line, whatever the table of
+    who reads it says. Without pressure the cylinders stay where they are.
+
+    truth: last measurements without noise, before the wiring, shape (4,). asked: what the actuators make of the voltages,
+    shape (3,), in the order of the table's outputs. volts: at the inputs now, as 16 bits hold them, shape (4,).
+    """
+
+    def __init__(self, configuration: Configuration, wiring: ChannelTable, seed: int) -> None:
+        rest = configuration.controller._replace(start=0.0, preload=0.0)
+        twin = Twin(configuration._replace(plant=analogue(configuration.plant), controller=rest), 0.0, seed)
+        self._twin, self._live = twin, twin.simulation.machine
+        self._dead = self._live._replace(
+            ground=self._live.ground._replace(step=0.0), structure=self._live.structure._replace(step=0.0)
+        )
+        self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
+        self.truth, self.volts, self.asked = np.zeros(4), np.empty(4), np.zeros(3)
+        self._noise, self._place = twin.disturbance.take(AHEAD), 0
+        _sampled(self._live, twin.sensing, self._noise[0], self._inputs, self.truth, self.volts)
+
+    def advance(self, written: Array, pressure: bool) -> None:
+        """One period under voltages that the outputs hold, shape (3,), then the next sample."""
+        self._place += 1
+        if self._place == AHEAD:
+            self._noise, self._place = self._twin.disturbance.take(AHEAD), 0
+        _advanced(
+            self._live if pressure else self._dead,
+            self._twin.sensing,
+            self._noise[self._place],
+            self._inputs,
+            self._outputs,
+            written,
+            self.asked,
+            self.truth,
+            self.volts,
+        )
+
+
+class WiredTwin:
+    """The twin as a rig behind the converters of a channel table, without a card: a `DrivenRig`."""
+
+    def __init__(self, terminals: Terminals, table: ChannelTable) -> None:
+        self._terminals, self.missed = terminals, 0
+        self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
+        self._held, self._values, self._commands = np.zeros(3), np.empty(4), np.empty(3)
+        self._pressure, self._fresh = False, True
+
+    @property
+    def truth(self) -> Measurements:
+        """The last measurements without noise."""
+        return Measurements(*self._terminals.truth.tolist())
+
+    def start(self) -> None:
+        """Nothing to do: a twin stands where it was built."""
+
+    def read(self) -> Measurements:
+        if not self._fresh:
+            self._terminals.advance(self._held, self._pressure)
+        self._fresh = False
+        to_values(self._inputs, self._terminals.volts, self._values)
+        return Measurements(*self._values.tolist())
+
+    def write(self, commands: Commands) -> None:
+        self._commands[:] = commands.ground, commands.structure, commands.voltage
+        to_volts(self._outputs, self._commands, self._held)
+
+    def pressure(self, on: bool) -> None:
+        self._pressure = on
+
+    def stop(self) -> None:
+        """Motor to zero, pressure off."""
+        self._commands[:] = 0.0, 0.0, 0.0
+        to_volts(self._outputs, self._commands, self._commands)
+        self._held[2], self._pressure = self._commands[2], False
+
+
+class InRealTime:
+    """A twin that is read in real time: a `DrivenRig` around another."""
+
+    def __init__(self, rig: WiredTwin, period: float) -> None:
+        self._rig, self._pacer, self.missed, self.late = rig, Pacer(period), 0, 0.0
+
+    def start(self) -> None:
+        self._rig.start()
+
+    def read(self) -> Measurements:
+        self.missed, self.late = self._pacer.wait(), self._pacer.late
+        for _ in range(self.missed):
+            self._rig.read()
+        return self._rig.read()
+
+    def write(self, commands: Commands) -> None:
+        self._rig.write(commands)
+
+    def pressure(self, on: bool) -> None:
+        self._rig.pressure(on)
+
+    def stop(self) -> None:
+        self._rig.stop()

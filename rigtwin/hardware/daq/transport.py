@@ -1,0 +1,125 @@
+"""Carries the calls of the unmodified nidaqmx client to a virtual card: in process, or through a socket.
+
+nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a connection that ends in a Python
+object; `serve` listens on a port, so that any NI-DAQmx gRPC client can use the twin as its card.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import grpc
+
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq.virtual import DriverError, VirtualCard
+
+SERVICE = "nidaqmx_grpc.NiDAQmx"
+LOCAL = "localhost"
+
+
+class CardError(grpc.RpcError):
+    """A driver's error as gRPC carries it."""
+
+    def __init__(self, status: grpc.StatusCode, message: str, number: int | None = None) -> None:
+        super().__init__(message)
+        self._status, self._message, self._number = status, message, number
+
+    def code(self) -> grpc.StatusCode:
+        return self._status
+
+    def details(self) -> str:
+        return self._message
+
+    def trailing_metadata(self) -> Any:
+        return [_Entry("ni-error", str(self._number))] if self._number is not None else []
+
+
+class _Entry:
+    def __init__(self, key: str, value: str) -> None:
+        self.key, self.value = key, value
+
+
+class InProcess(grpc.Channel):
+    """A connection to a card in this process. The client's messages are handed over as they are, unserialised."""
+
+    def __init__(self, card: VirtualCard) -> None:
+        self._card = card
+
+    def unary_unary(self, method: str, *_: Any, response_deserializer: Any = None, **__: Any) -> Any:  # type: ignore[override]
+        call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
+
+        def invoke(request: Any, **_: Any) -> Any:
+            try:
+                return card.answer(call, request, response)
+            except DriverError as error:
+                raise CardError(grpc.StatusCode.UNKNOWN, str(error), error.code) from None
+            except RigtwinError as error:
+                raise CardError(grpc.StatusCode.UNIMPLEMENTED, str(error)) from None
+
+        return invoke
+
+    def unary_stream(self, *_: Any, **__: Any) -> Any:
+        """Events are not carried; a client that asks for them is told so when it does."""
+
+        def refuse(*_: Any, **__: Any) -> Any:
+            raise CardError(grpc.StatusCode.UNIMPLEMENTED, "the virtual card sends no events")
+
+        return refuse
+
+    stream_unary = stream_stream = unary_stream
+
+    def subscribe(self, callback: Callable[..., Any], try_to_connect: bool | None = False) -> None: ...
+
+    def unsubscribe(self, callback: Callable[..., Any]) -> None: ...
+
+    def close(self) -> None: ...
+
+    def __enter__(self) -> InProcess:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+class _Calls(grpc.GenericRpcHandler):
+    """Every call of the service, found when it is made."""
+
+    def __init__(self, card: VirtualCard) -> None:
+        from nidaqmx._grpc_interpreter import grpc_types  # only nidaqmx knows the messages of its service
+
+        self._card, self._messages = card, grpc_types
+
+    def service(self, handler_call_details: Any) -> Any:
+        service, _, call = handler_call_details.method.strip("/").partition("/")
+        request, response = (getattr(self._messages, call + ending, None) for ending in ("Request", "Response"))
+        if service != SERVICE or request is None or response is None:
+            return None
+
+        def invoke(message: Any, context: grpc.ServicerContext) -> Any:
+            try:
+                return self._card.answer(call, message, response)
+            except DriverError as error:
+                context.set_trailing_metadata((("ni-error", str(error.code)),))
+                context.abort(grpc.StatusCode.UNKNOWN, str(error))
+            except RigtwinError as error:
+                context.abort(grpc.StatusCode.UNIMPLEMENTED, str(error))
+
+        return grpc.unary_unary_rpc_method_handler(
+            invoke, request_deserializer=request.FromString, response_serializer=response.SerializeToString
+        )
+
+
+def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
+    """Listens on this computer only; port 0 takes a free one. Returns the server and its port. Raises RigtwinError."""
+    logging.getLogger("grpc").setLevel(logging.CRITICAL)
+    server = grpc.server(ThreadPoolExecutor(max_workers=8), handlers=[_Calls(card)], options=(("grpc.so_reuseport", 0),))
+    try:
+        bound = server.add_insecure_port(f"{LOCAL}:{port}")
+    except RuntimeError:
+        bound = 0
+    if bound == 0:
+        raise RigtwinError(f"port {port} is taken; name another")
+    server.start()
+    return server, bound

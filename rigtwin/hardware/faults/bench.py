@@ -1,0 +1,112 @@
+"""The twin at the card's terminals with a fault in cable or actuator, and a log of what was put out and what truly moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.hardware.daq.conversion import conversion, to_values
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.terminals import Terminals
+from rigtwin.machine.configuration import Safety
+from rigtwin.numerics.arrays import Array
+
+SEEN_LVDT, SEEN_FORCE = 0.03, 150.0
+"""m and N by which a reading must be wrong before a fault counts as one: three times what noise, tyre and friction explain."""
+SEEN_CYLINDER = 0.06
+"""m by which a cylinder must be off its command: what a fast test asks of a good one is two thirds of it."""
+
+
+class FaultyBench:
+    """A `Wired` rig. kind: a name of KINDS, or empty; at: tick from which it holds; place: input or output that has it.
+
+    shown: first tick at which the fault is there to be seen, or −1. volts: at the inputs, shape (4,).
+    """
+
+    def __init__(
+        self, terminals: Terminals, table: ChannelTable, kind: str, at: int, place: int, seed: int, ticks: int
+    ) -> None:
+        self._terminals, self._kind, self._at, self._place = terminals, kind, at, place
+        self._random = np.random.default_rng(seed)
+        self._inputs, self._factor = conversion(table.inputs), conversion(table.outputs).factor
+        self._ranges = [line.scaling.range for line in table.inputs]
+        self.volts, self._before = terminals.volts.copy(), terminals.volts.copy()
+        self._held: float | None = None
+        self._direction = float(self._random.choice([-1.0, 1.0]))
+        self.tick, self.shown = 0, -1
+        self.written, self.pressure, self.truth = np.zeros((ticks, 3)), np.zeros(ticks, bool), np.zeros((ticks, 4))
+        self._read, self._true = np.empty(4), np.empty(4)
+
+    def advance(self, written: Array, pressure: bool) -> None:
+        if self.tick < len(self.written):
+            self.written[self.tick], self.pressure[self.tick] = written, pressure
+        acting = written.copy()
+        if self.tick >= self._at:
+            self._actuate(acting)
+        self._terminals.advance(acting, pressure)
+        if self.tick < len(self.truth):
+            self.truth[self.tick] = self._terminals.truth
+        self.tick += 1
+        self._before[:] = self.volts
+        self.volts[:] = self._terminals.volts
+        if self.tick >= self._at:
+            self._sense()
+
+    def _actuate(self, acting: Array) -> None:
+        place = self._place
+        if self._kind == "amplifier dead":
+            self._show(abs(acting[2]) * MOTOR_CONSTANT > SEEN_FORCE)
+            acting[2] = 0.0
+        elif self._kind == "valve stuck":
+            if self._held is None:
+                self._held = float(acting[place])
+            self._show(abs((acting[place] - self._held) * self._factor[place]) > SEEN_CYLINDER)
+            acting[place] = self._held
+        elif self._kind == "valve open":
+            acting[place] = 10.0 * self._direction
+            asked = self.written[min(self.tick, len(self.written) - 1), place] * self._factor[place]
+            self._show(abs(self._terminals.truth[place] - asked) > SEEN_CYLINDER)
+
+    def _sense(self) -> None:
+        kind, place, volts = self._kind, self._place, self.volts
+        span = self._ranges[place]
+        first = self.tick == self._at
+        if kind == "dropout":
+            volts[place] = 0.0
+            self._show(not first)
+        elif kind == "stuck":
+            volts[place] = self._before[place]
+            self._show(True)
+        elif kind == "spike" and first:
+            volts[place] += self._direction * span * self._random.uniform(0.1, 0.9)
+        elif kind == "not a number":
+            volts[place] = np.nan
+        elif kind == "wrong sign":
+            volts[place] = -volts[place]
+        elif kind == "gain x10":
+            volts[place] = min(max(10.0 * volts[place], -span), span)
+        elif kind == "step":
+            volts[place] += self._direction * 0.2 * span
+        elif kind == "open input":
+            volts[place] = self._random.uniform(-span, span)
+        to_values(self._inputs, volts, self._read)
+        to_values(self._inputs, self._terminals.volts, self._true)
+        self._show(not abs(self._read[place] - self._true[place]) <= (SEEN_FORCE if place == 3 else SEEN_LVDT))
+
+    def _show(self, there: bool) -> None:
+        if there and self.shown < 0:
+            self.shown = self.tick
+
+    def safe_from(self) -> int:
+        """First tick from which the motor's output is zero for good and the cylinders' are held or without pressure."""
+        last = min(self.tick, len(self.written))
+        motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
+        moving = np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
+        changes = np.flatnonzero(moving) + 1
+        return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
+
+    def exceeded(self, limits: Safety, since: int) -> float:
+        """Greatest true magnitude of position, travel or force from a tick on, in its limit."""
+        last = min(self.tick, len(self.truth))
+        bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])
+        return float(np.max(np.abs(self.truth[since:last]) / bounds)) if last > since else 0.0

@@ -1,0 +1,163 @@
+"""Real time: deadlines that do not drift, what the system grants a loop that must meet them, and how late it was."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+import gc
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigtwin.numerics.arrays import Array
+
+SPIN = 200e-6
+"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by tens of microseconds."""
+PRIORITY = 80
+EDGES = tuple(1e-6 * value for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000))
+"""Upper edges of the lateness histogram, s; the last class is what is beyond."""
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
+
+
+def monotonic() -> float:
+    """s, of a clock that never steps."""
+    return time.monotonic()
+
+
+def sleep_until(deadline: float, spin: float = SPIN) -> None:
+    """Returns at a time of `monotonic`, spinning over the last `spin` seconds."""
+    remaining = deadline - time.monotonic() - spin
+    if remaining > 0.0:
+        time.sleep(remaining)
+    while time.monotonic() < deadline:
+        pass
+
+
+class Pacer:
+    """Ticks at absolute deadlines, so that a late one does not shift those after it.
+
+    late: s by which the last wait ended after its deadline. A tick that ends after the next deadline is missed, and the loop
+    goes on with the first one that is still ahead.
+    """
+
+    def __init__(self, period: float) -> None:
+        self.period, self.late, self._next = period, 0.0, 0.0
+
+    def wait(self) -> int:
+        """Waits for the next deadline that is not past; returns how many were missed."""
+        now = time.monotonic()
+        if self._next == 0.0:
+            self._next = now
+        behind = int((now - self._next) / self.period) if now > self._next else 0
+        self._next += behind * self.period
+        if behind == 0:
+            sleep_until(self._next)
+        self.late = time.monotonic() - self._next
+        self._next += self.period
+        return behind
+
+
+class Lateness:
+    """How late each tick was, and how long its work took, both in s."""
+
+    def __init__(self, ticks: int) -> None:
+        self._late, self._work, self._count, self.missed = np.zeros(ticks), np.zeros(ticks), 0, 0
+
+    def add(self, late: float, work: float) -> None:
+        if self._count < len(self._late):
+            self._late[self._count], self._work[self._count] = late, work
+            self._count += 1
+
+    def record(self, scheduling: str) -> dict[str, str]:
+        """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum
+        of both, ticks missed, and what the system granted."""
+        figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
+        for name, values in (("late", self._late[: self._count]), ("work", self._work[: self._count])):
+            if len(values):
+                figures |= {f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()}
+        counts, _ = np.histogram(self._late[: self._count], bins=[-np.inf, *EDGES, np.inf])
+        figures["histogram"] = json.dumps({"edges": EDGES, "counts": counts.tolist()})
+        return figures
+
+
+def _statistics(values: Array) -> dict[str, float]:
+    return {"median": float(np.median(values)), "999": float(np.percentile(values, 99.9)), "max": float(values.max())}
+
+
+@dataclass(frozen=True)
+class Grant:
+    """One thing that a loop in real time wants of the system. lacking: why it is not there and how to get it, or empty."""
+
+    name: str
+    lacking: str = ""
+
+
+@contextmanager
+def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
+    """Takes what the system permits for the time of the loop, and gives it back: FIFO scheduling, memory locked, no garbage
+    collection. Yields what was granted and what not. `fifo`: whether to ask for the scheduling class at all."""
+    grants = [_memory(), Grant("no garbage collection")]
+    collecting, interval = gc.isenabled(), sys.getswitchinterval()
+    gc.collect()
+    gc.disable()
+    gc.freeze()
+    sys.setswitchinterval(1e-4)
+    before = _schedule() if fifo else Grant("FIFO scheduling", "not asked for")
+    grants.append(before)
+    try:
+        yield tuple(grants)
+    finally:
+        if fifo and not before.lacking:
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        sys.setswitchinterval(interval)
+        gc.unfreeze()
+        if collecting:
+            gc.enable()
+        if not grants[0].lacking:
+            _libc().munlockall()
+
+
+def _libc() -> ctypes.CDLL:
+    return ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
+
+
+def _memory() -> Grant:
+    if not sys.platform.startswith("linux"):
+        return Grant("locked memory", f"not known how on {sys.platform}")
+    if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
+        return Grant("locked memory", f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited")
+    return Grant("locked memory")
+
+
+def _schedule() -> Grant:
+    if not hasattr(os, "sched_setscheduler"):
+        return Grant("FIFO scheduling", f"not known how on {sys.platform}")
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except OSError as error:
+        return Grant("FIFO scheduling", f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE")
+    return Grant("FIFO scheduling")
+
+
+def machine_lacks() -> list[str]:
+    """What this computer lacks for a loop in real time, a line each; changes nothing."""
+    lacks: list[str] = []
+    with in_real_time() as grants:
+        lacks += [f"{grant.name}: {grant.lacking}" for grant in grants if grant.lacking]
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if cores < 2:
+        lacks.append("a core of its own: this computer has one, the loop shares it with everything else")
+    resolution = time.get_clock_info("monotonic").resolution
+    if resolution > 1e-6:
+        lacks.append(f"a fine clock: its resolution is {resolution:g} s; expected 1 us or better")
+    return lacks
+
+
+def described(grants: tuple[Grant, ...]) -> str:
+    return "; ".join(f"{grant.name}: {grant.lacking or 'granted'}" for grant in grants)

@@ -1,0 +1,128 @@
+"""The loop's side of a second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the
+rig and says so in the recording."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+import time
+from typing import Any
+
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.realtime import monotonic
+from rigtwin.hardware.session.guardian_process import guard
+from rigtwin.hardware.session.recorder import ROW
+from rigtwin.hardware.session.watched import (
+    ALIVE,
+    BEAT,
+    GROUND,
+    NUMBERS,
+    PREPARED,
+    READ,
+    RING,
+    STRUCTURE,
+    WATCHED,
+    WRITTEN,
+    Watched,
+    parts,
+)
+from rigtwin.hardware.supervisor import Transition
+
+STARTED = 30.0
+"""s within which the guardian must be there."""
+ABSENT = 1.0
+"""s after which a guardian that does not look any more is missed."""
+
+
+class Guardian:
+    """The loop's side: a `rigtwin.hardware.supervised.Recorder` whose work another process does."""
+
+    def __init__(self, watched: Watched) -> None:
+        """Raises RigtwinError if the recording cannot be written or the other process does not come."""
+        self._watched, self._finishing = watched, False
+        self.fault: str | None = None
+        context = multiprocessing.get_context("spawn")
+        memory = context.RawArray("d", NUMBERS + RING * ROW)
+        self._shared, self._ring = parts(memory)
+        self._pipe, theirs = context.Pipe()
+        arguments = (watched, theirs, memory, os.getpid())
+        self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
+        try:
+            self._process.start()
+            theirs.close()
+            if not self._pipe.poll(STARTED):
+                raise RigtwinError("the guardian process does not start")
+            said = self._answer()
+            if said != "ready":
+                raise RigtwinError(str(said))
+        except BaseException:
+            self._release()
+            raise
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def beat(self, ground: float, structure: float) -> None:
+        shared, now = self._shared, time.monotonic()
+        shared[GROUND], shared[STRUCTURE], shared[BEAT] = ground, structure, now
+        if now - shared[ALIVE] > ABSENT:
+            self.fault = self.fault or "the guardian process does not answer any more"
+
+    def tick(self, row: tuple[float, ...]) -> None:
+        written = int(self._shared[WRITTEN])
+        if written - self._shared[READ] >= RING:
+            self.fault = self.fault or "the recording cannot keep up with the loop"
+            return
+        self._ring[written % RING] = row
+        self._shared[WRITTEN] = written + 1.0
+
+    def flush(self) -> None:
+        """The other process writes by itself."""
+
+    def ready(self) -> None:
+        self._send("prepare")
+        end = monotonic() + STARTED
+        while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
+            time.sleep(1e-3)
+        if self._shared[PREPARED] == 0.0:
+            raise RigtwinError(self.fault or "the guardian process does not answer")
+
+    def transition(self, transition: Transition) -> None:
+        if transition.after in self._watched.phases and self._shared[WATCHED] == 0.0:
+            self._shared[BEAT] = time.monotonic()
+            self._shared[WATCHED] = 1.0
+        self._send("transition", transition)
+        if transition.after not in self._watched.phases:
+            self._shared[WATCHED] = 0.0
+
+    def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        self._send("metadata", name, values)
+
+    def finish(self, reason: str) -> None:
+        """Ends the recording and the other process."""
+        self._shared[WATCHED], self._finishing = 0.0, True
+        self._send("finish", reason)
+        self._process.join(STARTED if self.fault is None else ABSENT)
+        self._release()
+
+    def _send(self, *message: Any) -> None:
+        try:
+            self._pipe.send(message)
+        except (OSError, ValueError):
+            self.fault = self.fault or "the guardian process is gone, and the recording with it"
+
+    def _answer(self) -> Any:
+        try:
+            return self._pipe.recv()
+        except (EOFError, OSError):
+            return None
+
+    def _listen(self) -> None:
+        while (said := self._answer()) is not None:
+            self.fault = str(said)
+        if self.fault is None and not self._finishing:
+            self.fault = "the guardian process is gone, and the recording with it"
+
+    def _release(self) -> None:
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()

@@ -1,0 +1,236 @@
+"""The guardian's own process: writes the recording, looks at the loop, stops the rig if the loop dies or hangs."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any
+
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.realtime import PRIORITY, monotonic
+from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
+from rigtwin.hardware.session.watched import (
+    ALIVE,
+    BEAT,
+    GROUND,
+    PREPARED,
+    READ,
+    RING,
+    STRUCTURE,
+    WATCHED,
+    WRITTEN,
+    Watched,
+    parts,
+)
+from rigtwin.hardware.supervisor import Cause, Phase, Transition
+from rigtwin.numerics.arrays import Array
+from rigtwin.simulation.loop import BLOCK
+
+WRITE = 0.1
+"""s between two blocks of the recording."""
+LOOK = 2.5e-4
+"""s between two looks at the loop."""
+GONE = 1.0
+"""s within which a killed process must be gone."""
+
+
+def guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
+    """The other process."""
+    # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
+    with suppress(OSError, AttributeError):
+        os.setsid()
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    shared, ring = parts(memory)
+    from rigtwin.recording import Writer
+
+    try:
+        writer = Writer(**watched.recording)
+        writer.reserve()
+        for name, values in watched.metadata.items():
+            writer.add_metadata(name, values)
+        view = _live(watched)
+        keeping = _Keeping(writer, pipe, watched, view, shared, ring)
+        keeping.make_ready()
+    except RigtwinError as error:
+        pipe.send(str(error))
+        return
+    shared[ALIVE] = monotonic()
+    thread = threading.Thread(target=keeping.work, daemon=True)
+    thread.start()
+    with suppress(OSError, AttributeError):
+        # Of this thread alone: writing the recording must never be in the loop's way.
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+    pipe.send("ready")
+    died = _died_or_hung(owner, shared, watched, keeping)
+    if died is not None:
+        keeping.stop_rig(died, shared)
+    thread.join(1.0)
+    keeping.finish(died)
+
+
+def _live(watched: Watched) -> Callable[[str, Array], None] | None:
+    if watched.live == 0:
+        return None
+    from rigtwin.hardware.session.live import live_view
+
+    return live_view(watched.live)
+
+
+def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping) -> Cause | None:
+    """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
+    handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
+    try:
+        while not keeping.done.is_set():
+            shared[ALIVE] = monotonic()
+            if handle is not None:
+                dead = bool(select.select([handle], [], [], LOOK)[0])
+            else:
+                time.sleep(LOOK)
+                dead = os.getppid() != owner
+            if dead:
+                return Cause("process", "the controller process died") if shared[WATCHED] else None
+            if watched.table is not None and shared[WATCHED] and monotonic() - shared[BEAT] > watched.patience:
+                with suppress(ProcessLookupError):
+                    os.kill(owner, signal.SIGKILL)
+                if handle is not None and not watched.table.address:
+                    # A driver on this computer keeps the lines until the process is gone altogether.
+                    select.select([handle], [], [], GONE)
+                waited = f"{1e3 * watched.patience:.3g} ms"
+                return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
+        return None
+    finally:
+        if handle is not None:
+            os.close(handle)
+
+
+class _Keeping:
+    """Writes what the loop sends, on a thread of its own."""
+
+    def __init__(
+        self,
+        writer: Any,
+        pipe: Connection,
+        watched: Watched,
+        view: Callable[[str, Array], None] | None,
+        shared: Array,
+        ring: Array,
+    ) -> None:
+        self._shared, self._ring = shared, ring
+        self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
+        self._last: Transition | None = None
+        self._reason: str | None = None
+        self._resort: Any = None
+        self._cause = Cause("process", "")
+        self._time, self._said = 0.0, False
+        self.done = threading.Event()
+
+    def work(self) -> None:
+        try:
+            while self._reason is None:
+                if self._pipe.poll(WRITE):
+                    kind, *content = self._pipe.recv()
+                    getattr(self, f"_{kind}")(*content)
+                self._drain()
+                if self._keeper.fault is not None and not self._said:
+                    self._said = True
+                    self._pipe.send(self._keeper.fault)
+        except (EOFError, OSError):
+            self._drain()
+        if self._reason is not None:
+            self._drain()
+            self.done.set()
+
+    def _drain(self) -> None:
+        """Writes what the loop has put into the shared memory."""
+        shared = self._shared
+        while (first := int(shared[READ])) < (last := int(shared[WRITTEN])):
+            last = min(last, first + BLOCK, (first // RING + 1) * RING)
+            rows = self._ring[first % RING : first % RING + last - first].copy()
+            shared[READ] = float(last)
+            self._keeper.block(rows)
+            self._time = float(rows[-1, 0])
+            if self._view is not None:
+                self._view(SESSION, rows[:, : len(FIELDS)])
+
+    def make_ready(self) -> None:
+        """Everything that takes time, before there is anything to watch."""
+        if self._watched.table is not None:
+            from rigtwin.hardware.daq.failsafe import LastResort
+
+            self._resort = LastResort(self._watched.table)
+
+    def _prepare(self) -> None:
+        if self._resort is not None:
+            try:
+                self._resort.prepare()
+            except RigtwinError as error:
+                self._pipe.send(str(error))
+                return
+        self._shared[PREPARED] = 1.0
+
+    def _transition(self, transition: Transition) -> None:
+        self._last = transition
+        self._drain()
+        self._keeper.transition(transition)
+
+    def _metadata(self, name: str, values: dict[str, str]) -> None:
+        with suppress(RigtwinError):
+            self._writer.add_metadata(name, values)
+
+    def _finish(self, reason: str) -> None:
+        self._reason = reason
+
+    def stop_rig(self, cause: Cause, shared: Array) -> None:
+        """Force off now, pressure off after the hold."""
+        said = cause.reason
+        resort = self._resort
+        if resort is not None:
+            failed = _tried_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
+            if failed is None:
+                time.sleep(self._watched.hold)
+            failed = _tried_often(resort.pressure_off) or failed
+            if failed is not None:
+                said = f"{said}; and {failed}: stop the rig by hand"
+            resort.close()
+        self._cause = Cause(cause.name, said)
+        print(f"rigtwin: {said}", file=sys.stderr, flush=True)
+
+    def finish(self, died: Cause | None) -> None:
+        """Closes the recording with what it has to say."""
+        if died is None:
+            self._writer.finish(self._reason or "the loop ended without a word")
+            return
+        before = self._last.after if self._last is not None else Phase.IDLE
+        cause, now = self._cause, self._time if self._last is None else max(self._time, self._last.time)
+        if before != Phase.STOPPING:
+            self._keeper.transition(Transition(now, before, Phase.STOPPING, cause))
+        self._keeper.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))
+        with suppress(RigtwinError):
+            self._writer.finish(cause.reason)
+
+
+def _tried_often(act: Callable[[], None]) -> str | None:
+    """What is wrong with it after some tries, or None."""
+    failed = None
+    for _ in range(TRIES):
+        try:
+            act()
+        except RigtwinError as error:
+            failed = str(error)
+            time.sleep(0.02)
+        else:
+            return None
+    return failed
+
+
+TRIES = 25
+"""Of a call that has to succeed: half a second of them."""

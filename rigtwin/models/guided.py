@@ -1,0 +1,183 @@
+"""One joint's equation of motion: pushed by a force, or moved as prescribed. Compiled.
+
+Dry friction acts through a play and a spring in series with it. Where the description gives no spring it is as stiff as the
+step allows, which holds a sticking joint where it is. The step is implicit in friction and viscous forces, so it neither
+chatters nor creeps; positions are taken at the steps, velocities midway between them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.compiled import compilable
+from controllers.formula import Program, run
+from rigtwin.components.conditioning import Actuator, ActuatorState, conditioned
+from rigtwin.components.parts import Guide
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.converters import Transducer, TransducerState, transduced
+
+RIGID = 1e6
+"""Times inertia / step², above which a spring cannot be told from a rigid one."""
+
+
+class Inertia(NamedTuple):
+    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions; rest: where the guide's
+    spring is slack."""
+
+    mass: float
+    first: float
+    spacing: float
+    load: Array
+    rest: float
+
+
+class Loop(NamedTuple):
+    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are recorded signals, shape
+    (ticks, inputs), or sensors: sensor[i] is −1 or the number of the sensor that input i comes from."""
+
+    closed: bool
+    program: Program
+    registers: Array
+    memory: Array
+    recorded: Array
+    sensor: np.ndarray
+
+
+@compilable
+def gravity(inertia: Inertia, position: float) -> float:
+    """The load at a position, straight between the grid's points."""
+    place = (position - inertia.first) / inertia.spacing
+    place = min(max(place, 0.0), len(inertia.load) - 1.000001)
+    whole = int(place)
+    part = place - whole
+    return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
+
+
+@compilable
+def limits(guide: Guide, velocity: float) -> tuple[float, float]:
+    """What dry friction can bear against positive and against negative motion, N."""
+    size = guide.coulomb
+    if guide.stribeck != 0.0:
+        ratio = velocity / guide.stribeck_velocity
+        size += guide.stribeck * math.exp(-ratio * ratio)
+    return max(size + 0.5 * guide.asymmetry, 0.0), max(size - 0.5 * guide.asymmetry, 0.0)
+
+
+@compilable
+def stretched(apart: float, half: float) -> float:
+    """How far the spring behind a play of 2·half is stretched."""
+    return apart - half if apart > half else (apart + half if apart < -half else 0.0)
+
+
+@compilable
+def slid(apart: float, half: float, spring: float, forward: float, backward: float) -> tuple[float, float]:
+    """(dry friction, how far the slider slid) for a distance between the joint and its slider."""
+    force = spring * stretched(apart, half)
+    if force > forward:
+        return forward, apart - half - forward / spring
+    if force < -backward:
+        return -backward, apart + half + backward / spring
+    return force, 0.0
+
+
+@compilable
+def damping(guide: Guide, velocity: float) -> float:
+    """Viscous friction's coefficient in the direction of a velocity, Ns/m."""
+    more = 0.5 * guide.viscous_asymmetry
+    return guide.viscous + (more if velocity > 0.0 else -more)
+
+
+@compilable
+def resting(guide: Guide, position: float, rest: float) -> float:
+    """The forces that depend on the position alone."""
+    force = guide.stiffness * (position - rest) + guide.offset
+    if guide.cogging != 0.0:
+        force += guide.cogging * math.sin(2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase)
+    return force
+
+
+@kernel
+def carried(guide: Guide, inertia: Inertia, spring: float, period: float, motion: Array, out: Array) -> None:
+    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape (3, ticks)."""
+    slider, viscous = motion[0, 0], 0.0
+    share = period / (guide.relaxation + period)
+    for tick in range(motion.shape[1]):
+        x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
+        forward, backward = limits(guide, v)
+        dry, by = slid(x - slider, 0.5 * guide.backlash, spring, forward, backward)
+        slider += by
+        viscous += share * (damping(guide, v) * v - viscous)
+        out[tick] = (
+            inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest) + dry + viscous + guide.drag * v * abs(v)
+        )
+
+
+@kernel
+def pushed(
+    guide: Guide,
+    inertia: Inertia,
+    spring: float,
+    start: tuple[float, float],
+    constant: float,
+    limit: float,
+    drive: Actuator,
+    held: ActuatorState,
+    sensors: tuple[Transducer, ...],
+    states: tuple[TransducerState, ...],
+    kinds: np.ndarray,
+    loop: Loop,
+    command: Array,
+    besides: Array,
+    period: float,
+    steps: int,
+    out: Array,
+) -> None:
+    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity; command: as recorded, shape
+    (ticks,), replaced by the controller's if the loop is closed; besides: another force, N; out: position, velocity, force of
+    the actuator, shape (3, ticks)."""
+    h = period / steps
+    x, v = start
+    slider, viscous, force = x, damping(guide, v) * v, 0.0
+    half = 0.5 * guide.backlash
+    share = h / (guide.relaxation + h)
+    for tick in range(len(command)):
+        out[0, tick], out[1, tick], out[2, tick] = x, v, force
+        if loop.closed:
+            for number in range(len(loop.sensor)):
+                which = loop.sensor[number]
+                loop.registers[number] = loop.recorded[tick, number]
+                for each in range(len(sensors)):
+                    if each == which:
+                        loop.registers[number] = transduced(sensors[each], states[each], x if kinds[each] == 0 else v)
+            command[tick] = run(loop.program, loop.registers, loop.memory, period)
+        for _ in range(steps):
+            earlier = force
+            force = min(max(constant * conditioned(drive, held, command[tick]), -limit), limit)
+            coefficient = damping(guide, v)
+            # About this position half a step passes under the old force and half under the new one.
+            load = (
+                0.5 * (earlier + force)
+                + besides[tick]
+                - gravity(inertia, x)
+                - resting(guide, x, inertia.rest)
+                - (1.0 - share) * viscous
+            )
+            total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
+            rhs = inertia.mass * v + h * load
+            forward, backward = limits(guide, v)
+            velocity = rhs / total
+            apart = x + h * velocity - slider
+            if apart > half or apart < -half:
+                edge = math.copysign(half, apart)
+                velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
+                dry, by = slid(x + h * velocity - slider, half, spring, forward, backward)
+                if by != 0.0:
+                    velocity = (rhs - h * dry) / total
+                    slider = x + h * velocity - edge - dry / spring
+            viscous += share * (coefficient * velocity - viscous)
+            v = velocity
+            x += h * v

@@ -1,0 +1,72 @@
+"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any plant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from rigtwin.numerics.arrays import Array
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a component goes through, shape (ticks,) each: position m, its rate m/s, force N."""
+
+    position: Array
+    speed: Array
+    force: Array
+
+
+@dataclass(frozen=True)
+class Form:
+    """One way to disturb a component freely. entry: where it enters, as `disturbed` takes it; signal: shape (ticks,)."""
+
+    name: str
+    entry: str
+    signal: Array
+
+
+class Predictor(Protocol):
+    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in their order."""
+
+    def sensed(self, plant: Any) -> Array:
+        """What the signals should be, noise apart, shape (rows, ticks)."""
+        ...
+
+    def true(self, plant: Any) -> Array:
+        """What ideal sensors would read, shape (rows, ticks)."""
+        ...
+
+    def disturbed(self, plant: Any, entry: str, amount: Array) -> Array:
+        """The same as `sensed` with a disturbance, shape (ticks,), entering somewhere."""
+        ...
+
+    def places(self) -> Sequence[str]:
+        """Components that can be disturbed freely."""
+        ...
+
+    def forms(self, component: str, plant: Any) -> list[Form]:
+        """Ways to disturb one of them."""
+        ...
+
+    def strength(self, entry: str) -> float:
+        """rms of a disturbance that is small there."""
+        ...
+
+    def motion(self, component: str, plant: Any) -> Motion:
+        """What a component goes through."""
+        ...
+
+    def carried_noise(self, plant: Any) -> Array | None:
+        """What the noise of the signals that drive the model makes of the observed ones, shape (rows, ticks); None if they
+        are known exactly."""
+        ...
+
+    def coarser(self) -> Predictor:
+        """With half the integration steps, if it can be."""
+        ...
+
+    def finer(self) -> Predictor:
+        """With twice the integration steps."""
+        ...

@@ -1,0 +1,339 @@
+"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to search with.
+
+The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod has no inertia. So one
+scalar inclusion a step, solved exactly, replaces the simulator: rail and motor friction are set-valued. What depends on
+the effects (actuators, cylinders, breakaway, sensors) is the twin's own code; tests hold it against the twin.
+
+Positions are taken at the steps and velocities midway between them, which makes the scheme second order.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers import Measurements
+from controllers.compiled import compilable
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
+from rigtwin.components.friction import breakaway
+from rigtwin.components.gas_spring import spring_force
+from rigtwin.components.parameters import Computer, Cylinder, Motor, Plant
+from rigtwin.machine.configuration import Configuration
+from rigtwin.models.predictor import Form, Motion
+from rigtwin.models.quarter_car_forms import PLACES, STRENGTH, quarter_car_forms, signals
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.converters import seen, sensors
+from rigtwin.simulation.plant import YIELDING, Contacts, contacts, deflected, stiffening
+
+KEPT = 64
+"""Motions of plates that are kept."""
+
+KEPT_MOTIONS = 7
+"""Motions of the whole plant that are kept."""
+MECHANICAL = ("carriage", "rail", "tyre", "motor", "gas_spring", "ground_cylinder", "structure_cylinder", "computer")
+"""Components that the true motion depends on."""
+
+
+class Plate(NamedTuple):
+    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks + 1,); onward: where the
+    command held before a tick would take it one step later, shape (ticks,)."""
+
+    position: Array
+    onward: Array
+
+
+class Disturbances(NamedTuple):
+    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m, voltage V, force on the carriage
+    N."""
+
+    ground: Array
+    structure: Array
+    voltage: Array
+    force: Array
+
+
+class Carriage(NamedTuple):
+    """What the carriage's equation of motion needs besides its contacts."""
+
+    timestep: float
+    mass: float
+    rail_viscous: float
+    motor_viscous: float
+    motor_constant: float
+    motor_share: float
+    voltage_limit: float
+
+
+@kernel
+def _plate(
+    model: CylinderModel,
+    state: CylinderState,
+    conditioning: Actuator,
+    held: ActuatorState,
+    commands: Array,
+    steps: int,
+    position: Array,
+    onward: Array,
+) -> None:
+    for tick in range(len(commands)):
+        onward[tick] = next_position(model, state, held.memory[3])
+        for step in range(steps):
+            position[tick * steps + step] = state.position[0]
+            advance_cylinder(model, state, conditioned(conditioning, held, commands[tick]))
+    position[len(commands) * steps] = state.position[0]
+
+
+def plate(
+    cylinder: Cylinder, computer: Computer, commands: Array, start: float, at: float | None, timestep: float, steps: int
+) -> Plate:
+    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where that command holds it."""
+    conditioning = actuator(cylinder, computer, timestep)
+    held = holding(conditioning, start)
+    out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
+    state = settled(cylinder, float(held.memory[3]) if at is None else at)
+    _plate(sampled(cylinder, timestep), state, conditioning, held, commands, steps, out.position, out.onward)
+    return out
+
+
+@compilable
+def sliding(rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float) -> float:
+    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
+    against positive and negative v; motor: against positive and negative plate − v, plate being the plate's velocity."""
+    below = (rhs + rail[1] + motor[0]) / inertia
+    if below < min(0.0, plate):
+        return below
+    above = (rhs - rail[0] - motor[1]) / inertia
+    if above > max(0.0, plate):
+        return above
+    between = (rhs - rail[0] + motor[0]) / inertia if plate > 0.0 else (rhs + rail[1] - motor[1]) / inertia
+    return min(max(between, min(0.0, plate)), max(0.0, plate))
+
+
+@compilable
+def motor_friction(
+    rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float, velocity: float
+) -> float:
+    """The dry friction of the motor at that solution, as an impulse on the carriage in Ns."""
+    if velocity < plate:
+        return motor[0]
+    if velocity > plate:
+        return -motor[1]
+    left = inertia * velocity - rhs
+    if velocity > 0.0:
+        left += rail[0]
+    elif velocity < 0.0:
+        left -= rail[1]
+    else:
+        # Both stick: the rail carries what it can, as at the start of a test before anything has moved.
+        left += min(max(-left, -rail[1]), rail[0])
+    return min(max(left, -motor[1]), motor[0])
+
+
+@kernel
+def _mechanics(
+    carriage: Carriage,
+    now: Contacts,
+    motor_drive: Actuator,
+    motor_command: ActuatorState,
+    start: float,
+    preload: float,
+    steps: int,
+    ground: Array,
+    ground_onward: Array,
+    structure: Array,
+    structure_onward: Array,
+    voltage: Array,
+    pushed: Array,
+    out: Array,
+) -> None:
+    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values, shape (4, ticks)."""
+    h = carriage.timestep
+    x, v, force = start, 0.0, preload
+    ground_before = structure_before = 0.0
+    inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
+    share = h / (YIELDING + h)
+    for tick in range(len(voltage)):
+        for step in range(-1, steps):
+            # Before the tick's commands act, once as if the old ones went on: that is what the sensors see.
+            place = tick * steps + max(step, 0)
+            ground_here, structure_here = ground[place], structure[place]
+            if step < 0:
+                ground_there, structure_there = ground_onward[tick], structure_onward[tick]
+            else:
+                ground_there, structure_there = ground[place + 1], structure[place + 1]
+            plate_velocity = (structure_there - structure_here) / h
+            ground_velocity = (ground_there - ground_here) / h
+            structure_now, ground_now = structure_here + now.yielded[1], ground_here + now.yielded[0]
+            if step > 0 or (step == 0 and tick > 0):
+                plate_velocity += (now.yielded[1] - structure_before) / h
+                ground_velocity += (now.yielded[0] - ground_before) / h
+            travel = structure_now - x
+            deflection = ground_now - x
+            rail, motor = (h * now.rail.coulomb, h * now.rail.coulomb), (h * now.motor.coulomb, h * now.motor.coulomb)
+            bias = beside = 0.0
+            if now.changing:
+                forward, backward = breakaway(now.rail, now.rail_gap, x, v)
+                rail = (h * forward, h * backward)
+                forward, backward = breakaway(now.motor, now.motor_gap, travel, plate_velocity - v)
+                motor = (h * forward, h * backward)
+                bias = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
+            if now.gas.force > 0.0:
+                beside = spring_force(now.gas, -travel)
+            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick])
+            rhs, total, spring = free, inertia, 0.0
+            if deflection > 0.0:
+                spring = now.stiffness * deflection * stiffening(now, deflection)
+                rhs, total = free + h * (spring + now.damping * ground_velocity), inertia + h * now.damping
+            velocity = sliding(rhs, total, rail, motor, plate_velocity)
+            tyre = 0.0
+            if deflection > 0.0:
+                tyre = spring + now.damping * (ground_velocity - velocity)
+                if tyre < 0.0:
+                    tyre, rhs, total = 0.0, free, inertia
+                    velocity = sliding(rhs, total, rail, motor, plate_velocity)
+            dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
+            cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
+            if step < 0:
+                out[0, tick], out[1, tick], out[2, tick], out[3, tick] = ground_now, structure_now, travel, cell
+                continue
+            ground_before, structure_before = now.yielded[0], now.yielded[1]
+            now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
+            now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
+            asked = conditioned(motor_drive, motor_command, voltage[tick])
+            asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
+            force += carriage.motor_share * (carriage.motor_constant * asked - force)
+            v = velocity
+            x += h * v
+
+
+class Reduced:
+    """The plant under the commands of one test. Plates' motions are kept: most candidates leave them as they are."""
+
+    def __init__(self, ground: Array, structure: Array, voltage: Array, configuration: Configuration, steps: int) -> None:
+        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a tick."""
+        self._ground, self._structure, self._voltage = (np.ascontiguousarray(c) for c in (ground, structure, voltage))
+        self._configuration = configuration
+        self._start, self._preload = configuration.controller.start, configuration.controller.preload
+        self._period, self._steps = configuration.timing.period, steps
+        self._last: dict[tuple[object, ...], Array] = {}
+        self._plates: dict[tuple[object, ...], Plate] = {}
+
+    def coarser(self) -> Reduced:
+        """The same with half as many steps."""
+        return Reduced(self._ground, self._structure, self._voltage, self._configuration, max(1, self._steps // 2))
+
+    def finer(self) -> Reduced:
+        """The same with twice as many steps."""
+        return Reduced(self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps)
+
+    def _plate(self, cylinder: Cylinder, computer: Computer, commands: Array, start: float, at: float | None) -> Plate:
+        unloaded = cylinder._replace(compliance=0.0)
+        key = (unloaded, computer.delay, id(commands), at)
+        found = self._plates.get(key)
+        if found is None:
+            if len(self._plates) > KEPT:
+                self._plates.clear()
+            found = plate(unloaded, computer, commands, start, at, self._period / self._steps, self._steps)
+            self._plates[key] = found
+        return found
+
+    def true(self, plant: Plant, besides: Disturbances | None = None) -> Array:
+        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
+        does not know."""
+        timestep = self._period / self._steps
+        ground = self._plate(plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None)
+        # The spring is uncompressed at the start, the tyre carries the preload.
+        start = float(ground.position[0]) - deflected(plant, self._preload)
+        structure = self._plate(plant.structure_cylinder, plant.computer, self._structure, self._start, start)
+        nothing = np.zeros_like(self._voltage)
+        besides = besides or Disturbances(nothing, nothing, nothing, nothing)
+        ground, structure = self._displaced(ground, besides.ground), self._displaced(structure, besides.structure)
+        motor: Motor = plant.motor
+        carriage = Carriage(
+            timestep,
+            plant.carriage.mass,
+            plant.rail.viscous,
+            motor.viscous,
+            motor.constant,
+            1.0 - math.exp(-timestep / motor.time_constant),
+            min(motor.voltage_limit, motor.force_limit / motor.constant),
+        )
+        conditioning = actuator(motor, plant.computer, timestep)
+        out = np.empty((4, len(self._voltage)))
+        _mechanics(
+            carriage,
+            contacts(plant, start, 0.0),
+            conditioning,
+            holding(conditioning, self._preload / motor.constant),
+            start,
+            self._preload,
+            self._steps,
+            ground.position,
+            ground.onward,
+            structure.position,
+            structure.onward,
+            self._voltage + besides.voltage,
+            besides.force,
+            out,
+        )
+        return out
+
+    def _displaced(self, of: Plate, by: Array) -> Plate:
+        if not by.any():
+            return of
+        ticks = np.arange(len(by) * self._steps + 1) / self._steps
+        motion = np.interp(ticks, np.arange(len(by)), by)
+        ahead = motion[np.arange(len(by)) * self._steps + 1]
+        return Plate(of.position + motion, of.onward + ahead)
+
+    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
+        Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
+        if entry in Measurements._fields:
+            sensed = self.sensed(plant)
+            sensed[Measurements._fields.index(entry)] += amount
+            return sensed
+        amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
+        amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
+        true = self.true(plant, Disturbances(**amounts))
+        return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
+
+    def places(self) -> tuple[str, ...]:
+        return PLACES
+
+    def forms(self, component: str, plant: Plant) -> list[Form]:
+        through = signals(self.true(plant), self.sensed(plant), self._period)
+        return [Form(*each) for each in quarter_car_forms(component, through)]
+
+    def strength(self, entry: str) -> float:
+        return STRENGTH["N" if entry in ("voltage", "force", "load_cell") else "m"]
+
+    def motion(self, component: str, plant: Plant) -> Motion:
+        true = self.true(plant)
+        if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
+            position = true[2]
+        elif component.startswith("ground"):
+            position = true[0]
+        elif component.startswith("structure"):
+            position = true[1]
+        else:
+            position = true[1] - true[2]
+        return Motion(position, np.gradient(position, self._period), true[3])
+
+    def carried_noise(self, plant: Plant) -> None:
+        """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
+
+    def sensed(self, plant: Plant) -> Array:
+        """The same through the plant's sensors, noise and quantisation apart."""
+        mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
+        true = self._last.get(mechanical)
+        if true is None:
+            true = self.true(plant)
+            # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
+            self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
+        return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])

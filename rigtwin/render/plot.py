@@ -1,0 +1,147 @@
+"""Draws a recording: what moved, what pushed, and what the controller asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+from rigtwin.recording.channels import SUSPENSION_RIG
+
+COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
+KINDS = (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One line of a panel. needs: its channels; value: of them, in the panel's unit."""
+
+    label: str
+    colour: str
+    needs: tuple[tuple[str, str], ...]
+    value: Callable[..., Array]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Lines that share an axis."""
+
+    title: str
+    traces: tuple[Trace, ...]
+
+
+def _millimetres(position: Array) -> Array:
+    return 1e3 * position
+
+
+def _wheel(structure: Array, travel: Array) -> Array:
+    return 1e3 * (structure - travel)
+
+
+def _plain(signal: Array) -> Array:
+    return signal
+
+
+SENSED, ASKED = COLOURS["measured"], COLOURS["commanded"]
+PANELS = (
+    Panel(
+        "ground, mm",
+        (
+            Trace("measured", SENSED, (("/sensor", "ground_lvdt"),), _millimetres),
+            Trace("commanded", ASKED, (("/command", "ground"),), _millimetres),
+        ),
+    ),
+    Panel(
+        "plate (sprung mass), mm",
+        (
+            Trace("measured", SENSED, (("/sensor", "structure_lvdt"),), _millimetres),
+            Trace("commanded", ASKED, (("/command", "structure"),), _millimetres),
+        ),
+    ),
+    Panel("suspension travel, mm", (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),)),
+    Panel(
+        "wheel, mm",
+        (Trace("plate − travel", SENSED, (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")), _wheel),),
+    ),
+    Panel(
+        "suspension force, N",
+        (
+            Trace("measured", SENSED, (("/sensor", "load_cell"),), _plain),
+            Trace("demanded", ASKED, (("/command", "force"),), _plain),
+        ),
+    ),
+    Panel("motor voltage, V", (Trace("commanded", ASKED, (("/command", "voltage"),), _plain),)),
+)
+"""What is drawn, from top to bottom; a panel without data is left out."""
+
+
+def _plainly(recording: Recording) -> tuple[Panel, ...]:
+    """A panel for every channel name of another machine: what was commanded and what was sensed under one name together."""
+    names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
+    labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
+    return tuple(
+        Panel(name, tuple(Trace(label, colour, ((topic, name),), _plain) for topic, (label, colour) in labels.items()))
+        for name in names
+    )
+
+
+def stretch(recording: Recording, start: float, until: float | None) -> slice:
+    """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
+    end = float(recording.time[-1]) if until is None else until
+    if not (math.isfinite(start) and math.isfinite(end)):
+        raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
+    first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
+    if last - first < 2:
+        span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
+        raise RigtwinError(f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}")
+    return slice(int(first), int(last))
+
+
+def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
+    """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
+    checked_ending(out)
+    ticks = stretch(recording, start, until)
+    time = recording.time[ticks]
+    panels = PANELS if recording.machine == SUSPENSION_RIG else _plainly(recording)
+    there = [
+        (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
+        for panel in panels
+    ]
+    there = [(title, traces) for title, traces in there if traces]
+    figure = Figure(figsize=(11, 1.9 * len(there) + 0.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (title, traces) in zip(axes, there, strict=True):
+        for trace in traces:
+            signal = trace.value(*(recording.column(*channel)[ticks] for channel in trace.needs))
+            axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
+        axis.set_ylabel(title, fontsize=9)
+        axis.grid(alpha=0.3)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), fontsize=8, frameon=False, ncols=2, borderpad=0.1)
+        axis.margins(x=0)
+    axes[-1].set_xlabel("time, s")
+    ending = f" · {recording.end}" if recording.end else ""
+    figure.suptitle(f"{recording.path.name} · {recording.experiment}{ending}", fontsize=11)
+    save(figure, out)
+
+
+def checked_ending(out: Path) -> None:
+    """Raises RigtwinError unless a figure can be written to that name."""
+    if out.suffix.lower() not in KINDS:
+        raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
+
+
+def save(figure: Figure, out: Path) -> None:
+    """Writes a figure. Raises RigtwinError if the file cannot be written."""
+    try:
+        figure.savefig(out, dpi=110)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {out}: {error.strerror}") from None

@@ -1,0 +1,209 @@
+"""Films a recording offscreen: the rig in motion, and its force and travel drawn beneath with a line that marks the time."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import mujoco
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.render.plot import ASKED, SENSED, stretch
+from rigtwin.simulation.mechanics import SCENE
+from rigtwin.simulation.structure_motion import recorded_wing
+
+Image = NDArray[np.uint8]
+
+FRAMES_PER_SECOND = 30
+WIDTH, SCENE_HEIGHT, TRACE_HEIGHT = 960, 432, 288
+BEAM_DRAWN = 0.13
+"""m; drawn length of a beam."""
+BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
+SMOOTHING = 20.0
+"""Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
+NO_RENDERING = (
+    "cannot render without a display; on Debian or Ubuntu: sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
+    "elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
+)
+
+
+def film(
+    recording: Recording,
+    out: Path,
+    camera: str = "overview",
+    start: float = 0.0,
+    until: float | None = None,
+    magnify: float = 1.0,
+    progress: Callable[[int, int], object] | None = None,
+) -> None:
+    """Films the stretch from `start` to `until` (s) in real time, 30 frames a second, into an mp4 file.
+
+    magnify: how many times as large motions are drawn. progress is called with (frames done, frames in all). Raises
+    RigtwinError if the file's ending, the camera, the stretch or this machine's rendering is at fault.
+    """
+    if out.suffix.lower() != ".mp4":
+        raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
+    if not 0.0 < magnify <= 20.0:
+        raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
+    if recording.machine != SUSPENSION_RIG:
+        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; only {SUSPENSION_RIG} can be filmed")
+    for name in ("structure_lvdt", "suspension_lvdt", "ground_lvdt"):
+        if recording.has("/sensor", name) and not np.isfinite(recording.column("/sensor", name)).all():
+            raise RigtwinError(f"{recording.path}: /sensor.{name} has values that are no numbers; nothing can be drawn of it")
+    ticks = stretch(recording, start, until)
+    time = recording.time[ticks]
+    motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}
+    traces = _Traces(recording, ticks)
+    beams = recorded_wing(recording)
+    bent = None if beams is None else magnify * beams[ticks]
+    frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
+    temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
+    try:
+        with _renderer(camera) as render, av.open(str(temporary), "w", format="mp4") as container:
+            stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
+            stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
+            for number, tick in enumerate(frames):
+                at = {name: float(values[tick]) for name, values in motions.items()}
+                scene = render(at, None if bent is None else bent[tick])
+                picture = np.vstack([scene, traces.at(float(time[tick]))])
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")))
+                if progress is not None:
+                    progress(number + 1, len(frames))
+            container.mux(stream.encode())
+        temporary.replace(out)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {out}: {error.strerror}") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _motions(recording: Recording) -> dict[str, Array]:
+    """Joint → position in m at every tick, from the sensors alone, so that any recording can be filmed."""
+    structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
+    travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
+    ground = np.zeros_like(structure)
+    if recording.has("/sensor", "ground_lvdt"):
+        ground = _smooth(recording.column("/sensor", "ground_lvdt"), recording.period)
+    return {"ground": ground, "carriage": structure - travel, "structure": structure}
+
+
+def _smooth(signal: Array, period: float) -> Array:
+    if 0.45 / period <= SMOOTHING or len(signal) < 50:
+        return signal
+    return sosfiltfilt(butter(2, SMOOTHING, fs=1.0 / period, output="sos"), signal)
+
+
+def _context() -> Any:
+    """An offscreen GL context: of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere."""
+    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or ("egl" if sys.platform == "linux" else "glfw")
+    try:
+        context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
+        context.make_current()
+    except Exception as error:  # each kind raises its own
+        raise RigtwinError(f"{NO_RENDERING} ({kind}: {type(error).__name__})") from None
+    return context
+
+
+@contextmanager
+def _renderer(camera: str) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
+    """A function from joint positions, and the beams' heights over their centre where there are any, to a picture."""
+    model = mujoco.MjModel.from_xml_path(str(SCENE))
+    cameras = [model.camera(number).name for number in range(model.ncam)]
+    if camera not in cameras:
+        raise RigtwinError(f"unknown camera {camera!r}; there are {', '.join(cameras)}")
+    data = mujoco.MjData(model)
+    context = _context()
+    model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
+    drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
+    scene = mujoco.MjvScene(model, maxgeom=500)
+    options, view = mujoco.MjvOption(), mujoco.MjvCamera()
+    view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
+    window = mujoco.MjrRect(0, 0, WIDTH, SCENE_HEIGHT)
+    picture = np.empty((SCENE_HEIGHT, WIDTH, 3), np.uint8)
+
+    def render(positions: dict[str, float], bent: Array | None) -> Image:
+        for joint, position in positions.items():
+            data.qpos[model.joint(joint).qposadr[0]] = position
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        mujoco.mjv_updateScene(model, data, options, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
+        if bent is not None:
+            _draw_beams(scene, data.body("structure_plate").xpos, bent)
+        mujoco.mjr_render(window, scene, drawing)
+        mujoco.mjr_readPixels(picture, None, window, drawing)
+        return picture[::-1]
+
+    try:
+        yield render
+    finally:
+        drawing.free()
+        context.free()
+
+
+def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
+    """Adds the cross of beams to a scene, its centre at the plate; its arms are drawn across the rig and far shorter than they
+    are, what they do along it in full size."""
+    for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
+        points = [plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm) for n, height in enumerate(bent)]
+        for inner, outer in pairwise(points):
+            geom = scene.geoms[scene.ngeom]
+            kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+            mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), BEAM_COLOUR)
+            mujoco.mjv_connector(geom, kind, 0.012, inner, outer)
+            scene.ngeom += 1
+
+
+class _Traces:
+    """Force and travel drawn once; every frame adds the line that marks its time."""
+
+    def __init__(self, recording: Recording, ticks: slice) -> None:
+        time = recording.time[ticks]
+        figure = Figure(figsize=(WIDTH / 100, TRACE_HEIGHT / 100), dpi=100)
+        canvas = FigureCanvasAgg(figure)
+        upper, lower = figure.subplots(2, 1, sharex=True)
+        if recording.has("/sensor", "load_cell"):
+            upper.plot(time, recording.column("/sensor", "load_cell")[ticks], color=SENSED, linewidth=0.8, label="measured")
+        if recording.has("/command", "force"):
+            upper.plot(time, recording.column("/command", "force")[ticks], color=ASKED, linewidth=0.9, label="demanded")
+        upper.set_ylabel("force, N", fontsize=8)
+        if upper.lines:
+            upper.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
+        lower.plot(time, 1e3 * recording.column("/sensor", "suspension_lvdt")[ticks], color=SENSED, linewidth=0.8)
+        lower.set_ylabel("travel, mm", fontsize=8)
+        lower.set_xlabel("time, s", fontsize=8)
+        for axis in (upper, lower):
+            axis.grid(alpha=0.3)
+            axis.tick_params(labelsize=7)
+            axis.set_xlim(time[0], time[-1])
+        figure.subplots_adjust(left=0.07, right=0.985, top=0.97, bottom=0.16, hspace=0.12)
+        canvas.draw()
+        self._picture: Image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+        box = lower.get_window_extent()
+        top = upper.get_window_extent()
+        self._rows = slice(TRACE_HEIGHT - int(top.y1), TRACE_HEIGHT - int(box.y0))
+        self._left, self._width = box.x0, box.width
+        self._start, self._span = float(time[0]), float(time[-1] - time[0])
+
+    def at(self, time: float) -> Image:
+        """The traces with the marker at `time` (s)."""
+        picture = self._picture.copy()
+        column = int(self._left + self._width * (time - self._start) / self._span)
+        picture[self._rows, max(column - 1, 0) : column + 1] = (20, 20, 20)
+        return picture

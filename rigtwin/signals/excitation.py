@@ -1,0 +1,72 @@
+"""What excites a test: pseudo-random roads and multisines. Sums of sines whose phases come from a seed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Road
+from rigtwin.numerics.arrays import Array
+
+FADE = 1.0
+"""Seconds over which an excitation grows from nothing, so that the rig starts at rest."""
+
+
+def fade_in(time: Array, seconds: float = FADE) -> Array:
+    """Raised cosine from 0 at the start to 1 after `seconds`; its slope starts and ends at 0."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0))
+
+
+def sum_of_sines(time: Array, frequencies: Array, amplitudes: Array, phases: Array) -> Array:
+    """Σ amplitude·sin(2π·frequency·time + phase); frequencies Hz, phases rad."""
+    total = np.zeros_like(time)
+    for frequency, amplitude, phase in zip(frequencies, amplitudes, phases, strict=True):
+        total += amplitude * np.sin(2 * math.pi * frequency * time + phase)
+    return total
+
+
+def road_spectrum(road: Road) -> tuple[Array, Array]:
+    """Frequencies (Hz) and amplitudes (m) of the road's sines: sqrt(2·S(f/v)·Δf/v), S(γ) = k/γⁿ (thesis Eq. 6.3).
+
+    Raises RigtwinError if the band is empty.
+    """
+    if road.highest < road.lowest:
+        raise RigtwinError(f"road.highest = {road.highest:g} Hz is below road.lowest = {road.lowest:g} Hz")
+    count = int((road.highest - road.lowest) / road.spacing + 1e-9) + 1
+    frequencies = road.lowest + road.spacing * np.arange(count)
+    density = road.roughness / (frequencies / road.speed) ** road.exponent
+    return frequencies, np.sqrt(2 * density * road.spacing / road.speed)
+
+
+def road_profile(road: Road, time: Array, random: np.random.Generator) -> Array:
+    """Ground position in m over `time` (s), with random phases.
+
+    Measured from where it starts, since the cylinder starts at its zero, and faded in over the first second.
+    """
+    frequencies, amplitudes = road_spectrum(road)
+    phases = random.uniform(0.0, 2 * math.pi, len(frequencies))
+    profile = sum_of_sines(time, frequencies, amplitudes, phases)
+    return fade_in(time) * (profile - profile[0])
+
+
+def multisine(
+    time: Array, lowest: float, highest: float, spacing: float, slope: float, rms: float, random: np.random.Generator
+) -> Array:
+    """Random-phase multisine, amplitudes ∝ frequency^-slope, scaled to `rms`, faded in over the first second.
+
+    lowest, highest and spacing in Hz.
+    """
+    frequencies = np.arange(lowest, highest + spacing / 2, spacing)
+    amplitudes = frequencies**-slope
+    amplitudes *= rms / math.sqrt(0.5 * np.sum(amplitudes**2))
+    phases = random.uniform(0.0, 2 * math.pi, len(frequencies))
+    return fade_in(time) * sum_of_sines(time, frequencies, amplitudes, phases)
+
+
+def schroeder(time: Array, frequencies: Array, amplitude: float) -> Array:
+    """Multisine of equal amplitudes with Schroeder's phases −π·k·(k−1)/n, whose peak is low (thesis §6.1.2)."""
+    number = np.arange(1, len(frequencies) + 1)
+    phases = -math.pi * number * (number - 1) / len(frequencies)
+    return sum_of_sines(time, frequencies, np.full(len(frequencies), amplitude), phases)

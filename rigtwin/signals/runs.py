@@ -1,0 +1,21 @@
+"""Runs of equal samples, by which a dead or cut-off sensor is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigtwin.numerics.arrays import Array
+
+FLAT = 8
+"""Equal samples in a row at a signal's very end of range: it is cut off there."""
+
+
+def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
+    """Where the longest run of equal, counted samples starts, and its length."""
+    same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
+    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
+    starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
+    if not len(starts):
+        return 0, 1
+    longest = int(np.argmax(ends - starts))
+    return int(starts[longest]), int(ends[longest] - starts[longest]) + 1

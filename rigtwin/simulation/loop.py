@@ -1,0 +1,151 @@
+"""The control loop: read → update → write, tick by tick, until the test is over or a limit trips.
+
+`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving compiled code; both
+give the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
+from numpy.typing import NDArray
+
+from controllers import SIZE, Commands, Controller, Demand, Measurements, controller, initial_state, packed, unpacked, update
+from rigtwin.machine.configuration import Configuration, Safety
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.converters import Sensing, sampled
+from rigtwin.simulation.plant import Machine, advance, sense
+from rigtwin.simulation.rig import Rig
+from rigtwin.simulation.safety import Trip, Watch, judged, watching, watching_compiled
+from rigtwin.simulation.twin import Twin
+
+BLOCK = 250
+"""Ticks handed on at a time, so what is not yet in a recording is at most a quarter of a second."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape (ticks, 4), truth None for
+    a rig that does not know it; trip: why the test ends with this block's last tick, or Trip.NONE; column: that tripped, of
+    Measurements or, from 4 on, of Commands."""
+
+    first: int
+    commands: Array
+    measurements: Array
+    truth: Array | None
+    trip: Trip
+    column: int = 0
+
+
+def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Block]:
+    """Runs a test tick by tick. demands: shape (ticks, 3), columns of controllers.Demand."""
+    controlling = controller(configuration.controller, configuration.timing.period)
+    state, watch = initial_state(controlling), watching()
+    rig.start()
+    try:
+        for first in range(0, len(demands), BLOCK):
+            rows: list[tuple[Commands, Measurements]] = []
+            truth: list[Measurements] = []
+            trip, column = Trip.NONE, 0
+            for demand in demands[first : first + BLOCK]:
+                measured = rig.read()
+                if isinstance(rig, Twin):
+                    truth.append(rig.truth)
+                if isinstance(rig, Twin) and rig.misses(1)[0]:
+                    commands = rig.held
+                else:
+                    state, commands = update(controlling, state, measured, Demand(*demand.tolist()))
+                rows.append((commands, measured))
+                number, column = judged(configuration.safety, configuration.timing.period, watch, measured, commands)
+                trip = Trip(number)
+                if trip != Trip.NONE:
+                    break
+                rig.write(commands)
+            yield Block(
+                first,
+                np.array([commands for commands, _ in rows]),
+                np.array([measured for _, measured in rows]),
+                np.array(truth) if truth else None,
+                trip,
+                column,
+            )
+            if trip != Trip.NONE:
+                return
+    finally:
+        rig.stop()
+
+
+@kernel
+def _ticks(
+    machine: Machine,
+    controlling: Controller,
+    limits: Safety,
+    watch: Watch,
+    sensing: Sensing,
+    memory: Array,
+    held: Commands,
+    demands: Array,
+    missed: NDArray[np.bool_],
+    disturbance: Array,
+    commands_out: Array,
+    measured_out: Array,
+    truth_out: Array,
+) -> tuple[int, int, int]:
+    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object
+    can run into a pending Ctrl-C, which compiled code does not survive."""
+    state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
+    done, trip, column = 0, Trip.NONE.value, 0
+    for tick in range(len(demands)):
+        true = sense(machine)
+        measured = sampled(sensing, true, disturbance[tick])
+        demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
+        commands = held
+        if not missed[tick]:
+            state, commands = update(controlling, state, measured, demand)
+        for signal in range(4):
+            commands_out[tick, signal] = commands[signal]
+            measured_out[tick, signal] = measured[signal]
+            truth_out[tick, signal] = true[signal]
+        done = tick + 1
+        trip, column = judged(limits, controlling.period, watch, measured, commands)
+        if trip != Trip.NONE.value:
+            break
+        advance(machine, commands.ground, commands.structure, commands.voltage)
+        held = commands
+    numbers = packed(state)
+    for number in range(SIZE):
+        memory[number] = numbers[number]
+    return done, trip, column
+
+
+def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
+    """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
+    controlling = controller(configuration.controller, configuration.timing.period)
+    memory, watch = np.array(packed(initial_state(controlling))), watching_compiled()
+    for first in range(0, len(demands), block):
+        asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
+        commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
+        done, number, column = _ticks(
+            twin.simulation.machine,
+            controlling,
+            configuration.safety,
+            watch,
+            twin.sensing,
+            memory,
+            twin.held,
+            asked,
+            twin.misses(len(asked)),
+            twin.disturbance.take(len(asked)),
+            commands,
+            measured,
+            truth,
+        )
+        trip = Trip(number)
+        yield Block(first, commands[:done], measured[:done], truth[:done], trip, column)
+        if trip != Trip.NONE:
+            return
+        twin.held = Commands(*commands[-1].tolist())

@@ -1,0 +1,51 @@
+"""How well a test emulates what it should: the ideal system beside the model's output and what was sensed.
+
+e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error); thesis Eq. 3.1, 3.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+from rigtwin.signals.noise import rms
+from rigtwin.simulation.ideal import Ideal, ideal
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2 at every tick."""
+
+    position_e1: float
+    position_e2: float
+    position_total: float
+    force_e1: float
+    force_e2: float
+    force_total: float
+
+
+def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
+    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
+    structure, load_cell: what was sensed, m and N."""
+    position, force = commands[:, 1], commands[:, 2]
+    return Tracking(
+        position_e1=rms(target.structure - position),
+        position_e2=rms(position - structure),
+        position_total=rms(target.structure - structure),
+        force_e1=rms(target.force - force),
+        force_e2=rms(force - load_cell),
+        force_total=rms(target.force - load_cell),
+    )
+
+
+def tracking(recording: Recording, configuration: Configuration) -> Tracking:
+    """e1 and e2 of a recorded test. What was sensed is without noise where a twin knows it."""
+    known = "/truth" in recording.columns
+    structure = recording.column("/truth", "structure") if known else recording.column("/sensor", "structure_lvdt")
+    load_cell = recording.column("/truth" if known else "/sensor", "load_cell")
+    commands = np.column_stack([recording.column("/command", name) for name in ("ground", "structure", "force")])
+    return tracked(ideal(configuration, commands[:, 0]), commands, structure, load_cell)

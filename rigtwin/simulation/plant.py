@@ -1,0 +1,286 @@
+"""The running plant: MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from controllers import Measurements
+from controllers.compiled import compilable
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
+from rigtwin.components.friction import Friction, breakaway, friction, gap_at
+from rigtwin.components.gas_spring import spring_force
+from rigtwin.components.parameters import GasSpring, Plant
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import forward, integrate
+from rigtwin.simulation.mechanics import Handles, build, handles
+
+SCALE = 0.01
+"""m; at this deflection a tyre hardens as much whatever the power of its law."""
+YIELDING = 5e-3
+"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
+
+
+class Contacts(NamedTuple):
+    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape (1,) each; yielded: of
+    the ground and structure plate under load, m, shape (2,)."""
+
+    changing: bool
+    rail: Friction
+    rail_gap: Array
+    motor: Friction
+    motor_gap: Array
+    cogging: float
+    cogging_pitch: float
+    cogging_phase: float
+    stiffness: float
+    damping: float
+    hardening: float
+    hardening_power: float
+    ground_compliance: float
+    structure_compliance: float
+    gas: GasSpring
+    yielded: Array
+
+
+class Machine(NamedTuple):
+    """All that compiled code needs to run one plant. plain: whether its commands act as they are and its contacts do not
+    change with the motion, as in the nominal rig."""
+
+    mechanics: Handles
+    substeps: int
+    plain: bool
+    ground: CylinderModel
+    ground_state: CylinderState
+    ground_drive: Actuator
+    ground_command: ActuatorState
+    structure: CylinderModel
+    structure_state: CylinderState
+    structure_drive: Actuator
+    structure_command: ActuatorState
+    motor_drive: Actuator
+    motor_command: ActuatorState
+    contacts: Contacts
+
+
+def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
+    """The plant's contacts with the carriage and the travel at those positions, m."""
+    rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
+    compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
+    forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
+    return Contacts(
+        rail.changing or motor.changing or any(forces),
+        rail,
+        gap_at(carriage),
+        motor,
+        gap_at(travel),
+        plant.motor.cogging,
+        plant.motor.cogging_pitch,
+        plant.motor.cogging_phase,
+        tyre.stiffness,
+        tyre.damping,
+        tyre.hardening,
+        tyre.hardening_power,
+        *compliances,
+        plant.gas_spring,
+        np.zeros(2),
+    )
+
+
+def deflected(plant: Plant, preload: float) -> float:
+    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
+    return (preload + plant.gas_spring.force) / plant.tyre.stiffness
+
+
+def tyre_force(plant: Plant, deflection: Array, rate: Array) -> Array:
+    """What the tyre pushes with, N, at a deflection (m) that changes at a rate (m/s); it cannot pull."""
+    tyre, squeezed = plant.tyre, np.maximum(deflection, 0.0)
+    slope = np.maximum(1.0 + tyre.hardening * squeezed * (squeezed / SCALE) ** (tyre.hardening_power - 1.0), 0.0)
+    return np.maximum(tyre.stiffness * slope * squeezed + np.where(deflection > 0.0, tyre.damping * rate, 0.0), 0.0)
+
+
+class Simulation:
+    """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
+    at rest. Owns the MuJoCo structures that `machine` looks into."""
+
+    def __init__(self, plant: Plant, timestep: float, substeps: int, ground: float, structure: float, preload: float) -> None:
+        """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
+        self.model = build(plant, timestep)
+        self.data = mujoco.MjData(self.model)
+        view = handles(self.model, self.data)
+        drives = [
+            actuator(of, plant.computer, timestep) for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
+        ]
+        held = [holding(drives[0], ground), holding(drives[1], structure), holding(drives[2], preload / plant.motor.constant)]
+        here = float(held[0].memory[3])
+        view.qpos[view.ground] = here
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(plant, preload)
+        view.activation[0] = view.control[0] = preload / plant.motor.constant
+        touching = contacts(plant, carriage, 0.0)
+        self.machine = Machine(
+            view,
+            substeps,
+            not touching.changing and all(each.neutral for each in drives),
+            sampled(plant.ground_cylinder, timestep),
+            settled(plant.ground_cylinder, here),
+            drives[0],
+            held[0],
+            sampled(plant.structure_cylinder, timestep),
+            settled(plant.structure_cylinder, carriage),
+            drives[1],
+            held[1],
+            drives[2],
+            held[2],
+            touching,
+        )
+
+
+@compilable
+def drive(mechanics: Handles, joint: int, here: float, there: float) -> None:
+    """Prescribes a joint's motion over the coming timestep, from `here` to `there` in m."""
+    mechanics.qpos[joint] = here
+    mechanics.qvel[joint] = (there - here) / mechanics.timestep
+
+
+@compilable
+def motor_force(mechanics: Handles) -> float:
+    """What the motor pushes with now, its friction apart, N."""
+    return mechanics.motor_constant * mechanics.activation[0] + mechanics.motor_bias[0]
+
+
+@compilable
+def brace(mechanics: Handles) -> None:
+    """Holds the structure plate against the motor, so that its friction is not asked to."""
+    mechanics.applied[mechanics.structure] = -motor_force(mechanics)
+
+
+@compilable
+def stiffening(now: Contacts, deflection: float) -> float:
+    """How many times its nominal secant stiffness the tyre has at a deflection, m."""
+    if now.hardening == 0.0 or deflection <= 0.0:
+        return 1.0
+    return max(1.0 + now.hardening * deflection * (deflection / SCALE) ** (now.hardening_power - 1.0), 0.0)
+
+
+@compilable
+def touch(mechanics: Handles, now: Contacts) -> None:
+    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
+    if not now.changing:
+        return
+    carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
+    travel = mechanics.qpos[mechanics.structure] - carriage
+    sliding = mechanics.qvel[mechanics.structure] - velocity
+    # MuJoCo's dry friction is the same both ways; what one way has more is a force besides.
+    forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity)
+    mechanics.rail_friction[0] = 0.5 * (forward + backward)
+    mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
+    if now.gas.force > 0.0:
+        mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
+    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding)
+    mechanics.motor_friction[0] = 0.5 * (forward + backward)
+    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
+    mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
+    deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
+    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffening(now, deflection)
+
+
+@compilable
+def give_way(mechanics: Handles, now: Contacts) -> None:
+    """Lets compliant cylinders yield to the load of the last step."""
+    share = mechanics.timestep / (YIELDING + mechanics.timestep)
+    tyre = -mechanics.constraint[mechanics.ground]
+    cell = mechanics.constraint[mechanics.structure] + mechanics.passive[mechanics.structure] + motor_force(mechanics)
+    now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
+    now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
+
+
+@compilable
+def true_measurements(mechanics: Handles) -> Measurements:
+    """What ideal sensors read of the state last computed by `forward` with its sensors."""
+    ground, structure = mechanics.qpos[mechanics.ground], mechanics.qpos[mechanics.structure]
+    travel = structure - mechanics.qpos[mechanics.carriage]
+    return Measurements(ground, structure, travel, mechanics.sensors[mechanics.load_cell])
+
+
+@compilable
+def sense(machine: Machine) -> Measurements:
+    """Ideal measurements now, under the commands held until now.
+
+    The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
+    that accelerates the carriage with the plate, which a velocity one timestep old would not show.
+    """
+    mechanics, yielded = machine.mechanics, machine.contacts.yielded
+    ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+    onward = next_position(machine.ground, machine.ground_state, machine.ground_command.memory[3])
+    drive(mechanics, mechanics.ground, ground, onward + yielded[0])
+    onward = next_position(machine.structure, machine.structure_state, machine.structure_command.memory[3])
+    drive(mechanics, mechanics.structure, structure, onward + yielded[1])
+    touch(mechanics, machine.contacts)
+    brace(mechanics)
+    forward(mechanics.model, mechanics.data, 0, 0)
+    return true_measurements(mechanics)
+
+
+@compilable
+def advance(machine: Machine, ground_command: float, structure_command: float, voltage: float) -> None:
+    """One control period with the commands held."""
+    if machine.plain:
+        advance_plain(
+            machine.mechanics,
+            machine.substeps,
+            machine.ground,
+            machine.ground_state,
+            machine.structure,
+            machine.structure_state,
+            ground_command,
+            structure_command,
+            voltage,
+        )
+        machine.ground_command.memory[3] = ground_command
+        machine.structure_command.memory[3] = structure_command
+        return
+    mechanics, yielded = machine.mechanics, machine.contacts.yielded
+    for _ in range(machine.substeps):
+        ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+        asked = conditioned(machine.ground_drive, machine.ground_command, ground_command)
+        advance_cylinder(machine.ground, machine.ground_state, asked)
+        asked = conditioned(machine.structure_drive, machine.structure_command, structure_command)
+        advance_cylinder(machine.structure, machine.structure_state, asked)
+        mechanics.control[0] = conditioned(machine.motor_drive, machine.motor_command, voltage)
+        if machine.contacts.changing:
+            give_way(mechanics, machine.contacts)
+        drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])
+        drive(mechanics, mechanics.structure, structure, machine.structure_state.position[0] + yielded[1])
+        touch(mechanics, machine.contacts)
+        brace(mechanics)
+        forward(mechanics.model, mechanics.data, 0, 1)
+        integrate(mechanics.model, mechanics.data)
+
+
+@compilable
+def advance_plain(
+    mechanics: Handles,
+    substeps: int,
+    ground: CylinderModel,
+    ground_state: CylinderState,
+    structure: CylinderModel,
+    structure_state: CylinderState,
+    ground_command: float,
+    structure_command: float,
+    voltage: float,
+) -> None:
+    """The same for a machine whose commands act as they are and whose contacts do not change: a third faster."""
+    mechanics.control[0] = voltage
+    for _ in range(substeps):
+        ground_here, structure_here = ground_state.position[0], structure_state.position[0]
+        advance_cylinder(ground, ground_state, ground_command)
+        advance_cylinder(structure, structure_state, structure_command)
+        drive(mechanics, mechanics.ground, ground_here, ground_state.position[0])
+        drive(mechanics, mechanics.structure, structure_here, structure_state.position[0])
+        brace(mechanics)
+        forward(mechanics.model, mechanics.data, 0, 1)
+        integrate(mechanics.model, mechanics.data)

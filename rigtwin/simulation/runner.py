@@ -1,0 +1,84 @@
+"""Runs one test on the twin, into a recording or in memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rigtwin import __version__
+from rigtwin.machine.configuration import Configuration, Safety, flattened
+from rigtwin.machine.effects import applied
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Writer
+from rigtwin.simulation.loop import run_compiled
+from rigtwin.simulation.safety import Trip, explained
+from rigtwin.simulation.twin import Twin
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it early."""
+
+    path: Path
+    ticks: int
+    reason: str
+    tripped: bool
+
+
+@dataclass(frozen=True)
+class Ran:
+    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of controllers.Commands, .Measurements;
+    trip: why it ended early, or Trip.NONE."""
+
+    commands: Array
+    measurements: Array
+    truth: Array
+    trip: Trip
+
+
+def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
+    """Runs `demands`, shape (ticks, 3), on the twin and keeps everything in memory."""
+    blocks = list(run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands))
+    truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
+    commands, measured = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("commands", "measurements"))
+    return Ran(commands, measured, truth, blocks[-1].trip)
+
+
+def unlimited(configuration: Configuration) -> Configuration:
+    """The same without trips, to see what a twin would do wherever it goes."""
+    return configuration._replace(safety=Safety(*(math.inf for _ in Safety._fields)))
+
+
+def record(
+    path: Path,
+    experiment: str,
+    configuration: Configuration,
+    demands: Array,
+    seed: int,
+    progress: Callable[[int], object] = lambda _: None,
+    effects: Sequence[str] = (),
+) -> Outcome:
+    """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
+
+    effects: as `--effect` takes them; the rig has them, the operator's settings in the recording do not know.
+
+    progress is called with the ticks done since its last call. A trip, an interruption or an exception leaves a readable
+    recording that says why it ended. Raises RigtwinError before anything is written if the configuration is at fault.
+    """
+    actual = applied(configuration, list(effects))
+    twin = Twin(actual, float(demands[0, 0]), seed)
+    settings = flattened(configuration)
+    ticks, trip, column = 0, Trip.NONE, 0
+    with Writer(path, experiment, configuration.timing.period, settings["controller"]) as writer:
+        writer.add_twin(seed, settings, tuple(effects), __version__)
+        for block in run_compiled(twin, actual, demands):
+            writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
+            ticks, trip, column = ticks + len(block.commands), block.trip, block.column
+            progress(len(block.commands))
+        reason = explained(trip, configuration.safety, column)
+        writer.finish(reason)
+    return Outcome(path, ticks, reason, trip != Trip.NONE)

@@ -1,0 +1,217 @@
+"""Limits: what ends a test at once. Looks at raw measurements and at commands before they are written, on twin and rig
+alike.
+
+A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled loop and the rig's loop
+call the same one.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers import Commands, Measurements
+from controllers.compiled import compilable
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.components.parameters import Plant
+from rigtwin.machine.configuration import Safety
+from rigtwin.numerics.arrays import Array
+
+MOTOR_LAG = Plant().motor.time_constant
+"""s, of the motor's force behind its voltage."""
+LEADING = 1.5
+"""Times its cylinder's limit that a command may be."""
+VELOCITY_SPAN = 10
+"""Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
+
+
+class Trip(IntEnum):
+    """Why a test ended early."""
+
+    NONE = 0
+    STRUCTURE = 1
+    FORCE = 2
+    TRAVEL = 3
+    NOT_A_NUMBER = 4
+    GROUND = 5
+    VELOCITY = 6
+    JUMP = 7
+    STUCK = 8
+    FOLLOWING = 9
+    COMMAND = 10
+    COMMAND_RATE = 11
+    WHEEL = 12
+    MOTOR = 13
+
+
+(
+    _NONE,
+    _STRUCTURE,
+    _FORCE,
+    _TRAVEL,
+    _NOT_A_NUMBER,
+    _GROUND,
+    _VELOCITY,
+    _JUMP,
+    _STUCK,
+    _FOLLOWING,
+    _COMMAND,
+    _COMMAND_RATE,
+    _WHEEL,
+    _MOTOR,
+) = (trip.value for trip in Trip)
+"""Plain numbers: looking up an enumeration's value takes longer than the comparison."""
+
+
+class Watch(NamedTuple):
+    """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
+    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
+    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place. Arrays for
+    compiled loops; lists, which Python reads faster, for others."""
+
+    measured: Array | list[float]
+    repeats: Array | list[float]
+    commands: Array | list[float]
+    travel: Array | list[float]
+    motor: Array | list[float]
+
+
+def watching() -> Watch:
+    """Before the first tick, for a loop in Python."""
+    unknown = [math.nan]
+    return Watch(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
+
+
+def watching_compiled() -> Watch:
+    """Before the first tick, for a compiled loop."""
+    return Watch(*(np.array(values) for values in watching()))
+
+
+@compilable
+def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements) -> tuple[int, int]:
+    """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
+    for column in range(4):
+        if not math.isfinite(measured[column]):
+            return _NOT_A_NUMBER, column
+    trip, at = _NONE, 0
+    for column in range(4):
+        change = abs(measured[column] - watch.measured[column])
+        rate = limits.force_rate if column == 3 else limits.lvdt_rate
+        if change > rate * period and trip == _NONE:
+            trip, at = _JUMP, column
+        watch.repeats[column] = watch.repeats[column] + 1.0 if change == 0.0 else 1.0
+        if watch.repeats[column] >= limits.stuck and trip == _NONE:
+            trip, at = _STUCK, column
+        watch.measured[column] = measured[column]
+    place = int(watch.travel[VELOCITY_SPAN]) if watch.travel[VELOCITY_SPAN] >= 0.0 else 0
+    moved = abs(measured.suspension_lvdt - watch.travel[place])
+    watch.travel[place] = measured.suspension_lvdt
+    watch.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
+    if trip != _NONE:
+        return trip, at
+    if abs(measured.structure_lvdt) > limits.structure:
+        return _STRUCTURE, 1
+    if abs(measured.load_cell) > limits.force:
+        return _FORCE, 3
+    if abs(measured.suspension_lvdt) > limits.travel:
+        return _TRAVEL, 2
+    if abs(measured.ground_lvdt) > limits.ground:
+        return _GROUND, 0
+    if moved > limits.velocity * VELOCITY_SPAN * period:
+        return _VELOCITY, 2
+    # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
+    if abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt) > limits.wheel:
+        return _WHEEL, 2
+    if abs(measured.load_cell - watch.motor[0]) > limits.motor:
+        return _MOTOR, 3
+    return _NONE, 0
+
+
+@compilable
+def commanded_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
+    """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
+    are remembered as written."""
+    for column in range(4):
+        if not math.isfinite(commands[column]):
+            return _NOT_A_NUMBER, 4 + column
+    if abs(commands.ground) > LEADING * limits.ground:
+        return _COMMAND, 4
+    # What leads a cylinder to its limit may be beyond it for as long as the cylinder lags behind.
+    if abs(commands.structure) > LEADING * limits.structure:
+        return _COMMAND, 5
+    for column in (0, 1, 3):
+        rate = limits.voltage_rate if column == 3 else limits.command_rate
+        if abs(commands[column] - watch.commands[column]) > rate * period:
+            return _COMMAND_RATE, 4 + column
+    if abs(commands.ground - measured.ground_lvdt) > limits.following:
+        return _FOLLOWING, 0
+    if abs(commands.structure - measured.structure_lvdt) > limits.following:
+        return _FOLLOWING, 1
+    if abs(commands.force - measured.load_cell) > limits.following_force:
+        return _FOLLOWING, 3
+    for column in range(4):
+        watch.commands[column] = commands[column]
+    share = 1.0 - math.exp(-period / MOTOR_LAG)
+    force = watch.motor[0] if math.isfinite(watch.motor[0]) else measured.load_cell
+    watch.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
+    return _NONE, 0
+
+
+@compilable
+def judged(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
+    """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
+    trip, column = sensed_wrong(limits, period, watch, measured)
+    if trip == _NONE:
+        trip, column = commanded_wrong(limits, period, watch, measured, commands)
+    return trip, column
+
+
+def held(limits: Safety, commands: Commands) -> Commands:
+    """The stop state after commands: no force, cylinders where they were told to be, but not beyond their limits."""
+    ground = min(max(commands.ground, -limits.ground), limits.ground)
+    structure = min(max(commands.structure, -limits.structure), limits.structure)
+    return Commands(ground, structure, 0.0, 0.0)
+
+
+def beyond(limits: Safety, measured: Measurements) -> bool:
+    """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
+    ground, structure = abs(measured.ground_lvdt) <= limits.ground, abs(measured.structure_lvdt) <= limits.structure
+    return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
+
+
+def within(limits: Safety, measured: Measurements) -> str | None:
+    """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
+    hysteresis."""
+    share = 1.0 - limits.hysteresis
+    for name, limit in zip(Measurements._fields, (limits.ground, limits.structure, limits.travel, limits.force), strict=True):
+        value = getattr(measured, name)
+        if not abs(value) <= share * limit:
+            return f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, {100 * share:.0f} % of its limit"
+    return None
+
+
+def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
+    """One line for the operator. column: of Measurements, from 4 on of Commands."""
+    name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
+    lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)
+    command, change = ("m", limits.command_rate) if column != 7 else ("V", limits.voltage_rate)
+    error, following = ("m", limits.following) if column != 3 else ("N", limits.following_force)
+    return {
+        Trip.NONE: "completed",
+        Trip.STRUCTURE: f"trip: |structure_lvdt| above {limits.structure:g} m",
+        Trip.FORCE: f"trip: |load_cell| above {limits.force:g} N",
+        Trip.TRAVEL: f"trip: |suspension_lvdt| above {limits.travel:g} m, the motor's stroke",
+        Trip.NOT_A_NUMBER: f"trip: {name} is not a finite number",
+        Trip.GROUND: f"trip: |ground_lvdt| above {limits.ground:g} m",
+        Trip.VELOCITY: f"trip: suspension_lvdt moves faster than {limits.velocity:g} m/s",
+        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: sensor or cable",
+        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
+        Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
+        Trip.COMMAND: f"trip: {name} is beyond its limit",
+        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground plate: one of them is wrong",
+        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
+        Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
+    }[trip]

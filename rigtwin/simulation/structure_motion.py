@@ -1,0 +1,65 @@
+"""What the structure model did during a test: the controller run again on what was measured."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from controllers import (
+    SIZE,
+    Controller,
+    Demand,
+    Measurements,
+    Settings,
+    Structure,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
+from controllers.beam import MODES
+from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.recording import Recording
+
+MODAL = slice(7, 7 + MODES)
+"""The modal displacements within a packed state."""
+
+
+@kernel
+def _states(controlling: Controller, start: Array, measured: Array, demands: Array, out: Array) -> None:
+    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
+    for tick in range(len(measured)):
+        sample = Measurements(measured[tick, 0], measured[tick, 1], measured[tick, 2], measured[tick, 3])
+        state, _ = update(controlling, state, sample, Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]))
+        numbers = packed(state)
+        for number in range(SIZE):
+            out[tick, number] = numbers[number]
+
+
+def states(settings: Settings, period: float, measured: Array, demands: Array) -> Array:
+    """The controller's packed state after every tick, shape (ticks, SIZE). measured: shape (ticks, 4), columns of
+    controllers.Measurements; demands: shape (ticks, 3), of controllers.Demand; period: s."""
+    controlling = controller(settings, period)
+    out = np.empty((len(measured), SIZE))
+    start = np.array(packed(initial_state(controlling)))
+    _states(controlling, start, np.ascontiguousarray(measured), np.ascontiguousarray(demands), out)
+    return out
+
+
+def wing(settings: Settings, period: float, packed_states: Array) -> Array:
+    """Of the cross of beams: height over its centre at 0, 1, 2 and 3 beams from it, m, shape (ticks, 4)."""
+    heights = packed_states[:, MODAL] @ controller(settings, period).modes.wing
+    return heights - heights[:, :1]
+
+
+def recorded_wing(recording: Recording) -> Array | None:
+    """The same of a recording, or None if its structure model was not of beams."""
+    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    if settings.structure != Structure.BEAM:
+        return None
+    measured = np.column_stack([recording.column("/sensor", name) for name in Measurements._fields])
+    demands = np.column_stack([recording.column("/command", name) for name in Demand._fields])
+    return wing(settings, recording.period, states(settings, recording.period, measured, demands))

@@ -1,0 +1,68 @@
+"""The twin as a rig: MuJoCo's mechanics, both cylinders, and the converters in between."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers import Commands, Measurements
+from controllers.force import MOTOR_CONSTANT
+from rigtwin.machine.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.simulation.converters import Disturbance, sampled, sensing
+from rigtwin.simulation.plant import Machine, Simulation, advance, sense
+
+_advance = kernel(advance)
+
+
+@kernel
+def _sense(machine: Machine, out: Array) -> None:
+    true = sense(machine)
+    for number in range(4):
+        out[number] = true[number]
+
+
+class Twin:
+    """A simulated rig. The same configuration, first ground command and seed give the same measurements to the bit.
+
+    `truth` holds the last measurements before noise and quantisation.
+    """
+
+    def __init__(self, configuration: Configuration, ground: float, seed: int) -> None:
+        """ground: the first ground command, m. Raises RigtwinError unless the period is a multiple of the timestep."""
+        controller = configuration.controller
+        self.simulation = Simulation(
+            configuration.plant,
+            configuration.timing.timestep,
+            configuration.substeps,
+            ground=ground,
+            structure=controller.start,
+            preload=controller.preload,
+        )
+        self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
+        self.sensing = sensing(configuration.plant, configuration.timing.period)
+        self._missed = np.random.default_rng([seed, 2])
+        self._share_missed = configuration.plant.computer.missed_ticks
+        self.held = Commands(float(ground), controller.start, controller.preload, controller.preload / MOTOR_CONSTANT)
+        self.truth = Measurements(0.0, 0.0, 0.0, 0.0)
+
+    def start(self) -> None:
+        """Nothing to do: a twin is built at its start."""
+
+    def read(self) -> Measurements:
+        true = np.empty(4)
+        _sense(self.simulation.machine, true)
+        self.truth = Measurements(*true.tolist())
+        return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
+
+    def misses(self, ticks: int) -> NDArray[np.bool_]:
+        """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as they are."""
+        return self._missed.random(ticks) < self._share_missed
+
+    def write(self, commands: Commands) -> None:
+        _advance(self.simulation.machine, commands.ground, commands.structure, commands.voltage)
+        self.held = commands
+
+    def stop(self) -> None:
+        """Nothing to do: nothing moves unless written to."""

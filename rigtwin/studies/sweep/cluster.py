@@ -1,0 +1,120 @@
+"""The workers of a dask cluster, by its scheduler's address."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from types import TracebackType
+from typing import Any
+from uuid import uuid4
+
+from rigtwin.errors import RigtwinError
+from rigtwin.studies.sweep.digest import source_digest
+
+ANSWERS = 5.0
+"""s that a scheduler may take to answer."""
+PATIENCE = 60.0
+"""s without any worker until a sweep gives up."""
+
+
+def _same(digest: str, function: Callable[[Any], Any], argument: Any) -> Any:
+    """On a worker: the job, if the worker has the same sources."""
+    here = source_digest()
+    if here != digest:
+        raise RigtwinError(f"a worker of the cluster has another version of rigtwin: sources {here}, here {digest}")
+    return function(argument)
+
+
+class _Given:
+    """A job at the cluster. What it came to is fetched with that of others, since each fetch is milliseconds."""
+
+    def __init__(self, future: Any) -> None:
+        self.future = future
+        self.fetched: list[Any] = []
+
+    def result(self) -> Any:
+        return self.fetched[0] if self.fetched else self.future.result()
+
+    def cancel(self) -> None:
+        self.future.cancel()
+
+    def add_done_callback(self, fn: Callable[[Any], Any], /) -> None:
+        self.future.add_done_callback(lambda _: fn(self))
+
+
+class Cluster:
+    """Raises RigtwinError if the package is missing, nobody answers, or it has no workers."""
+
+    ahead = 16
+    """A job is tens of milliseconds on its way."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            from distributed import Client
+            from distributed.scheduler import KilledWorker
+        except ImportError:
+            raise RigtwinError("--cluster needs dask.distributed: pip install 'rigtwin[cluster]'") from None
+        self.lost: tuple[type[BaseException], ...] = (KilledWorker,)
+        self.address = address
+        try:
+            self._client = Client(address, timeout=ANSWERS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            said = str(error).splitlines()[0] if str(error) else "no answer"
+            raise RigtwinError(
+                f"no cluster at {address}: {said}; expected a scheduler's address, such as tcp://host:8786"
+            ) from None
+        self._run = uuid4().hex
+        self._given = 0
+        self._ready: deque[_Given] = deque()
+        if not self.capacity:
+            self._client.close()
+            raise RigtwinError(f"the cluster at {address} has no workers; start some: dask worker {address} --nthreads 1")
+
+    @property
+    def capacity(self) -> int:
+        return sum(self._client.nthreads().values())
+
+    def submit(self, function: Callable[[Any], Any], argument: Any) -> Any:
+        self._given += 1
+        key = f"rigtwin-{self._run}-{self._given}"
+        return _Given(self._client.submit(_same, source_digest(), function, argument, key=key, pure=False))
+
+    def next(self, finished: SimpleQueue[Any]) -> Any:
+        if not self._ready:
+            self._ready.append(self._waited(finished))
+            with suppress(Empty):
+                while True:
+                    self._ready.append(finished.get_nowait())
+            good = [one for one in self._ready if one.future.status == "finished"]
+            with suppress(Exception):
+                # What cannot be fetched together says why when it is asked for alone.
+                results: Any = self._client.gather([one.future for one in good])
+                for one, result in zip(good, results, strict=True):
+                    one.fetched.append(result)
+        return self._ready.popleft()
+
+    def _waited(self, finished: SimpleQueue[Any]) -> _Given:
+        """The next job that is done."""
+        alone = 0.0
+        while True:
+            before = time.monotonic()
+            try:
+                return finished.get(timeout=2.0)
+            except Empty:
+                pass
+            if self._client.status != "running":
+                raise RigtwinError(f"the cluster at {self.address} is gone; what is done is kept, run again to go on")
+            alone = 0.0 if self.capacity else alone + time.monotonic() - before
+            if alone > PATIENCE:
+                raise RigtwinError(
+                    f"the cluster at {self.address} has no workers left; what is done is kept, run again to go on"
+                )
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._client.close()
