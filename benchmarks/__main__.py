@@ -21,7 +21,7 @@ from experiments import EXPERIMENTS
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.machine.configuration import Configuration, Safety, Timing
-from rigtwin.machine.effects import applied
+from rigtwin.machine.configuration import applied
 from rigtwin.machine.library import find
 from rigtwin.numerics.compiling import kernel, step
 from rigtwin.simulation.loop import BLOCK, run_compiled

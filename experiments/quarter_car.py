@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controllers import Settings, Skyhook, Structure
 from experiments.experiment import Experiment, flat_ground, road_ground
-from rigtwin.components.parameters import GasSpring, Plant
+from rigtwin.components import GasSpring, RigPlant
 from rigtwin.machine.configuration import Configuration, Road, Timing
 
 PASSIVE = Settings()
@@ -34,7 +34,7 @@ EXPERIMENTS = (
         "gas-spring",
         "quarter car on a real gas spring beside the motor, dropped",
         "thesis §3.5, Eq. 3.3",
-        Configuration(plant=Plant(gas_spring=GAS), controller=ON_GAS),
+        Configuration(plant=RigPlant(gas_spring=GAS), controller=ON_GAS),
         flat_ground,
     ),
     Experiment(

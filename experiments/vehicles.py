@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from controllers import Settings
 from experiments.experiment import Experiment, flat_ground
-from rigtwin.components.parameters import Carriage, Plant, Tyre
+from rigtwin.components import Carriage, RigPlant, Tyre
 from rigtwin.machine.configuration import Configuration, Timing
 
 
@@ -34,7 +34,7 @@ def configuration(vehicle: Vehicle) -> Configuration:
     """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so that the body drops."""
     preload = 0.9 * vehicle.sprung_mass * Settings().gravity
     return Configuration(
-        plant=Plant(carriage=Carriage(vehicle.unsprung_mass), tyre=Tyre(vehicle.tyre_stiffness)),
+        plant=RigPlant(carriage=Carriage(vehicle.unsprung_mass), tyre=Tyre(vehicle.tyre_stiffness)),
         controller=Settings(
             start=-preload / vehicle.tyre_stiffness,
             sprung_mass=vehicle.sprung_mass,

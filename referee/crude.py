@@ -7,13 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Measurements
-from rigtwin.components.parameters import Plant
-from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.components import RigPlant, Scales, Swing, candidates
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.diagnosis.trial import swings
-from rigtwin.diagnosis.trials import TRIALS, trials
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.effects import candidates
+from rigtwin.diagnosis.swing import swings
 from rigtwin.machine.library import find
 from rigtwin.recording import load
 from rigtwin.recording.channels import SUSPENSION_RIG
@@ -31,22 +27,25 @@ BETTER = 0.98
 def black_box(path: Path) -> str:
     """The effect whose closed loop comes nearest to a recording tick by tick, or `none`."""
     recording = load(path)
-    configuration = configuration_of(recording, Configuration())
+    machine = find(SUSPENSION_RIG)
+    configuration = machine.configuration_of(recording)
     ticks = min(recording.ticks, round(SECONDS / recording.period))
     free = unlimited(configuration._replace(timing=configuration.timing._replace(timestep=0.5 * recording.period)))
     demands = np.column_stack([recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")])
     measured = np.stack([recording.column("/sensor", name)[:ticks] for name in Measurements._fields])
     noise = np.array([white_noise(row) for row in measured])
 
-    def misfit(plant: Plant) -> float:
+    def misfit(plant: RigPlant) -> float:
         truth = simulated(free._replace(plant=plant), demands, 0).truth.T
         return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
 
     best, name = BETTER * misfit(configuration.plant), "none"
-    swing = swings(find(SUSPENSION_RIG), (recording,))
+    swing = swings(machine, (recording,))
     for effect in candidates(configuration.plant):
-        if effect.kind.name in TRIALS:
-            for start in trials(effect, configuration.plant, swing).starts[:8]:
+        if effect.searched:
+            # The rig's starts need no sizes of its motion.
+            starts = effect.starts(configuration.plant, swing.get(effect.component, Swing()), Scales)
+            for start in starts.values[:8]:
                 if (value := misfit(with_values(configuration.plant, (effect,), (start,)))) < best:
                     best, name = value, effect.name
     return name

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from controllers import SIZE, Commands, Controller, Demand, Measurements, controller, initial_state, packed, unpacked, update
+from controllers import (
+    SIZE,
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
 from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
 from referee.reference_rig import disturbed
 from rigtwin.machine.configuration import Configuration, Safety

@@ -43,13 +43,19 @@ def writable(out: Path) -> None:
 
 def table(rows: list[tuple[str, ...]]) -> str:
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    )
 
 
 def late(figures: Mapping[str, str]) -> str:
     """What a recording says of the lateness of a loop in real time."""
     try:
-        times = [f"{1e6 * float(figures.get(f'late_{figure}', 'nan')):.3g} us" for figure in ("median", "999", "max")]
+        times = [
+            f"{1e6 * float(figures.get(f'late_{figure}', 'nan')):.3g} us"
+            for figure in ("median", "999", "max")
+        ]
     except ValueError:
         return "its lateness cannot be read"
     return (

@@ -16,7 +16,10 @@ def written(path: Path, seed: int) -> None:
     random = np.random.default_rng(seed)
     motion = wander(random, SECONDS, PERIOD / FINE, 0.03, 0.2, 2.5)
     force = damper_force(TRUTH, motion, np.gradient(motion, PERIOD / FINE))
-    position, load = sampled(random, motion[::FINE], 4e-6, 1e-6), sampled(random, force[::FINE], 1.2, 0.1)
+    position, load = (
+        sampled(random, motion[::FINE], 4e-6, 1e-6),
+        sampled(random, force[::FINE], 1.2, 0.1),
+    )
     lines = ["Logger 4711;;", "Prüfling: Dämpfer 3;;", "Zeit;Weg;Kraft", "s;mm;N"]
     for tick, (x, f) in enumerate(zip(position, load, strict=True)):
         lines.append(f"{tick * PERIOD:.3f};{1e3 * x:.3f};{f:.1f}".replace(".", ","))

@@ -18,14 +18,14 @@ from referee.reference_plant import Truth
 from referee.reference_rig import Law, quiet, run
 from referee.score import misses, rows, table, wilson
 from referee.test_signals import TESTS, asked
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.machine.effects import candidates
+from rigtwin.components import candidates
 from rigtwin.machine.library import find as machine_of
 from rigtwin.recording import load
 
-KNOWN = {effect.name for effect in candidates(Plant())} | {"setting@controller"}
+KNOWN = {effect.name for effect in candidates(RigPlant())} | {"setting@controller"}
 
 
 def test_the_referee_imports_nothing_of_the_twin():

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.checks import check, longest_run
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.machine.configuration import Timing
-from rigtwin.machine.effects import candidates
+from rigtwin.components import candidates
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.conftest import RECORDINGS
@@ -49,7 +49,7 @@ def test_recordings_of_the_stand_in_rig_have_no_fault(path):
     assert faults(load(path)) == {}
 
 
-@pytest.mark.parametrize("name", [e.name for e in candidates(Plant())])
+@pytest.mark.parametrize("name", [e.name for e in candidates(RigPlant())])
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
     configuration = experiment.configuration._replace(timing=Timing(duration=5.0))

@@ -9,12 +9,13 @@ import pytest
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
 from rigtwin.diagnosis.replays import REPLAYS
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration, Timing, from_assignments
-from rigtwin.machine.effects import applied, candidates, find
+from rigtwin.components import candidates, find
+from rigtwin.machine.configuration import applied
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.conftest import rig_recording
@@ -167,7 +168,7 @@ LEFT_OVER = {
 """Effects that a twin which has them explains only in part, and why."""
 
 
-@pytest.mark.parametrize("name", [effect.name for effect in candidates(Plant()) if effect.kind.name not in ("quantisation",)])
+@pytest.mark.parametrize("name", [effect.name for effect in candidates(RigPlant()) if effect.kind.name not in ("quantisation",)])
 def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise is left."""
     experiment = EXPERIMENTS["imposed"]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.signals.noise import white_noise, without_mains
 from rigtwin.simulation.converters import Disturbance, converted, sensors
 
 
 def test_disturbances_have_the_sizes_of_the_table_and_do_not_depend_on_the_block():
-    plant = Plant()
+    plant = RigPlant()
     whole = Disturbance(plant, 1e-3, 4).take(20_000)
     parts = Disturbance(plant, 1e-3, 4)
     assert np.array_equal(whole, np.concatenate([parts.take(n) for n in (1, 249, 9750, 10_000)]))
@@ -26,7 +26,7 @@ def test_disturbances_have_the_sizes_of_the_table_and_do_not_depend_on_the_block
 
 
 def test_channels_are_independent():
-    plant = Plant()
+    plant = RigPlant()
     louder = plant._replace(load_cell=plant.load_cell._replace(white=3.0))
     one, other = Disturbance(plant, 1e-3, 4).take(100), Disturbance(louder, 1e-3, 4).take(100)
     assert np.array_equal(one[:, :3], other[:, :3])

@@ -10,7 +10,7 @@ from scipy.signal import lsim
 
 from controllers import Mode, Settings
 from rigtwin.components.cylinder import continuous
-from rigtwin.components.parameters import Cylinder
+from rigtwin.components import Cylinder
 from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.machine.configuration import Configuration, Timing
 from rigtwin.signals.excitation import schroeder

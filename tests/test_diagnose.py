@@ -10,7 +10,7 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
@@ -22,7 +22,8 @@ from rigtwin.diagnosis.sampling import outstanding
 from rigtwin.diagnosis.unknown_input import located
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration, from_toml, overridden
-from rigtwin.machine.effects import find, without
+from rigtwin.components import find
+from rigtwin.machine.configuration import without
 from rigtwin.machine.library import find as machine_of
 from rigtwin.machine.posterior import load_posterior
 from rigtwin.models.predictor import Motion
@@ -241,7 +242,7 @@ def test_a_controller_as_told_has_no_deviation():
 )
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
-    (found,) = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(Plant())], Plant())
+    (found,) = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(RigPlant())], RigPlant())
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)
 
@@ -249,9 +250,9 @@ def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
 @SLOW
 def test_noise_that_all_sensors_share_is_the_laboratorys():
     louder = [
-        f"noise@{name}={3 * getattr(Plant(), name).white}"
-        for name in Plant()._fields
-        if hasattr(getattr(Plant(), name), "white")
+        f"noise@{name}={3 * getattr(RigPlant(), name).white}"
+        for name in RigPlant()._fields
+        if hasattr(getattr(RigPlant(), name), "white")
     ]
     outcome = answered(recorded("imposed", tuple(louder)))
     assert outcome.diagnosis.verdict == "no gap"

@@ -11,11 +11,12 @@ import pytest
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components.conditioning import actuator, conditioned, holding
-from rigtwin.components.friction import breakaway, friction, gap_at
-from rigtwin.components.parameters import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, Plant, Rail, Tyre
+from rigtwin.components.guide import breakaway, friction, gap_at
+from rigtwin.components import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, RigPlant, Rail, Tyre
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration, Timing
-from rigtwin.machine.effects import KINDS, applied, candidates, find
+from rigtwin.components import KINDS, candidates, find
+from rigtwin.machine.configuration import applied
 from rigtwin.recording import load
 from rigtwin.simulation.converters import sampled, sensing
 from rigtwin.simulation.loop import run, run_compiled
@@ -24,7 +25,7 @@ from rigtwin.simulation.plant import contacts, drive, touch
 from rigtwin.simulation.runner import record
 from rigtwin.simulation.twin import Twin
 
-EFFECTS = {effect.name: effect for effect in candidates(Plant())}
+EFFECTS = {effect.name: effect for effect in candidates(RigPlant())}
 IMPOSED = EXPERIMENTS["imposed"]
 SHORT = IMPOSED.configuration._replace(timing=Timing(duration=3.0))
 DEMANDS = IMPOSED.demands(SHORT, 0)
@@ -168,7 +169,7 @@ def test_actuator_conditioning_in_closed_form():
 
 
 def test_sensor_in_closed_form():
-    plant = Plant(load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045), ground_lvdt=Lvdt(0, 0, 0, lag=0.02))
+    plant = RigPlant(load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045), ground_lvdt=Lvdt(0, 0, 0, lag=0.02))
     sensors = sensing(plant, 1e-3)
     time = np.arange(1000) * 1e-3
     wave = np.sin(2 * np.pi * 2.0 * time)
@@ -204,7 +205,7 @@ def test_backlash_is_felt_only_where_the_gap_is_taken_up():
     assert np.all(felt[-1] == (0.0, 50.0))
 
 
-def steady_force(plant: Plant, velocity: float) -> float:
+def steady_force(plant: RigPlant, velocity: float) -> float:
     """Force of rail and tyre on the carriage when driven at a steady speed out of the tyre's reach, N."""
     model = build(plant, STEP)
     data = mujoco.MjData(model)
@@ -223,13 +224,13 @@ def steady_force(plant: Plant, velocity: float) -> float:
 def test_rail_force_at_a_steady_speed(velocity):
     rail = Rail(coulomb=50.0, viscous=300.0, asymmetry=12.0)
     expected = -(50.0 * math.copysign(1.0, velocity) + 300.0 * velocity + 6.0)
-    quiet = Plant(carriage=Carriage(1e4), rail=rail, motor=Motor(coulomb=0.0))
+    quiet = RigPlant(carriage=Carriage(1e4), rail=rail, motor=Motor(coulomb=0.0))
     assert steady_force(quiet, velocity) == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize(("damping", "hardening"), [(0.0, 40.0), (800.0, 0.0), (300.0, 25.0)])
 def test_tyre_law(damping, hardening):
-    plant = Plant(rail=Rail(coulomb=0.0), motor=Motor(coulomb=0.0), tyre=Tyre(50_000.0, damping, hardening))
+    plant = RigPlant(rail=Rail(coulomb=0.0), motor=Motor(coulomb=0.0), tyre=Tyre(50_000.0, damping, hardening))
     model = build(plant, STEP)
     data = mujoco.MjData(model)
     view = handles(model, data)

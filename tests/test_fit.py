@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
@@ -16,7 +16,8 @@ from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
 from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.diagnosis.trials import TRIALS
-from rigtwin.machine.effects import KINDS, applied, find
+from rigtwin.components import KINDS, find
+from rigtwin.machine.configuration import applied
 from rigtwin.machine.library import find as machine_of
 from rigtwin.recording import Recording
 
@@ -89,7 +90,7 @@ def test_an_effect_is_found_at_its_size(text):
     evidence = evidence_of(recorded("imposed", (text,)))
     fitter = Fitter(evidence)
     fit = fitter.settled(fitter.single(effect))
-    nominal = effect.nominal(Plant())[effect.kind.parameters[0]]
+    nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])
     assert fitter.nothing.misfit - fit.misfit > detectable(evidence)
@@ -102,7 +103,7 @@ def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
     large = nominal.shifted(plant, [8.0 if t.parameter == "mass" else 0.0 for t in RIG.tolerances])
     clean = nominal.residual(plant)
 
-    def cost(other: Plant) -> float:
+    def cost(other: RigPlant) -> float:
         difference = [a - b for a, b in zip(nominal.predicted(other), nominal.predicted(plant), strict=True)]
         despike(difference[0][3], 6.0)
         return space.misfit(clean - nominal.whitened(difference)) - space.misfit(clean)
@@ -118,7 +119,7 @@ def test_a_deviation_within_tolerance_is_no_finding(nominal):
     assert tolerance is not None
 
     def fit(value: float) -> Fit:
-        return Fit((effect,), ((value,),), 0.0, ((0.0,),), with_values(Plant(), (effect,), ((value,),)))
+        return Fit((effect,), ((value,),), 0.0, ((0.0,),), with_values(RigPlant(), (effect,), ((value,),)))
 
     assert within_tolerance(fit(34.0 * 1.005), nominal)
     assert not within_tolerance(fit(34.0 * 1.02), nominal)

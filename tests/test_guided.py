@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from rigtwin.components.parts import Guide, PositionActuator
+from rigtwin.components import Guide, PositionActuator
 from rigtwin.machine.library import find
 from rigtwin.machine.machine import Machine
 from rigtwin.models.following import followed

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rigtwin.cli import main
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import possible
 from rigtwin.diagnosis.trials import searched, trials
 from rigtwin.machine.description import examined, load
-from rigtwin.machine.effects import find as effect_of
+from rigtwin.components import find as effect_of
 from rigtwin.machine.library import find, shipped
 from rigtwin.machine.setting import from_assignments, nominal, overridden, without
 from tests.described import MJCF, TOML, described, recording_of
@@ -32,7 +32,7 @@ def test_a_shipped_machine_has_no_mistakes(name):
 
 def test_the_suspension_rig_is_described_like_any_other():
     machine = find("suspension-rig")
-    assert machine.plant == Plant()
+    assert machine.plant == RigPlant()
     assert [row.name for row in machine.rows] == ["ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell"]
     assert len(machine.tolerances) == 20
     tolerance = machine.tolerance_of("motor", "gain")
@@ -72,7 +72,7 @@ def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
 @pytest.mark.parametrize("name", [name for name in shipped() if name != "suspension-rig"])
 def test_every_effect_of_a_machine_can_be_searched_for(name):
     from rigtwin.diagnosis.joint_trials import Scales
-    from rigtwin.diagnosis.trial import SHARES, Swing
+    from rigtwin.diagnosis.swing import SHARES, Swing
 
     machine = find(name)
     scale = Scales(0.03, 0.1, 0.25, 0.8, 60.0, 1e-3)

@@ -12,18 +12,18 @@ from scipy.signal import StateSpace, dlsim
 
 from experiments import EXPERIMENTS
 from rigtwin.components.cylinder import continuous
-from rigtwin.components.parameters import Carriage, Motor, Plant, Rail, Tyre
+from rigtwin.components import Carriage, Motor, RigPlant, Rail, Tyre
 from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.machine.configuration import Configuration
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
 from tests.reference import coulomb_carriage
 
 STEP = 2.5e-4
-NOMINAL = Plant()
+NOMINAL = RigPlant()
 SMOOTH = NOMINAL._replace(rail=Rail(0.0), motor=NOMINAL.motor._replace(coulomb=0.0))
 
 
-def simulation(plant: Plant = NOMINAL, step: float = STEP) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def simulation(plant: RigPlant = NOMINAL, step: float = STEP) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = build(plant, step)
     return model, mujoco.MjData(model)
 

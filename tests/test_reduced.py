@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
-from rigtwin.diagnosis.trial import swings
+from rigtwin.diagnosis.swing import swings
 from rigtwin.diagnosis.trials import TRIALS, trials
 from rigtwin.machine.configuration import Configuration, Safety
-from rigtwin.machine.effects import Effect, candidates
+from rigtwin.components import Effect, candidates
 from rigtwin.machine.library import find as machine_of
 from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.recording import Recording
@@ -21,13 +21,13 @@ from rigtwin.simulation.twin import Twin
 from tests.test_fit import recorded
 
 SECONDS = 4.0
-QUIET = Plant()._replace(
+QUIET = RigPlant()._replace(
     **{
-        name: getattr(Plant(), name)._replace(white=0.0, hum=0.0, resolution=0.0)
+        name: getattr(RigPlant(), name)._replace(white=0.0, hum=0.0, resolution=0.0)
         for name in ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
     }
 )
-SEARCHED = [effect for effect in candidates(Plant()) if effect.kind.name in TRIALS]
+SEARCHED = [effect for effect in candidates(RigPlant()) if effect.kind.name in TRIALS]
 
 
 def both(configuration: Configuration, name: str = "imposed") -> tuple[np.ndarray, np.ndarray]:
@@ -70,7 +70,7 @@ def swing():
 
 
 def size_of(effect: Effect, swing) -> tuple[float, ...]:
-    starts = trials(effect, Plant(), swing).starts
+    starts = trials(effect, RigPlant(), swing).starts
     return starts[len(starts) // 2]
 
 
@@ -106,7 +106,7 @@ def test_the_inclusion_is_solved_exactly(rhs, plate):
 
 def test_a_disturbance_acts_where_it_enters():
     recording = recorded("imposed", seconds=SECONDS)
-    plant = Plant()
+    plant = RigPlant()
     reduced = reduced_of(recording)
     nothing = np.zeros(recording.ticks)
     shift = np.full(recording.ticks, 1e-3)
@@ -120,6 +120,6 @@ def test_a_disturbance_acts_where_it_enters():
 def test_a_finer_step_changes_little():
     recording = recorded("imposed", seconds=SECONDS)
     reduced = reduced_of(recording)
-    change = np.abs(reduced.sensed(Plant()) - reduced.finer().sensed(Plant()))
+    change = np.abs(reduced.sensed(RigPlant()) - reduced.finer().sensed(RigPlant()))
     assert np.max(change[:3]) < 6e-5
     assert float(np.median(change[3])) < 0.3

@@ -14,7 +14,7 @@ from experiments.thesis.landing import Landing, touch_down
 from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
 from experiments.vehicles import VEHICLES, configuration
 from rigtwin.components.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
-from rigtwin.components.parameters import Cylinder, Motor
+from rigtwin.components import Cylinder, Motor
 from rigtwin.numerics.arrays import Array
 from rigtwin.studies.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
 

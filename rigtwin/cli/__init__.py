@@ -30,7 +30,9 @@ your own machine: docs/tutorial.md
 
 
 def _parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter)
+    top = argparse.ArgumentParser(
+        prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     top.add_argument("--version", action="store_true", help="print the version and stop")
     command = added(top.add_subparsers(dest="command", metavar="command"))
     for group in (testing, recordings, diagnosing, studying):

@@ -31,7 +31,9 @@ def _diagnoses(parsed: Namespace, workers: Workers) -> int:
     from referee.score import document, table
 
     cases = CASES if parsed.cases is None else parsed.cases
-    with tqdm(total=2 * cases, disable=None, unit="case", desc="withheld effects", leave=False) as bar:
+    with tqdm(
+        total=2 * cases, disable=None, unit="case", desc="withheld effects", leave=False
+    ) as bar:
         result = check(parsed.folder, cases, parsed.seed, parsed.baselines, workers, bar.update)
     print(table(result))
     if parsed.json is not None:
@@ -46,7 +48,9 @@ def _tuning(parsed: Namespace, workers: Workers) -> int:
 
     study = find(parsed.tune)
     if len(study.minimise) != 1 or study.minimise[0].more:
-        raise RigtwinError(f"--tune {parsed.tune}: expected a study with one objective that is of the test itself")
+        raise RigtwinError(
+            f"--tune {parsed.tune}: expected a study with one objective that is of the test itself"
+        )
     cases = RIGS if parsed.cases is None else parsed.cases
     total = (cases + 1) * (study.evaluations + 1) * study.roads + cases * (1 + 3 * study.held_out)
     with (
@@ -55,9 +59,14 @@ def _tuning(parsed: Namespace, workers: Workers) -> int:
     ):
 
         def said(case: Case) -> None:
-            bar.write(f"rig {case.number + 1}: withheld {case.defect}; diagnosed: {case.found}", file=sys.stdout)
+            bar.write(
+                f"rig {case.number + 1}: withheld {case.defect}; diagnosed: {case.found}",
+                file=sys.stdout,
+            )
 
-        found = checked(Bench(study, store, workers, bar.update), cases, parsed.seed, bar.set_description, said)
+        found = checked(
+            Bench(study, store, workers, bar.update), cases, parsed.seed, bar.set_description, said
+        )
     print(text(study, found))
     if parsed.json is not None:
         write_json(parsed.json, document(study, found))

@@ -16,7 +16,16 @@ import numpy as np
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.calibration import FORCE, at_rest, bumps, dated, responses, signed, spanned, zeroed
+from rigtwin.hardware.daq.calibration import (
+    FORCE,
+    at_rest,
+    bumps,
+    dated,
+    responses,
+    signed,
+    spanned,
+    zeroed,
+)
 from rigtwin.hardware.daq.card import Card, connected, require_client
 from rigtwin.hardware.daq.failsafe import release
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible, fit, load_table, written
@@ -26,8 +35,7 @@ from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import Test, record_at_leisure, record_in_real_time
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.effects import applied
+from rigtwin.machine.configuration import Configuration, applied
 from rigtwin.recording import load
 
 PORTS = 65535
@@ -48,7 +56,10 @@ def serve(parsed: Namespace) -> int:
     terminals = Terminals(applied(configuration, parsed.effect), table, parsed.seed)
     card = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, port = listen(card, parsed.port)
-    print(f'virtual card {table.device}: set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.', flush=True)
+    print(
+        f'virtual card {table.device}: set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.',
+        flush=True,
+    )
     with stop_requests() as stop:
         while stop() is None:
             time.sleep(0.1)
@@ -61,9 +72,13 @@ def free(parsed: Namespace) -> int:
     """Frees what a program that died has left on a gRPC device server."""
     table = load_table(parsed.card)
     if not table.address:
-        raise RigtwinError("card.address is empty: the driver of this computer frees a dead program's lines by itself")
+        raise RigtwinError(
+            "card.address is empty: the driver of this computer frees a dead program's lines by itself"
+        )
     left = release(table)
-    print(f"motor at zero, pressure off; {'what a dead program had is free' if left else 'nothing had been left'}")
+    print(
+        f"motor at zero, pressure off; {'what a dead program had is free' if left else 'nothing had been left'}"
+    )
     return 0
 
 
@@ -74,9 +89,14 @@ def check(parsed: Namespace) -> int:
     writable(parsed.out)
     if not parsed.operator.strip():
         raise RigtwinError("--operator is empty: expected who calibrates")
-    spans, references = _named(parsed.span, "--span", table), _named(parsed.reference, "--reference", table)
+    spans, references = (
+        _named(parsed.span, "--span", table),
+        _named(parsed.reference, "--reference", table),
+    )
     if not LEAST_STROKE <= parsed.stroke <= MOST_STROKE:
-        raise RigtwinError(f"--stroke {parsed.stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
+        raise RigtwinError(
+            f"--stroke {parsed.stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m"
+        )
     told = _told(parsed.moved)
     fit(table, Configuration().safety)
     if not (parsed.signs or parsed.zero or spans):
@@ -96,7 +116,9 @@ def check(parsed: Namespace) -> int:
         print(tabulated(rows))
         for signal in still:
             if signal.repeats >= table.plausible.stuck:
-                raise RigtwinError(f"{signal.name} gave {signal.repeats} times the same reading: stuck or not connected")
+                raise RigtwinError(
+                    f"{signal.name} gave {signal.repeats} times the same reading: stuck or not connected"
+                )
         table = spanned(table, still, spans) if spans else table
         table = zeroed(table, still, references) if parsed.zero else table
     fit(table, Configuration().safety)
@@ -117,7 +139,9 @@ def _named(texts: Sequence[str], option: str, table: ChannelTable) -> dict[str, 
         try:
             found[name] = float(value)
         except ValueError:
-            raise RigtwinError(f"{option} {text}: expected NAME=NUMBER, such as structure_lvdt=0.1") from None
+            raise RigtwinError(
+                f"{option} {text}: expected NAME=NUMBER, such as structure_lvdt=0.1"
+            ) from None
         if name not in names or not np.isfinite(found[name]):
             raise RigtwinError(f"{option} {text}: expected one of {', '.join(names)} and a number")
     return found
@@ -127,7 +151,12 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     """The card, or a virtual one that is wired as `wiring` says."""
     period = Configuration().timing.period
     if wiring is None:
-        card = Card(table, period, connected(table.address), pacer=Pacer(period) if table.timing == "software" else None)
+        card = Card(
+            table,
+            period,
+            connected(table.address),
+            pacer=Pacer(period) if table.timing == "software" else None,
+        )
     else:
         require_client()
         from rigtwin.hardware.daq.transport import InProcess
@@ -138,10 +167,15 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     return card
 
 
-def _signs(table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace, told: Mapping[str, int]) -> ChannelTable:
+def _signs(
+    table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace, told: Mapping[str, int]
+) -> ChannelTable:
     """Moves every output a little, under supervision, and turns the signs that are wrong."""
     if wiring is None and not parsed.arm:
-        _ask("the check moves ground, structure and motor a little; everybody clear? type arm to go: ", ("arm",))
+        _ask(
+            "the check moves ground, structure and motor a little; everybody clear? type arm to go: ",
+            ("arm",),
+        )
     rig = _rig(table, wiring)
     configuration, demands = bumps(parsed.stroke, FORCE, Configuration().timing.period)
     # Signals whose signs are unknown cannot be held against each other; each alone still can.
@@ -157,7 +191,9 @@ def _signs(table: ChannelTable, wiring: ChannelTable | None, parsed: Namespace, 
             raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
         recording = load(path)
     if recording.ticks != len(demands):
-        raise RigtwinError(f"{len(demands) - recording.ticks} ticks were missed; do it again, with less else on this computer")
+        raise RigtwinError(
+            f"{len(demands) - recording.ticks} ticks were missed; do it again, with less else on this computer"
+        )
     measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
     moved = {output: _went(output, table, wiring, told) for output in OUTPUTS}
     checked, said = signed(table, responses(measured, demands), moved)
@@ -172,29 +208,42 @@ def _told(texts: Sequence[str]) -> dict[str, int]:
     for text in texts:
         name, _, sign = text.partition("=")
         if name not in OUTPUTS or sign not in ("+", "-"):
-            raise RigtwinError(f"--moved {text}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+")
+            raise RigtwinError(
+                f"--moved {text}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
+            )
         told[name] = 1 if sign == "+" else -1
     return told
 
 
-def _went(output: str, table: ChannelTable, wiring: ChannelTable | None, told: Mapping[str, int]) -> int:
+def _went(
+    output: str, table: ChannelTable, wiring: ChannelTable | None, told: Mapping[str, int]
+) -> int:
     """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
     if output in told:
         return told[output]
     place = OUTPUTS.index(output)
     if wiring is not None:
         return int(table.outputs[place].scaling.sign * wiring.outputs[place].scaling.sign)
-    what = {"ground": "the ground plate go towards the wheel", "structure": "the structure plate go away from the wheel"}
+    what = {
+        "ground": "the ground plate go towards the wheel",
+        "structure": "the structure plate go away from the wheel",
+    }
     return (
         1
-        if _ask(f"did {what.get(output, 'the motor push the plate away from the wheel')} first? y/n: ", ("y", "n")) == "y"
+        if _ask(
+            f"did {what.get(output, 'the motor push the plate away from the wheel')} first? y/n: ",
+            ("y", "n"),
+        )
+        == "y"
         else -1
     )
 
 
 def _ask(question: str, answers: tuple[str, ...]) -> str:
     if not sys.stdin.isatty():
-        raise RigtwinError(f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)")
+        raise RigtwinError(
+            f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)"
+        )
     try:
         while (said := input(question).strip().lower()) not in answers:
             pass

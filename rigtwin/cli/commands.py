@@ -28,7 +28,15 @@ def list_experiments(parsed: Namespace) -> int:
     rows = [("setting", "value", "unit", "allowed", "source")]
     for key, value, meaning in parameters(find(parsed.settings).configuration):
         if isinstance(meaning, Quantity):
-            rows.append((key, f"{value:g}", meaning.unit, f"{meaning.low:g} to {meaning.high:g}", meaning.source))
+            rows.append(
+                (
+                    key,
+                    f"{value:g}",
+                    meaning.unit,
+                    f"{meaning.low:g} to {meaning.high:g}",
+                    meaning.source,
+                )
+            )
         else:
             rows.append((key, value.label, "", " | ".join(meaning.labels()), ""))
     print(table(rows))
@@ -53,8 +61,17 @@ def run(parsed: Namespace) -> int:
             raise RigtwinError(f"--{option.replace('_', '-')} goes with {needs}")
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)
-    with tqdm(total=len(demands), unit="tick", unit_scale=True, disable=None, desc=experiment.name, leave=False) as bar:
-        outcome = record(path, experiment.name, configuration, demands, parsed.seed, bar.update, parsed.effect)
+    with tqdm(
+        total=len(demands),
+        unit="tick",
+        unit_scale=True,
+        disable=None,
+        desc=experiment.name,
+        leave=False,
+    ) as bar:
+        outcome = record(
+            path, experiment.name, configuration, demands, parsed.seed, bar.update, parsed.effect
+        )
     seconds = outcome.ticks * configuration.timing.period
     print(f"{experiment.name}: {seconds:.3f} s recorded in {outcome.path}; {outcome.reason}")
     return 3 if outcome.tripped else 0
@@ -69,7 +86,9 @@ def _run_supervised(parsed: Namespace, path: Path) -> int:
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
-        raise RigtwinError("--live goes with a session in real time: --real-time, or --target daq without --dry-run")
+        raise RigtwinError(
+            "--live goes with a session in real time: --real-time, or --target daq without --dry-run"
+        )
     writable(apart(path, *(given for given in (parsed.card, parsed.config) if given is not None)))
     return work(parsed, test_of(parsed, parsed.name), path)
 
@@ -96,24 +115,32 @@ def faults(parsed: Namespace) -> int:
 
 
 def effects(parsed: Namespace) -> int:
-    from rigtwin.components.parameters import Plant
-    from rigtwin.machine.effects import candidates
+    from rigtwin.components import RigPlant, candidates
 
-    plant = Plant()
-    rows: list[tuple[str, ...]] = [("effect", "parameter", "nominal", "unit", "allowed", "what it does")]
+    plant = RigPlant()
+    rows: list[tuple[str, ...]] = [
+        ("effect", "parameter", "nominal", "unit", "allowed", "what it does")
+    ]
     for effect in candidates(plant):
         if parsed.component not in (None, effect.component):
             continue
         name, meaning = effect.name, effect.kind.meaning
         for parameter, quantity in effect.quantities().items():
-            value, allowed = effect.nominal(plant)[parameter], f"{quantity.low:g} to {quantity.high:g}"
+            value, allowed = (
+                effect.nominal(plant)[parameter],
+                f"{quantity.low:g} to {quantity.high:g}",
+            )
             rows.append((name, parameter, f"{value:g}", quantity.unit, allowed, meaning))
             name = meaning = ""
     if len(rows) == 1:
         components = dict.fromkeys(effect.component for effect in candidates(plant))
-        raise RigtwinError(f"unknown component {parsed.component!r}; there are {', '.join(components)}")
+        raise RigtwinError(
+            f"unknown component {parsed.component!r}; there are {', '.join(components)}"
+        )
     print(table(rows))
-    print("setting@controller=NAME:VALUE  a setting that is not what the recording says; rigtwin list --settings has them")
+    print(
+        "setting@controller=NAME:VALUE  a setting that is not what the recording says; rigtwin list --settings has them"
+    )
     return 0
 
 
@@ -134,14 +161,20 @@ def info(parsed: Namespace) -> int:
 
     recording = load(parsed.recording)
     print(f"{recording.path}: {recording.experiment} on {recording.machine}")
-    print(f"{recording.ticks} ticks of {recording.period:g} s, {recording.time[0]:g} to {recording.time[-1]:.3f} s")
+    print(
+        f"{recording.ticks} ticks of {recording.period:g} s, {recording.time[0]:g} to {recording.time[-1]:.3f} s"
+    )
     print(f"ended: {recording.end or 'not said'}")
     if recording.twin:
-        print(f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}")
+        print(
+            f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}"
+        )
     for note in recording.notes:
         print(f"note: {note}")
     for step in recording.transitions:
-        print(f"{step.get('time', '?'):>12s} s  {step.get('from')} → {step.get('to')}: {step.get('reason')}")
+        print(
+            f"{step.get('time', '?'):>12s} s  {step.get('from')} → {step.get('to')}: {step.get('reason')}"
+        )
     if recording.lateness:
         print(late(recording.lateness))
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
@@ -230,18 +263,24 @@ def calibrate(parsed: Namespace) -> int:
 
     recording = load(parsed.recording)
     if recording.machine != SUSPENSION_RIG:
-        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; expected {SUSPENSION_RIG}")
+        raise RigtwinError(
+            f"{recording.path}: it is of machine {recording.machine!r}; expected {SUSPENSION_RIG}"
+        )
     if parsed.out is not None:
         writable(apart(parsed.out, parsed.recording))
     told: Settings = overridden(Configuration(), {"controller": recording.controller}).controller
-    for fault in check(recording, overridden(Configuration(), {"controller": recording.controller})):
+    for fault in check(
+        recording, overridden(Configuration(), {"controller": recording.controller})
+    ):
         if fault.fatal:
             raise RigtwinError(f"{recording.path}: {fault.message}")
         print(f"note: {fault.message}")
     for note in recording.notes:
         print(f"note: {note}")
     found = calibrated(recording, told)
-    print(f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, from {found.reversals} reversals")
+    print(
+        f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, from {found.reversals} reversals"
+    )
     print(
         f"tried on the recording: {found.detected} of {found.reversals} reversals detected, {found.false} false steps, "
         f"{1e3 * found.delay:.0f} ms after the reversal"

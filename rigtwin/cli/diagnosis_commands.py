@@ -18,12 +18,11 @@ if TYPE_CHECKING:
 def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
-    from rigtwin.components.parameters import Plant
+    from rigtwin.components import RigPlant
     from rigtwin.diagnosis.compare import compare as replay_all
     from rigtwin.diagnosis.compare import compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.replays import REPLAYS
-    from rigtwin.machine.configuration import Configuration, Timing
-    from rigtwin.machine.effects import applied
+    from rigtwin.machine.configuration import Configuration, Timing, applied
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
 
@@ -34,24 +33,34 @@ def compare(parsed: Namespace) -> int:
         apart(parsed.json, parsed.recording, *([parsed.other] if parsed.other else []))
     if parsed.other is not None:
         if parsed.config is not None or parsed.set or parsed.effect:
-            raise RigtwinError("--set, --config and --effect change the twin; two recordings are compared without one")
+            raise RigtwinError(
+                "--set, --config and --effect change the twin; two recordings are compared without one"
+            )
         other = load(parsed.other)
         results, left_out = compare_recordings(recording, other), {}
         notes = (*recording.notes, *other.notes, *differences(recording, other))
         print(f"{recording.path} against {parsed.other}, tick against tick")
     else:
         twin = applied(configured(Configuration(), parsed), parsed.effect)
-        besides = twin._replace(plant=Plant(), timing=twin.timing._replace(timestep=Timing().timestep))
+        besides = twin._replace(
+            plant=RigPlant(), timing=twin.timing._replace(timestep=Timing().timestep)
+        )
         if besides != Configuration():
-            raise RigtwinError("compare changes the plant and timing.timestep only; all other settings are the recording's own")
+            raise RigtwinError(
+                "compare changes the plant and timing.timestep only; all other settings are the recording's own"
+            )
         configuration = configuration_of(recording, twin)
         with tqdm(total=len(REPLAYS), disable=None, desc="replaying", leave=False) as bar:
-            comparison = replay_all(recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name))
+            comparison = replay_all(
+                recording, configuration, lambda name: bar.update() and bar.set_postfix_str(name)
+            )
         results, left_out, notes = comparison.replays, comparison.left_out, comparison.notes
         print(f"{recording.path} against the twin; a ratio of 1 is noise alone")
     for note in notes:
         print(f"note: {note}")
-    rows: list[tuple[str, ...]] = [("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")]
+    rows: list[tuple[str, ...]] = [
+        ("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")
+    ]
     for name, result in results.items():
         rows.append(_row(name, result))
         rows += [_row(f"  {output}", part) for output, part in result.outputs.items()]
@@ -59,7 +68,10 @@ def compare(parsed: Namespace) -> int:
     for name, reason in left_out.items():
         print(f"{name}: left out; {reason}")
     if parsed.json is not None:
-        document = {"recording": str(recording.path), "replays": {name: asdict(result) for name, result in results.items()}}
+        document = {
+            "recording": str(recording.path),
+            "replays": {name: asdict(result) for name, result in results.items()},
+        }
         write_json(parsed.json, {**document, "left_out": left_out, "notes": list(notes)})
     return 0
 
@@ -82,20 +94,31 @@ def _compare_described(recording: Recording, parsed: Namespace) -> int:
             raise RigtwinError(f"{recording.path}: {fault.message}")
         print(f"note: {fault.message}")
     evidence = Evidence(machine, [recording], [setup])
-    each, difference = evidence.lines[0], evidence.lines[0].measured - evidence.predicted(setup.plant)[0]
+    each, difference = (
+        evidence.lines[0],
+        evidence.lines[0].measured - evidence.predicted(setup.plant)[0],
+    )
     print(f"{recording.path} against the twin of {machine.name}; a ratio of 1 is noise alone")
     results = {}
     for number, row in enumerate(machine.rows):
         counted = each.fade[number] > 0.5
-        results[row.name] = single(difference[number][counted], float(each.noise[number]), row.unit, recording.period)
+        results[row.name] = single(
+            difference[number][counted], float(each.noise[number]), row.unit, recording.period
+        )
     print(
         table(
-            [("signal", "residual rms", "noise floor", "ratio", "most of it, Hz"), *(_row(*item) for item in results.items())]
+            [
+                ("signal", "residual rms", "noise floor", "ratio", "most of it, Hz"),
+                *(_row(*item) for item in results.items()),
+            ]
         )
     )
     if parsed.json is not None:
         apart(parsed.json, parsed.recording)
-        document = {"recording": str(recording.path), "signals": {name: asdict(each) for name, each in results.items()}}
+        document = {
+            "recording": str(recording.path),
+            "signals": {name: asdict(each) for name, each in results.items()},
+        }
         write_json(parsed.json, document)
     return 0
 
@@ -127,8 +150,13 @@ def diagnose(parsed: Namespace) -> int:
             apart(out, *inputs)
             writable(out)
     if len({path.resolve() for path in inputs}) < len(inputs):
-        raise RigtwinError("a recording is named twice; each counts once, and what is held out must not be fitted")
-    recordings, held_out = [load(path) for path in parsed.recordings], [load(path) for path in parsed.held_out]
+        raise RigtwinError(
+            "a recording is named twice; each counts once, and what is held out must not be fitted"
+        )
+    recordings, held_out = (
+        [load(path) for path in parsed.recordings],
+        [load(path) for path in parsed.held_out],
+    )
     machine = machine_of(recordings[0], parsed.machine)
     base = base_of(machine, parsed)
     menu = EXPERIMENTS.values() if machine.name == SUSPENSION_RIG else ()
@@ -178,10 +206,9 @@ def machine_of(recording: Recording, described: str | None) -> Machine:
 def base_of(machine: Machine, parsed: Namespace) -> Any:
     """The twin that recordings are compared with, as the command line has it: a Configuration, or a Setup of a described
     machine."""
-    from rigtwin.components.parameters import Plant
+    from rigtwin.components import RigPlant
     from rigtwin.machine import setting
-    from rigtwin.machine.configuration import Configuration, Timing
-    from rigtwin.machine.effects import without
+    from rigtwin.machine.configuration import Configuration, Timing, without
     from rigtwin.recording.channels import SUSPENSION_RIG
 
     if machine.name != SUSPENSION_RIG:
@@ -193,9 +220,13 @@ def base_of(machine: Machine, parsed: Namespace) -> Any:
             setup = setting.without(setup, name)
         return setup
     base = configured(Configuration(), parsed)
-    besides = base._replace(plant=Plant(), timing=base.timing._replace(timestep=Timing().timestep))
+    besides = base._replace(
+        plant=RigPlant(), timing=base.timing._replace(timestep=Timing().timestep)
+    )
     if besides != Configuration():
-        raise RigtwinError("diagnose changes the plant and timing.timestep only; all other settings are the recording's own")
+        raise RigtwinError(
+            "diagnose changes the plant and timing.timestep only; all other settings are the recording's own"
+        )
     for name in getattr(parsed, "without", []):
         base = without(base, name)
     return base

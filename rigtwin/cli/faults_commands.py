@@ -41,7 +41,10 @@ def faults(parsed: Namespace) -> int:
     channels = load_table(parsed.card)
     todo = _todo(parsed)
     outcomes, undone = list[Outcome](), list[str]()
-    with TemporaryDirectory(prefix="rigtwin-faults-") as folder, tqdm(todo, unit="fault", disable=None, leave=False) as bar:
+    with (
+        TemporaryDirectory(prefix="rigtwin-faults-") as folder,
+        tqdm(todo, unit="fault", disable=None, leave=False) as bar,
+    ):
         try:
             for fault in bar:
                 bar.set_description(fault.kind.name)
@@ -52,7 +55,10 @@ def faults(parsed: Namespace) -> int:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
             print(f"interrupted after {len(outcomes)} of {len(todo)}")
-    rows = [_row(kind, [outcome for outcome in outcomes if outcome.fault.kind == kind]) for kind in KINDS]
+    rows = [
+        _row(kind, [outcome for outcome in outcomes if outcome.fault.kind == kind])
+        for kind in KINDS
+    ]
     rows = [row for row in rows if row[2] != "0"]
     failed = [outcome for outcome in outcomes if not outcome.passed]
     passed = len(outcomes) - len(failed)
@@ -111,7 +117,12 @@ def _write(path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[
     try:
         old = path.read_text(encoding="utf-8") if path.exists() else ""
         before, mark, _ = old.partition(MARK)
-        path.write_text(f"{before}{MARK}\n\n" + "\n".join(lines).rstrip() + "\n" if mark else "\n".join(lines) + "\n", "utf-8")
+        path.write_text(
+            f"{before}{MARK}\n\n" + "\n".join(lines).rstrip() + "\n"
+            if mark
+            else "\n".join(lines) + "\n",
+            "utf-8",
+        )
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
 

@@ -14,7 +14,14 @@ def machines(_parsed: Namespace) -> int:
     rows = [("machine", "title", "components", "observed")]
     for name in shipped():
         machine = find(name)
-        rows.append((name, machine.title, ", ".join(machine.components), ", ".join(row.name for row in machine.rows)))
+        rows.append(
+            (
+                name,
+                machine.title,
+                ", ".join(machine.components),
+                ", ".join(row.name for row in machine.rows),
+            )
+        )
     print(table([(name, title) for name, title, *_ in rows]))
     for name, _, components, observed in rows[1:]:
         print(f"\n{name}\n  components  {components}\n  observed    {observed}")
@@ -22,7 +29,6 @@ def machines(_parsed: Namespace) -> int:
 
 
 def machine(parsed: Namespace) -> int:
-    from rigtwin.diagnosis.trials import searched
     from rigtwin.machine.description import examined
     from rigtwin.machine.library import shipped
 
@@ -39,8 +45,10 @@ def machine(parsed: Namespace) -> int:
         print(
             f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; observed {', '.join(r.name for r in replay.rows)}"
         )
-    rows = [("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")]
-    effects = [effect for effect in found.effects() if searched(effect)]
+    rows = [
+        ("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")
+    ]
+    effects = [effect for effect in found.effects() if effect.searched]
     for name, component in found.components.items():
         held = [t for t in found.tolerances if t.group == name and not t.ticks]
         part = getattr(found.plant, name)

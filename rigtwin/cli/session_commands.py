@@ -18,7 +18,13 @@ from rigtwin.hardware.daq.table import load_table, trusted
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import machine_lacks
 from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
-from rigtwin.hardware.session.record import Test, on_card, on_virtual_card, record_at_leisure, record_in_real_time
+from rigtwin.hardware.session.record import (
+    Test,
+    on_card,
+    on_virtual_card,
+    record_at_leisure,
+    record_in_real_time,
+)
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervised import Ended
 from rigtwin.hardware.supervisor import COMPLETED
@@ -43,7 +49,9 @@ def _on_twin(parsed: Namespace, test: Test, path: Path) -> int:
         bar = stack.enter_context(_bar(test))
         if parsed.real_time:
             timed = InRealTime(twin, test.configuration.timing.period)
-            ended = record_in_real_time(timed, test, path, stop, guarded=False, live=parsed.live, progress=bar.update)
+            ended = record_in_real_time(
+                timed, test, path, stop, guarded=False, live=parsed.live, progress=bar.update
+            )
         else:
             ended = record_at_leisure(twin, test, path, stop, bar.update)
     return _said(test, path, ended)
@@ -57,13 +65,20 @@ def _dry(parsed: Namespace, test: Test, path: Path) -> int:
     if ended.ticks:
         rows: list[tuple[str, ...]] = [("predicted", "peak", "limit", "margin")]
         for quantity in predicted(load(path), test.limited):
-            peak, limit = f"{quantity.peak:.4g} {quantity.unit}", f"{quantity.limit:g} {quantity.unit}"
+            peak, limit = (
+                f"{quantity.peak:.4g} {quantity.unit}",
+                f"{quantity.limit:g} {quantity.unit}",
+            )
             rows.append((quantity.name, peak, limit, f"{100 * quantity.margin:.0f} %"))
         print(table(rows))
     for lacking in _lacking(test):
         print(f"before the rig may be armed: {lacking}")
     if ended.cause == COMPLETED and not test.effects:
-        enter(parsed.card, _key(test), {"experiment": test.experiment, "date": date.today().isoformat()})
+        enter(
+            parsed.card,
+            _key(test),
+            {"experiment": test.experiment, "date": date.today().isoformat()},
+        )
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code
 
@@ -116,8 +131,12 @@ def _on_the_rig(parsed: Namespace, test: Test, path: Path) -> int:
 
 def _armed_by_hand(test: Test) -> bool:
     if not sys.stdin.isatty():
-        raise RigtwinError("no terminal to ask for arming; say --arm if everybody is clear of the rig")
-    print(f"{test.experiment} on card {test.table.device}. Any key stops it. Everybody clear of the rig?")
+        raise RigtwinError(
+            "no terminal to ask for arming; say --arm if everybody is clear of the rig"
+        )
+    print(
+        f"{test.experiment} on card {test.table.device}. Any key stops it. Everybody clear of the rig?"
+    )
     try:
         return input("type arm to go: ").strip() == "arm"
     except EOFError:
@@ -125,7 +144,14 @@ def _armed_by_hand(test: Test) -> bool:
 
 
 def _bar(test: Test) -> tqdm:
-    return tqdm(total=len(test.demands), unit="tick", unit_scale=True, disable=None, desc=test.experiment, leave=False)
+    return tqdm(
+        total=len(test.demands),
+        unit="tick",
+        unit_scale=True,
+        disable=None,
+        desc=test.experiment,
+        leave=False,
+    )
 
 
 def _said(test: Test, path: Path, ended: Ended) -> int:
@@ -147,4 +173,11 @@ def test_of(parsed: Namespace, name: str) -> Test:
     experiment = find(name)
     configuration = configured(experiment.configuration, parsed)
     demands = experiment.demands(configuration, parsed.seed)
-    return Test(experiment.name, configuration, demands, parsed.seed, load_table(parsed.card or CARD), parsed.effect)
+    return Test(
+        experiment.name,
+        configuration,
+        demands,
+        parsed.seed,
+        load_table(parsed.card or CARD),
+        parsed.effect,
+    )

@@ -18,21 +18,60 @@ TABLE_6_2 = "quarter-car"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """The options of the command."""
-    parser.add_argument("--vehicle", default=TABLE_6_2, metavar="NAME", help=f"by name (default {TABLE_6_2}: thesis Table 6.2)")
     parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="another value of it, e.g. suspension_damping=500"
+        "--vehicle",
+        default=TABLE_6_2,
+        metavar="NAME",
+        help=f"by name (default {TABLE_6_2}: thesis Table 6.2)",
     )
-    parser.add_argument("--tau", type=float, default=RIG_LAG, metavar="S", help="lag of every path (default 0.01)")
-    parser.add_argument("--delay", action="store_true", help="the rightmost pole with pure delays of tau instead of lags")
-    parser.add_argument("--map", nargs=2, metavar=("X", "Y"), help="draw stability over two parameters, e.g. sprung_mass tau")
-    parser.add_argument("--model", default="rig", metavar="NAME", help="of the map: one of those in the table (default rig)")
-    parser.add_argument("--out", "-o", type=Path, metavar="F.png", help="where to draw the map (default stability.png)")
-    parser.add_argument("--json", type=Path, metavar="F.json", help="also write the figures to a file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="another value of it, e.g. suspension_damping=500",
+    )
+    parser.add_argument(
+        "--tau", type=float, default=RIG_LAG, metavar="S", help="lag of every path (default 0.01)"
+    )
+    parser.add_argument(
+        "--delay",
+        action="store_true",
+        help="the rightmost pole with pure delays of tau instead of lags",
+    )
+    parser.add_argument(
+        "--map",
+        nargs=2,
+        metavar=("X", "Y"),
+        help="draw stability over two parameters, e.g. sprung_mass tau",
+    )
+    parser.add_argument(
+        "--model",
+        default="rig",
+        metavar="NAME",
+        help="of the map: one of those in the table (default rig)",
+    )
+    parser.add_argument(
+        "--out",
+        "-o",
+        type=Path,
+        metavar="F.png",
+        help="where to draw the map (default stability.png)",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="F.json", help="also write the figures to a file"
+    )
 
 
 def stability(parsed: argparse.Namespace) -> int:
     """Prints the poles and the critical lag and delay of every model of a vehicle."""
-    from rigtwin.studies.stability.mapping import around, checked_ending, checked_model, draw, stability_map
+    from rigtwin.studies.stability.mapping import (
+        around,
+        checked_ending,
+        checked_model,
+        draw,
+        stability_map,
+    )
 
     car = _changed(_vehicle(parsed.vehicle), parsed.set)
     tau = checked_time("--tau", parsed.tau)
@@ -47,26 +86,33 @@ def stability(parsed: argparse.Namespace) -> int:
         if parsed.delay:
             raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
         if parsed.map[0] == parsed.map[1]:
-            raise RigtwinError(f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters")
+            raise RigtwinError(
+                f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
+            )
     axes = [around(name, car, tau) for name in parsed.map or ()]
     rows = _rows(car, tau, parsed.delay)
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
     print(_printed(rows, tau, parsed.delay))
     at_rig = _rows(car, RIG_LAG, delay=False)["rig"]
     words = "stable" if at_rig["stable"] else "unstable"
-    print(f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} ms: rightmost pole {_pole(at_rig)} 1/s, {words}")
+    print(
+        f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
+    )
     if parsed.map:
         draw(stability_map(parsed.model, car, tau, axes[0], axes[1]), out)
         print(f"drawn in {out}")
     if parsed.json is not None:
-        write_json(parsed.json, {"vehicle": car._asdict(), "tau": tau, "models": rows, "rig_at_10_ms": at_rig})
+        write_json(
+            parsed.json,
+            {"vehicle": car._asdict(), "tau": tau, "models": rows, "rig_at_10_ms": at_rig},
+        )
     return 0
 
 
 def _vehicle(name: str) -> QuarterCar:
     from controllers.settings import Settings
     from experiments.vehicles import VEHICLES
-    from rigtwin.components.parameters import Carriage, Tyre
+    from rigtwin.components import Carriage, Tyre
 
     tyre, settings = Tyre(), Settings()
     found = {
@@ -90,7 +136,9 @@ def _changed(car: QuarterCar, assignments: list[str]) -> QuarterCar:
     for assignment in assignments:
         name, _, text = assignment.partition("=")
         if name not in QuarterCar._fields:
-            raise RigtwinError(f"--set {assignment}: unknown parameter {name!r}; there are {', '.join(QuarterCar._fields)}")
+            raise RigtwinError(
+                f"--set {assignment}: unknown parameter {name!r}; there are {', '.join(QuarterCar._fields)}"
+            )
         try:
             car = car._replace(**{name: float(text)})
         except ValueError:
@@ -125,13 +173,23 @@ def _rows(car: QuarterCar, tau: float, delay: bool) -> dict[str, dict[str, float
 def _printed(rows: dict[str, dict[str, float | bool | None]], tau: float, delay: bool) -> str:
     kind = "delays" if delay else "lags"
     lines: list[tuple[str, ...]] = [
-        ("model", f"rightmost pole, {kind} of {1e3 * tau:g} ms", "stable", "critical lag", "at", "critical delay", "at")
+        (
+            "model",
+            f"rightmost pole, {kind} of {1e3 * tau:g} ms",
+            "stable",
+            "critical lag",
+            "at",
+            "critical delay",
+            "at",
+        )
     ]
     for name, row in rows.items():
         times = []
         for key in ("critical_lag", "critical_delay"):
             time, frequency = row[key], row[f"{key}_frequency"]
-            times += ["none", ""] if time is None else [f"{1e3 * time:.4g} ms", f"{frequency:.4g} rad/s"]
+            times += (
+                ["none", ""] if time is None else [f"{1e3 * time:.4g} ms", f"{frequency:.4g} rad/s"]
+            )
         lines.append((name, f"{_pole(row)} 1/s", "yes" if row["stable"] else "no", *times))
     return table(lines)
 

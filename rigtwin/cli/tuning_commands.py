@@ -28,7 +28,11 @@ def tune(parsed: Namespace) -> int:
         return 0
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
-    numbers = {"roads": parsed.roads, "held_out": parsed.held_out, "evaluations": parsed.evaluations}
+    numbers = {
+        "roads": parsed.roads,
+        "held_out": parsed.held_out,
+        "evaluations": parsed.evaluations,
+    }
     study = find(parsed.study, parsed.set, **numbers)
     posterior = None if parsed.twin is None else load_posterior(parsed.twin)
     folder = parsed.out or Path("tuning") / study.name
@@ -37,7 +41,9 @@ def tune(parsed: Namespace) -> int:
     with (
         hired(parsed.workers, parsed.cluster) as workers,
         Store(folder / RUNS) as store,
-        tqdm(total=_runs(study, posterior), disable=None, unit="run", leave=False, file=sys.stderr) as bar,
+        tqdm(
+            total=_runs(study, posterior), disable=None, unit="run", leave=False, file=sys.stderr
+        ) as bar,
     ):
         bench = Bench(study, store, workers, bar.update)
         outcome = tuned(bench, parsed.seed, posterior, bar.set_description)
@@ -53,12 +59,21 @@ def _runs(study: Study, posterior: Posterior | None) -> int:
     searches = 1 if posterior is None else 2
     rigs = 1 + len(study.judge) + (0 if posterior is None else 1 + len(posterior.otherwise))
     points = study.points if len(study.minimise) == 2 else 0
-    return searches * (study.evaluations + 1) * study.roads + study.held_out * (rigs * (1 + searches) + points)
+    return searches * (study.evaluations + 1) * study.roads + study.held_out * (
+        rigs * (1 + searches) + points
+    )
 
 
 def _listing() -> str:
     rows = [("study", "what", "experiment", "parameters")]
     for name in shipped():
         study = find(name)
-        rows.append((name, study.title, study.experiment, ", ".join(each.key.partition(".")[2] for each in study.parameters)))
+        rows.append(
+            (
+                name,
+                study.title,
+                study.experiment,
+                ", ".join(each.key.partition(".")[2] for each in study.parameters),
+            )
+        )
     return table(rows)

@@ -1,0 +1,51 @@
+"""What a machine is made of. One noun a file: its parameters with unit, bounds and source, its law
+as compilable functions, the effects that it can have, and where a search for each starts."""
+
+from rigtwin.components.actuators import ForceActuator, PositionActuator
+from rigtwin.components.computer import Computer, Mains
+from rigtwin.components.cylinder import Cylinder
+from rigtwin.components.effect import Effect, Kind, Motion, Scales, Starts, Swing
+from rigtwin.components.gas_spring import GasSpring
+from rigtwin.components.guide import Guide, Rail
+from rigtwin.components.library import KINDS, candidates, find, title
+from rigtwin.components.mass import Carriage, Mass
+from rigtwin.components.motor import Motor
+from rigtwin.components.plant import Plant, with_parameters
+from rigtwin.components.quantity import UNLIMITED
+from rigtwin.components.rig import RigPlant
+from rigtwin.components.sensors import ForceSensor, LoadCell, Lvdt, PositionSensor, VelocitySensor
+from rigtwin.components.tyre import Tyre
+
+__all__ = [
+    "KINDS",
+    "UNLIMITED",
+    "Carriage",
+    "Computer",
+    "Cylinder",
+    "Effect",
+    "ForceActuator",
+    "ForceSensor",
+    "GasSpring",
+    "Guide",
+    "Kind",
+    "LoadCell",
+    "Lvdt",
+    "Mains",
+    "Mass",
+    "Motion",
+    "Motor",
+    "Plant",
+    "PositionActuator",
+    "PositionSensor",
+    "Rail",
+    "RigPlant",
+    "Scales",
+    "Starts",
+    "Swing",
+    "Tyre",
+    "VelocitySensor",
+    "candidates",
+    "find",
+    "title",
+    "with_parameters",
+]

@@ -1,18 +1,32 @@
-"""What becomes of an actuator's command before it acts: delay, deadband, gain, saturation, rate limit, lag, in that order.
+"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit, lag, in that order.
 
-All of them are neutral in the nominal rig, whose commands pass as they are.
+All of them are neutral in the nominal machine, whose commands pass as they are.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from controllers.compiled import compilable
-from rigtwin.components.parameters import UNLIMITED, Computer, Cylinder, Motor
-from rigtwin.components.parts import ForceActuator
+from rigtwin.components.actuators import ForceActuator, PositionActuator
+from rigtwin.components.computer import Computer
+from rigtwin.components.cylinder import Cylinder
+from rigtwin.components.effect import Context, Guess, Kind, Starts, at_limits, fixed_starts
+from rigtwin.components.guide import late_starts
+from rigtwin.components.motor import Motor
+from rigtwin.components.quantity import UNLIMITED
+from rigtwin.components.sensors import (
+    DECLARED,
+    ForceSensor,
+    LoadCell,
+    Lvdt,
+    PositionSensor,
+    VelocitySensor,
+)
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.delay import delayed, ring
 
@@ -42,7 +56,14 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
     """The conditioning of a motor's voltage, a cylinder's position or a force actuator's command."""
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
-    neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (0.0, 0.0, 1.0, UNLIMITED, UNLIMITED, 0.0)
+    neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (
+        0.0,
+        0.0,
+        1.0,
+        UNLIMITED,
+        UNLIMITED,
+        0.0,
+    )
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
     return Actuator(
         neutral,
@@ -85,8 +106,145 @@ def conditioned(conditioning: Actuator, state: ActuatorState, command: float) ->
     if conditioning.neutral:
         state.memory[3] = command
         return command
-    wanted = limited(conditioning, state, delayed(state.history, state.memory, conditioning.delay, command))
+    wanted = limited(
+        conditioning, state, delayed(state.history, state.memory, conditioning.delay, command)
+    )
     before = state.memory[2]
     state.memory[2] = before + min(max(wanted - before, -conditioning.rate), conditioning.rate)
     state.memory[3] += conditioning.share * (state.memory[2] - state.memory[3])
     return state.memory[3]
+
+
+BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
+"""Shares of a known limit at which a lower one is looked for."""
+
+
+def _speed_limit(at: Context) -> Starts:
+    known = [share * getattr(at.plant, at.effect.group).speed_limit for share in BELOW]
+    return at_limits([min(pair) for pair in zip(at.swing.fastest, known, strict=True)], 1e-6)
+
+
+def _deadband(at: Context) -> Starts:
+    size = at.scales.stroke if at.effect.of is PositionActuator else max(at.swing.largest[0], 1e-12)
+    return Starts.single([share * size for share in (0.003, 0.01, 0.03, 0.1, 0.3)], 0.001 * size)
+
+
+def _offset(at: Context) -> Starts:
+    sizes = {ForceSensor: at.scales.force, VelocitySensor: at.scales.speed}
+    size = sizes.get(at.effect.of, at.scales.stroke)
+    return Starts.single([share * size for share in (-0.2, -0.02, 0.02, 0.2)], 0.002 * size)
+
+
+def _two_lags(at: Context) -> Starts:
+    time = at.scales.time
+    sizes = [share * time for share in (0.005, 0.02, 0.06, 0.2)]
+    starts = tuple((long, ratio * long) for long in sizes for ratio in (0.2, 0.7))
+    return Starts(starts, (0.002 * time, 0.002 * time))
+
+
+def _resonance(at: Context) -> Starts:
+    slowest = 1.0 / (2.0 * math.pi * at.scales.time)
+    speeds = [slowest * ratio for ratio in (1.5, 4.0, 10.0, 30.0, 80.0)]
+    return Starts(tuple(product(speeds, (0.15, 0.5, 0.9))), (0.02 * slowest, 0.01))
+
+
+def _each(guess: Guess | None, *types: type) -> dict[type, Guess | None]:
+    return dict.fromkeys(types, guess)
+
+
+RIG = (Motor, Cylinder, *DECLARED)
+DESCRIBED_ACTUATORS = (ForceActuator, PositionActuator)
+DESCRIBED_SENSORS = (PositionSensor, VelocitySensor, ForceSensor)
+DESCRIBED = (*DESCRIBED_ACTUATORS, *DESCRIBED_SENSORS)
+KINDS = (
+    Kind(
+        "gain",
+        "gain",
+        ("gain",),
+        "output by this factor",
+        _each(fixed_starts((0.8, 0.93, 1.07, 1.2), 0.004), *RIG, *DESCRIBED),
+    ),
+    Kind(
+        "lag",
+        "lag",
+        ("lag",),
+        "a first-order lag more",
+        _each(fixed_starts((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4), *RIG)
+        | _each(late_starts, *DESCRIBED),
+    ),
+    Kind(
+        "delay",
+        "delay",
+        ("delay",),
+        "a delay more",
+        _each(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG, Computer)
+        | _each(late_starts, *DESCRIBED),
+    ),
+    Kind(
+        "saturation",
+        "saturation",
+        ("saturation",),
+        "command limited to this magnitude",
+        _each(lambda at: at_limits(at.swing.largest, 1e-6), Motor, Cylinder)
+        | _each(lambda at: at_limits(at.swing.largest, 1e-9), *DESCRIBED_ACTUATORS),
+    ),
+    Kind(
+        "deadband",
+        "deadband",
+        ("deadband",),
+        "command without effect within this band",
+        {
+            Motor: fixed_starts((0.02, 0.08, 0.3), 0.004),
+            Cylinder: fixed_starts((1e-4, 5e-4, 2e-3, 6e-3), 2e-5),
+            **_each(_deadband, *DESCRIBED_ACTUATORS),
+        },
+    ),
+    Kind(
+        "rate_limit",
+        "rate limit",
+        ("rate_limit",),
+        "command's rate limited",
+        {
+            Motor: lambda at: at_limits(at.swing.fastest, 1e-6),
+            **_each(lambda at: at_limits(at.swing.fastest, 1e-9), *DESCRIBED_ACTUATORS),
+        },
+    ),
+    Kind("rate_limit", "rate limit", ("speed_limit",), "speed limited", {Cylinder: _speed_limit}),
+    Kind(
+        "compliance",
+        "compliance",
+        ("compliance",),
+        "yields under load",
+        {Cylinder: fixed_starts((2e-7, 1e-6, 5e-6), 2e-8)},
+    ),
+    Kind(
+        "two_lags",
+        "pair of lags",
+        ("lag", "second_lag"),
+        "two first-order lags, one after the other",
+        {PositionActuator: _two_lags},
+    ),
+    Kind(
+        "resonance",
+        "natural frequency",
+        ("natural_frequency", "damping_ratio"),
+        "follows as an underdamped system of second order",
+        {PositionActuator: _resonance},
+    ),
+    Kind(
+        "offset",
+        "offset",
+        ("offset",),
+        "output displaced",
+        {
+            Lvdt: fixed_starts((-2e-3, -3e-4, 3e-4, 2e-3), 1e-5),
+            LoadCell: fixed_starts((-20.0, -4.0, 4.0, 20.0), 0.1),
+            **_each(_offset, *DESCRIBED_SENSORS, PositionActuator),
+        },
+    ),
+    Kind("hum", "mains hum", ("hum",), "amplitude of the mains line", _each(None, *DECLARED)),
+    Kind("noise", "white noise", ("white",), "white noise, rms", _each(None, *DECLARED)),
+    Kind(
+        "quantisation", "quantisation", ("resolution",), "size of one bit", _each(None, *DECLARED)
+    ),
+)

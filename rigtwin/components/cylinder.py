@@ -4,14 +4,40 @@ limit of the speed. MJCF has no actuator of fourth order, so this runs beside Mu
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
 
 from controllers.compiled import compilable
-from rigtwin.components.parameters import Cylinder
+from rigtwin.components.quantity import NONE, UNLIMITED, Quantity
 from rigtwin.numerics.arrays import Array
+
+H_OF_S = "identified closed loop H(s), thesis Eq. 6.2"
+
+
+class Cylinder(NamedTuple):
+    """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s + a0), scaled to unit
+    static gain, then a limit of the speed."""
+
+    b2: Annotated[float, Quantity("1/s^2", -1e6, 1e6, H_OF_S)] = 1817.0
+    b1: Annotated[float, Quantity("1/s^3", -1e8, 1e8, H_OF_S)] = 7.719e4
+    b0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)] = 6.243e5
+    a3: Annotated[float, Quantity("1/s", 0.0, 1e5, H_OF_S)] = 165.9
+    a2: Annotated[float, Quantity("1/s^2", 0.0, 1e8, H_OF_S)] = 6674.0
+    a1: Annotated[float, Quantity("1/s^3", 0.0, 1e10, H_OF_S)] = 8.598e4
+    a0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)] = 6.281e5
+    speed_limit: Annotated[float, Quantity("m/s", 0.001, 10.0, "Vickers cylinder, thesis §3.2")] = (
+        0.3
+    )
+    gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: follows its command at rest")] = 1.0
+    lag: Annotated[float, Quantity("s", 0.0, 0.5, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
+    deadband: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
+    saturation: Annotated[float, Quantity("m", 1e-4, UNLIMITED, NONE)] = UNLIMITED
+    compliance: Annotated[
+        float, Quantity("m/N", 0.0, 2e-5, "0: a cylinder in position control does not yield, §3.2")
+    ] = 0.0
 
 
 class CylinderModel(NamedTuple):
@@ -52,7 +78,9 @@ def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
     both[:4, :4], both[:4, 4] = a, b
     step = expm(both * timestep)
     transition, entry = np.ascontiguousarray(step[:4, :4]), np.ascontiguousarray(step[:4, 4])
-    return CylinderModel(transition, entry, c @ transition, float(c @ entry), cylinder.speed_limit * timestep)
+    return CylinderModel(
+        transition, entry, c @ transition, float(c @ entry), cylinder.speed_limit * timestep
+    )
 
 
 def settled(cylinder: Cylinder, position: float) -> CylinderState:
@@ -77,4 +105,6 @@ def advance_cylinder(model: CylinderModel, state: CylinderState, command: float)
     z0, z1, z2, z3 = state.filter[0], state.filter[1], state.filter[2], state.filter[3]
     for i in range(4):
         row = model.transition[i]
-        state.filter[i] = row[0] * z0 + row[1] * z1 + row[2] * z2 + row[3] * z3 + model.entry[i] * command
+        state.filter[i] = (
+            row[0] * z0 + row[1] * z1 + row[2] * z2 + row[3] * z3 + model.entry[i] * command
+        )

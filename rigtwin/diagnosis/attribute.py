@@ -9,15 +9,14 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rigtwin.components import Effect
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values, without_each
 from rigtwin.diagnosis.stepwise import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
-from rigtwin.diagnosis.trials import searched
-from rigtwin.machine.effects import Effect
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""
@@ -101,10 +100,12 @@ class Attribution:
 
 def library(evidence: Evidence) -> list[Effect]:
     """The candidates that are searched for."""
-    return [effect for effect in evidence.machine.effects() if searched(effect)]
+    return [effect for effect in evidence.machine.effects() if effect.searched]
 
 
-def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: None) -> Attribution:
+def attribute(
+    evidence: Evidence, progress: Callable[[int], object] = lambda _: None
+) -> Attribution:
     """Searches the whole library. progress is called with the number of fits done since its last call."""
     least, rules = detectable(evidence), ROUGH if evidence.machine.rough else KNOWN
     search, fitter = Fitter(evidence.coarser()), Fitter(evidence)
@@ -126,7 +127,11 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
         singles = mapped(search.single, effects)
         singles.sort(key=priced)
         # Those far behind stay there, however the tolerances are taken.
-        near = singles[0].misfit + NEAR * max(search.nothing.misfit - singles[0].misfit, 0.0) + 2.0 * least
+        near = (
+            singles[0].misfit
+            + NEAR * max(search.nothing.misfit - singles[0].misfit, 0.0)
+            + 2.0 * least
+        )
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
         tried = mapped(fitter.settled, close) + singles[len(close) :]
         tried.sort(key=priced)
@@ -137,23 +142,37 @@ def attribute(evidence: Evidence, progress: Callable[[int], object] = lambda _: 
             hopes: list[Hope] = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
-                if leader.misfit - first.misfit <= FAR_BEHIND * max(nothing.misfit - first.misfit, 0.0):
+                if leader.misfit - first.misfit <= FAR_BEHIND * max(
+                    nothing.misfit - first.misfit, 0.0
+                ):
                     hopes += search.seconds(leader, effects, least)
             hopes.sort(key=lambda hope: hope.promised)
             hopeful = _once(hopes)[: MANY if much else FEW]
-            pairs = mapped(lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful)
+            pairs = mapped(
+                lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful
+            )
             pairs.sort(key=priced)
             for _ in range(LOOKED_AGAIN if pairs else 0):
                 known = {frozenset(pair.effects) for pair in pairs}
-                fresh = [pair for pair in search.alike(pairs[0], effects) if frozenset(pair[0]) not in known]
+                fresh = [
+                    pair
+                    for pair in search.alike(pairs[0], effects)
+                    if frozenset(pair[0]) not in known
+                ]
                 pairs += mapped(lambda pair: search.refined(*pair), fresh)
                 pairs.sort(key=priced)
             pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
             least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
-            tried += [p for p in pairs if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)]
+            tried += [
+                p
+                for p in pairs
+                if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)
+            ]
         chain = [fit for fit in plain(tried, least) if fit.effects][:1]
         if rules.most > KNOWN.most:
-            more, chain = grown(tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), mapped)
+            more, chain = grown(
+                tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), mapped
+            )
             tried += more
     tried = plain(tried, least)
     silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
@@ -178,7 +197,12 @@ def detectable(evidence: Evidence) -> float:
 
 
 def _judged(
-    nothing: Fit, tried: list[Fit], evidence: Evidence, silent: tuple[Effect, ...], rules: Rules, chain: Sequence[Fit]
+    nothing: Fit,
+    tried: list[Fit],
+    evidence: Evidence,
+    silent: tuple[Effect, ...],
+    rules: Rules,
+    chain: Sequence[Fit],
 ) -> Attribution:
     gap = max(nothing.misfit - evidence.expected, 0.0)
     pool = sorted([*tried, nothing], key=priced)
@@ -192,19 +216,37 @@ def _judged(
         apart = 0.5 * _independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
-    ranking = tuple(Explanation(fit, priced(fit), float(weight)) for fit, weight in zip(pool, weights, strict=True))
+    ranking = tuple(
+        Explanation(fit, priced(fit), float(weight))
+        for fit, weight in zip(pool, weights, strict=True)
+    )
     found = nothing.misfit - priced(best) > detectable(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
     left = max(best.misfit - expected, 0.0) / expected
     explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
     more = left > UNEXPLAINED
-    named = ranking[0] if found and not (more and (explained < rules.enough or left > rules.too_much)) else None
+    named = (
+        ranking[0]
+        if found and not (more and (explained < rules.enough or left > rules.too_much))
+        else None
+    )
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
-    return Attribution(nothing, expected, named, ranking, explained if found else 0.0, left, more, shares, silent, tuple(chain))
+    return Attribution(
+        nothing,
+        expected,
+        named,
+        ranking,
+        explained if found else 0.0,
+        left,
+        more,
+        shares,
+        silent,
+        tuple(chain),
+    )
 
 
-def _independent(evidence: Evidence, plant: Any) -> float:
+def _independent(evidence: Evidence, plant: Plant) -> float:
     """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
     imaginary parts."""
     total = square = 0.0
@@ -224,4 +266,7 @@ def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:
     for _, others, values in without_each(fit):
         residual = evidence.residual(with_values(evidence.plant, others, values))
         lost.append(max(float(np.sum(residual**2)) - whole, 0.0))
-    return {effect.name: explained * one / max(sum(lost), 1e-9) for effect, one in zip(fit.effects, lost, strict=True)}
+    return {
+        effect.name: explained * one / max(sum(lost), 1e-9)
+        for effect, one in zip(fit.effects, lost, strict=True)
+    }

@@ -8,53 +8,67 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers import Measurements
-from rigtwin.diagnosis.checks import SHORTEST
-from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
+from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
+from rigtwin.diagnosis.cross_validation import gap_level
+from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, single
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.machine import Machine, Structure
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise, without_mains
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All replays of a recording, by name, and what could not be replayed and why."""
+    """What each replay of a recording leaves, by its name, and what could not be replayed and why. gap: rms of all signals less
+    what the twin predicts of them, in units of their white noise; 1 is noise alone."""
 
     replays: dict[str, Residual]
     left_out: dict[str, str]
     notes: tuple[str, ...]
-
-
-def configuration_of(recording: Recording, base: Configuration | None = None) -> Configuration:
-    """The operator's settings of a recording over `base` (the nominal rig). Raises RigtwinError for settings unknown here."""
-    start = base or Configuration()
-    substeps = max(1, math.ceil(recording.period / start.timing.timestep - 1e-9))
-    duration = max(recording.ticks * recording.period, 0.01)
-    timing = {"period": recording.period, "duration": duration, "timestep": recording.period / substeps}
-    changes: dict[str, dict[str, object]] = {"controller": dict(recording.controller), "timing": dict(timing)}
-    if start.plant.gas_spring.force == 0.0:
-        # What the operator says stands beside the motor does stand there.
-        keys = {"force": "gas_force", "length": "gas_length", "exponent": "gas_exponent"}
-        changes["gas_spring"] = {
-            key: changes["controller"][name] for key, name in keys.items() if name in changes["controller"]
-        }
-    try:
-        return overridden(start, changes)
-    except RigtwinError as error:
-        raise RigtwinError(f"{recording.path}: {error}") from None
+    gap: float
 
 
 def compare(
-    recording: Recording, configuration: Configuration, progress: Callable[[str], object] = lambda _: None
+    machine: Machine,
+    recording: Recording,
+    configuration: Configuration | None = None,
+    progress: Callable[[str], object] = lambda _: None,
 ) -> Comparison:
-    """Replays everything. configuration: of the twin, see `configuration_of`; progress is called with each replay's name."""
-    replays = Replays(recording, configuration)
+    """A recording against the twin.
+
+    Parameters
+    ----------
+    machine
+        That the recording is of.
+    recording
+        The data.
+    configuration
+        Of the twin, see `Machine.configuration_of`; by default that of the description.
+    progress
+        Called with each replay's name.
+
+    Raises
+    ------
+    RigtwinError
+        Naming every fault of the data that makes a comparison meaningless.
+    """
+    configuration = configuration or machine.configuration_of(recording)
+    faults = require_fit(machine, recording, configuration)
+    notes = (*recording.notes, *(fault.message for fault in faults))
+    evidence = Evidence(machine, [recording], [configuration])
+    gap = gap_level(evidence, configuration.plant)
+    if machine.structure is Structure.JOINTS:
+        return Comparison(signal_residuals(evidence), {}, notes, gap)
+    replays = ComponentReplays(recording, configuration)
     left_out: dict[str, str] = {}
     if not recording.controller:
-        reason = "the recording does not say what the controller was told to do"
-        left_out = {"controller": reason, "closed_loop": reason}
+        left_out = dict.fromkeys(
+            ("controller", "closed_loop"),
+            "the recording does not say what the controller was told to do",
+        )
     results: dict[str, Residual] = {}
     for name, replay in REPLAYS.items():
         if name not in left_out:
@@ -63,8 +77,19 @@ def compare(
                 results[name] = replay(replays)
             except Undetermined as reason:
                 left_out[name] = str(reason)
-    notes = (*recording.notes, *(fault.message for fault in replays.faults))
-    return Comparison(results, left_out, notes)
+    return Comparison(results, left_out, notes, gap)
+
+
+def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
+    """What each signal of the first recording has left, by its name."""
+    lines, period = evidence.lines[0], evidence.recordings[0].period
+    difference = lines.measured - evidence.predicted(evidence.plant)[0]
+    return {
+        row.name: single(
+            difference[n][lines.fade[n] > 0.5], float(lines.noise[n]), row.unit, period
+        )
+        for n, row in enumerate(evidence.machine.rows)
+    }
 
 
 def differences(first: Recording, second: Recording) -> tuple[str, ...]:
@@ -73,37 +98,60 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
     if first.experiment != second.experiment:
         notes.append(f"different experiments: {first.experiment} and {second.experiment}")
     settings = {*first.controller, *second.controller}
-    unlike = sorted(key for key in settings if first.controller.get(key) != second.controller.get(key))
+    unlike = sorted(
+        key for key in settings if first.controller.get(key) != second.controller.get(key)
+    )
     if unlike:
         notes.append(f"different controller settings: {', '.join(unlike)}")
     ticks = min(first.ticks, second.ticks)
     if first.has("/command", "ground") and second.has("/command", "ground"):
-        apart = first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
+        apart = (
+            first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
+        )
         if np.max(np.abs(apart)) > 1e-6:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":
-        notes.append("with a model in the loop a limit cycle drifts in phase, so two runs of one rig differ too")
+        notes.append(
+            "with a model in the loop a limit cycle drifts in phase, so two runs of one rig differ too"
+        )
     return tuple(notes)
 
 
-def compare_recordings(first: Recording, second: Recording) -> dict[str, Residual]:
-    """Two recordings of one test, channel by channel over their common length. The floor is both sensors' noise together.
+def compare_recordings(
+    machine: Machine, first: Recording, second: Recording
+) -> dict[str, Residual]:
+    """Two recordings of one test, sensor by sensor over their common length. The floor is both sensors' noise together.
 
-    Raises RigtwinError if their periods differ or they share no channel.
+    Raises RigtwinError if their periods differ or they share no sensor.
     """
     if first.period != second.period:
-        raise RigtwinError(f"periods differ: {first.path} has {first.period:g} s, {second.path} has {second.period:g} s")
+        raise RigtwinError(
+            f"periods differ: {first.path} has {first.period:g} s, {second.path} has {second.period:g} s"
+        )
     ticks = min(first.ticks, second.ticks)
     if ticks < SHORTEST:
         raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")
     results: dict[str, Residual] = {}
-    for name, unit in zip(Measurements._fields, ("m", "m", "m", "N"), strict=True):
-        if first.has("/sensor", name) and second.has("/sensor", name):
-            one, other = first.column("/sensor", name)[:ticks], second.column("/sensor", name)[:ticks]
+    sensors = [
+        each
+        for each in machine.components.values()
+        if each.channel is not None and each.element == "sensor"
+    ]
+    for sensor in sensors:
+        topic, name = sensor.channel or ("", "")
+        if first.has(topic, name) and second.has(topic, name):
+            one, other = first.column(topic, name)[:ticks], second.column(topic, name)[:ticks]
             if not (np.isfinite(one).all() and np.isfinite(other).all()):
-                raise RigtwinError(f"/sensor.{name} is not a number somewhere in {first.path} or {second.path}")
-            difference = without_mains(one - other, first.period, 50.0)
-            results[name] = single(difference, math.hypot(white_noise(one), white_noise(other)), unit, first.period)
+                raise RigtwinError(
+                    f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
+                )
+            difference = without_mains(one - other, first.period, machine.plant.mains.frequency)
+            results[sensor.name] = single(
+                difference,
+                math.hypot(white_noise(one), white_noise(other)),
+                sensor.unit,
+                first.period,
+            )
     if not results:
         raise RigtwinError(f"{first.path} and {second.path} share no sensor")
     return results

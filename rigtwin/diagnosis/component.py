@@ -11,14 +11,29 @@ import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from rigtwin.components import Carriage, Cylinder, GasSpring, Motor, Rail, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
-from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, sampled, settled
-from rigtwin.components.parameters import Carriage, Cylinder, GasSpring, Motor, Plant, Rail
+from rigtwin.components.cylinder import (
+    CylinderModel,
+    CylinderState,
+    advance_cylinder,
+    sampled,
+    settled,
+)
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate, kernel
 from rigtwin.simulation.mechanics import Handles, build, handles
-from rigtwin.simulation.plant import Contacts, brace, contacts, deflected, drive, motor_force, touch, true_measurements
+from rigtwin.simulation.plant import (
+    Contacts,
+    brace,
+    contacts,
+    deflected,
+    drive,
+    motor_force,
+    touch,
+    true_measurements,
+)
 
 FIXED = 1e6
 """kg; a carriage this heavy goes where it is driven."""
@@ -51,7 +66,11 @@ def _cylinder(
 
 
 def replay_cylinder(
-    cylinder: Cylinder, configuration: Configuration, commands: Array, start: float, position: float | None = None
+    cylinder: Cylinder,
+    configuration: Configuration,
+    commands: Array,
+    start: float,
+    position: float | None = None,
 ) -> Array:
     """Command → plate position at every tick, m, unloaded, from rest at `position` under the command `start`; by default
     where that command holds it."""
@@ -60,7 +79,15 @@ def replay_cylinder(
     command = holding(conditioning, start)
     state = settled(cylinder, float(command.memory[3]) if position is None else position)
     model = sampled(cylinder, timestep)
-    _cylinder(model, state, conditioning, command, np.ascontiguousarray(commands), configuration.substeps, out)
+    _cylinder(
+        model,
+        state,
+        conditioning,
+        command,
+        np.ascontiguousarray(commands),
+        configuration.substeps,
+        out,
+    )
     return out
 
 
@@ -120,7 +147,7 @@ def _between(motion: Array, substeps: int) -> Array:
 
 
 def _run(
-    plant: Plant,
+    plant: RigPlant,
     configuration: Configuration,
     ground: Array,
     structure: Array,
@@ -156,7 +183,9 @@ def _run(
     return out
 
 
-def replay_carriage(configuration: Configuration, ground: Array, force: Array, preload: float) -> Array:
+def replay_carriage(
+    configuration: Configuration, ground: Array, force: Array, preload: float
+) -> Array:
     """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both are out of it."""
     plant = configuration.plant
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
@@ -165,15 +194,33 @@ def replay_carriage(configuration: Configuration, ground: Array, force: Array, p
     return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
 
 
-def replay_mechanics(configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float) -> Output:
+def replay_mechanics(
+    configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float
+) -> Output:
     """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
     plant = configuration.plant
     wheel = float(ground[0]) - deflected(plant, preload)
-    return _run(plant, configuration, ground, structure, None, voltage, np.zeros_like(voltage), preload, wheel)
+    return _run(
+        plant,
+        configuration,
+        ground,
+        structure,
+        None,
+        voltage,
+        np.zeros_like(voltage),
+        preload,
+        wheel,
+    )
 
 
-def replay_motor(configuration: Configuration, travel: Array, voltage: Array, preload: float) -> Array:
+def replay_motor(
+    configuration: Configuration, travel: Array, voltage: Array, preload: float
+) -> Array:
     """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
-    alone = configuration.plant._replace(carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring())
+    alone = configuration.plant._replace(
+        carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring()
+    )
     nothing = np.zeros_like(travel)
-    return _run(alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0).load_cell
+    return _run(
+        alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0
+    ).load_cell

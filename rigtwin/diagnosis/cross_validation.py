@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rigtwin.components import Effect
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
-from rigtwin.machine.effects import Effect
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
@@ -41,10 +41,12 @@ class Blocks:
     after: Array
 
     def joined(self, other: Blocks) -> Blocks:
-        return Blocks(np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after]))
+        return Blocks(
+            np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after])
+        )
 
 
-def power(evidence: Evidence, plant: Any) -> list[Array]:
+def power(evidence: Evidence, plant: Plant) -> list[Array]:
     """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
     found = []
     for each, predicted in zip(evidence.lines, evidence.predicted(plant), strict=True):
@@ -53,11 +55,26 @@ def power(evidence: Evidence, plant: Any) -> list[Array]:
     return found
 
 
-def blocks(evidence: Evidence, before: Any, after: Any, counted: Sequence[Array]) -> Blocks:
+def gap_level(evidence: Evidence, plant: Plant) -> float:
+    """rms of all signals less what a plant predicts, in units of their white noise, where a test counts."""
+    powers = [
+        each[lines.fade.max(axis=0) > 0.5]
+        for each, lines in zip(power(evidence, plant), evidence.lines, strict=True)
+    ]
+    ticks = sum(len(each) for each in powers)
+    return math.sqrt(sum(float(each.sum()) for each in powers) / max(ticks, 1))
+
+
+def blocks(evidence: Evidence, before: Plant, after: Plant, counted: Sequence[Array]) -> Blocks:
     """The blocks of the parts that count."""
     pairs: tuple[list[float], list[float]] = ([], [])
     for recording, part, each, one, other in zip(
-        evidence.recordings, counted, evidence.lines, power(evidence, before), power(evidence, after), strict=True
+        evidence.recordings,
+        counted,
+        evidence.lines,
+        power(evidence, before),
+        power(evidence, after),
+        strict=True,
     ):
         length = max(1, round(BLOCK / recording.period))
         weight = part * (each.fade.max(axis=0) > 0.5)
@@ -83,7 +100,9 @@ def interval(of: Blocks) -> Interval:
     before, after = of.before[drawn].mean(axis=1), of.after[drawn].mean(axis=1)
     values = [shrinkage(b, a) for b, a in zip(before, after, strict=True)]
     low, high = np.quantile(values, [0.025, 0.975])
-    return Interval(shrinkage(float(of.before.mean()), float(of.after.mean())), float(low), float(high))
+    return Interval(
+        shrinkage(float(of.before.mean()), float(of.after.mean())), float(low), float(high)
+    )
 
 
 @dataclass(frozen=True)
@@ -113,14 +132,19 @@ def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
 
 
 def _refitted(evidence: Evidence, fit: Fit) -> Fit:
-    return Fitter(evidence).refined(fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects))
+    return Fitter(evidence).refined(
+        fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects)
+    )
 
 
 def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
     """The halves of the recordings, and the fit made again to each."""
     parts = halves(evidence.recordings)
     return parts, [
-        _refitted(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit) for part in parts
+        _refitted(
+            Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit
+        )
+        for part in parts
     ]
 
 
@@ -131,11 +155,15 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
-        predicted = shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0
+        predicted = (
+            shrinkage(float(inside.before.mean()), float(inside.after.mean()))
+            if len(inside.before)
+            else 0.0
+        )
         whole = [np.ones(recording.ticks) for recording in other.recordings]
         data = f"{len(whole)} held-out recording{'s' if len(whole) > 1 else ''}"
 
-        def outside(plant: Any) -> Blocks:
+        def outside(plant: Plant) -> Blocks:
             return blocks(other, evidence.plant, plant, whole)
 
         def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
@@ -143,35 +171,52 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
 
         kept, rejected = gated(fit.effects, kept_outside, worse)
         if rejected and evidence.machine.rough:
-            values = [own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept]
+            values = [
+                own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept
+            ]
             fit = Fitter(evidence).settled(Fitter(evidence).refined(kept, values))
         apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
-        return Judged(predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit)
+        return Judged(
+            predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit
+        )
     parts, fits = _halved(evidence, fit)
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
         inside = blocks(evidence, evidence.plant, refitted.plant, own)
-        predictions.append(shrinkage(float(inside.before.mean()), float(inside.after.mean())) if len(inside.before) else 0.0)
+        predictions.append(
+            shrinkage(float(inside.before.mean()), float(inside.after.mean()))
+            if len(inside.before)
+            else 0.0
+        )
         outcomes.append((refitted, foreign))
 
     def across(kept: tuple[Effect, ...]) -> Blocks:
         found = [
-            blocks(evidence, evidence.plant, with_effects(evidence.plant, refitted, kept), part) for refitted, part in outcomes
+            blocks(evidence, evidence.plant, with_effects(evidence.plant, refitted, kept), part)
+            for refitted, part in outcomes
         ]
         return found[0].joined(found[1])
 
     kept, rejected = gated(fit.effects, across, worse)
     data = "each half, fitted to the other"
-    return Judged(float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits))
+    return Judged(
+        float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits)
+    )
 
 
-def with_effects(plant: Any, fit: Fit, kept: Sequence[Effect]) -> Any:
+def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
     """The plant with those of a fit's effects that are kept."""
-    pairs = [(effect, values) for effect, values in zip(fit.effects, fit.values, strict=True) if effect in kept]
+    pairs = [
+        (effect, values)
+        for effect, values in zip(fit.effects, fit.values, strict=True)
+        if effect in kept
+    ]
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
-def gated(effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE) -> tuple[Effects, Effects]:
+def gated(
+    effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE
+) -> tuple[Effects, Effects]:
     """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
     of the effects."""
     kept = effects
@@ -180,7 +225,9 @@ def gated(effects: Effects, across: Callable[[Effects], Blocks], worse: float = 
         if not len(left.after):
             break
         # One that is far off spoils the others' standing: the worst goes first.
-        without = {effect: across(tuple(other for other in kept if other != effect)) for effect in kept}
+        without = {
+            effect: across(tuple(other for other in kept if other != effect)) for effect in kept
+        }
         worst = min(kept, key=lambda effect: float(without[effect].after.mean()))
         if float(left.after.mean()) <= worse * float(without[worst].after.mean()):
             break

@@ -1,128 +1,337 @@
-"""Is a recording of a described machine fit to be diagnosed? Faults of the data, before anybody takes them for physics."""
+"""Is a recording fit to be diagnosed? Faults of the data, before anybody takes them for physics."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
-from rigtwin.diagnosis.checks import SHORTEST, Fault, check, gaps
-from rigtwin.diagnosis.evidence import cut_off
+from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine
-from rigtwin.models.replaying import Setup, predictor
+from rigtwin.machine.machine import Machine, Row
+from rigtwin.models.choose import model_of
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import rms, white_noise
+from rigtwin.signals.noise import rms, smallest_step, white_noise
+from rigtwin.signals.runs import cut_off, longest_run
 
+SHORTEST = 200
+"""Ticks below which a noise floor cannot be estimated."""
 SHORTEST_TIME = 0.5
-"""s."""
+"""s; less than a few periods of anything that a machine does says nothing."""
 STEPS = 2
 """Of integration a tick, for a rough prediction."""
-ALIKE = 0.8
-"""How well a signal goes with what is expected of it, from which its sign and unit can be told."""
+STUCK = 200
+"""Equal samples in a row of a sensor whose noise is declared: it is not alive."""
+COARSE = 20.0
+"""Times its declared bit from which a sensor is coarse."""
 MOVES = 10.0
 """A signal this many times its noise says what its scale is."""
 OUTLIER = 100.0
 """Times the range of nearly all of a signal at which a sample is damage."""
-CLOSE = 0.15
-"""How close a ratio must be to that of two units."""
-UNITS = {
-    "m": ((1e3, "mm"), (1e2, "cm"), (1e6, "um")),
+PLAUSIBLE = 1e9
+"""In SI units; above it a number is damage."""
+WOUND_UP = 0.05
+"""Share of ticks with a command at its limit from which its loop is no measure of a force."""
+MOST_SWAPPED = 4
+"""Sensors of one unit among which an exchange is looked for."""
+UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
+    "m": ((1e3, "mm"), (1e2, "cm"), (39.37, "inch"), (1e6, "um")),
     "rad": ((57.2958, "degrees"),),
     "m/s": ((1e3, "mm/s"),),
-    "N": ((1e-3, "kN"),),
+    "N": ((1e-3, "kN"), (0.2248, "lbf"), (9.81**-1, "kgf")),
+    "Nm": ((1e3, "Nmm"),),
 }
 """SI unit → (how many of another make one, its name)."""
 
 
-def faults_of(machine: Machine, recording: Recording, setup: Configuration | Setup) -> tuple[Fault, ...]:
-    """All faults found, the gravest first. Later checks are left out where earlier ones make them meaningless."""
-    if isinstance(setup, Configuration):
-        return check(recording, setup)
-    found: list[Fault] = []
-    for stage in (_presence, _values, _scale):
-        found += stage(machine, recording, setup)
-        if any(fault.fatal for fault in found):
-            break
+@dataclass(frozen=True)
+class Alike:
+    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign is wrong; unit: above which
+    a scale is judged; far: scale, either way, that is no gain whatever it is; close: how near a scale must be to a unit's."""
+
+    sign: float
+    unit: float
+    far: float
+    close: float
+
+
+KNOWN = Alike(sign=0.7, unit=0.7, far=5.0, close=0.5)
+ROUGH = Alike(sign=0.8, unit=0.8, far=np.inf, close=0.15)
+"""Of a machine whose nominal values are only a start."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with the data. kind: short name; where: the channel, or the recording; message: one line; fatal: no
+    comparison makes sense."""
+
+    kind: str
+    where: str
+    message: str
+    fatal: bool = True
+
+
+def find_faults(
+    machine: Machine, recording: Recording, configuration: Configuration
+) -> tuple[Fault, ...]:
+    """All faults of a recording.
+
+    Parameters
+    ----------
+    machine
+        That it should be of.
+    recording
+        The data.
+    configuration
+        Of the twin, see `Machine.configuration_of`.
+
+    Returns
+    -------
+    Faults, the gravest first. Later checks are left out where earlier ones make them meaningless.
+    """
+    found = [*_presence(machine, recording)]
+    if not found:
+        found += _values(machine, recording)
+    if not found:
+        predicted = model_of(machine, recording, configuration, STEPS).sensed(configuration.plant)
+        for stage in (_alive, _order, _scale):
+            found += stage(machine, recording, predicted)
+            if any(fault.fatal for fault in found):
+                break
     return tuple(sorted(found, key=lambda fault: not fault.fatal))
 
 
+def require_fit(
+    machine: Machine, recording: Recording, configuration: Configuration
+) -> tuple[Fault, ...]:
+    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that does."""
+    faults = find_faults(machine, recording, configuration)
+    if fatal := [fault.message for fault in faults if fault.fatal]:
+        raise RigtwinError(f"{recording.path}: {'; '.join(fatal)}")
+    return faults
+
+
 def channels(machine: Machine) -> list[tuple[str, str]]:
-    """(topic, field) of everything that the machine's replays need, in order."""
+    """(topic, field) of everything that a diagnosis of the machine reads, in order."""
     found = []
     for replay in machine.replays:
-        mover = machine.components[replay.moved_by[0]].channel
-        if mover is not None and not replay.closed:
-            found.append(mover)
-        if replay.closed and machine.control is not None:
-            found += machine.control.inputs.values()
-            found.append(("/command", machine.control.output))
+        movers = [machine.components[name].channel for name in replay.moved_by]
+        found += [channel for channel in movers if channel is not None and not replay.closed]
         found += [row.channel for row in replay.rows]
+    if machine.control is not None:
+        found += machine.control.channels
+        found += [("/command", name) for name in machine.control.outputs]
     return list(dict.fromkeys(found))
 
 
-def _presence(machine: Machine, recording: Recording, _setup: Setup) -> Iterator[Fault]:
+def _presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
     if recording.machine != machine.name:
-        yield Fault("wrong machine", "recording", f"it is of machine {recording.machine!r}; this twin is {machine.name!r}")
+        yield Fault(
+            "wrong machine",
+            "recording",
+            f"it is of machine {recording.machine!r}; this twin is {machine.name!r}",
+        )
     for topic, name in channels(machine):
         if not recording.has(topic, name):
             there = ", ".join(f"{t}.{n}" for t, fields in recording.columns.items() for n in fields)
-            yield Fault("missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}")
+            yield Fault(
+                "missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}"
+            )
+    lasts = recording.ticks * recording.period
     if recording.ticks < SHORTEST:
-        yield Fault("too short", "recording", f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}")
-
-
-def _lasts(recording: Recording) -> Iterator[Fault]:
-    """A test of less than a few periods of anything that a machine does says nothing."""
-    if recording.ticks * recording.period < SHORTEST_TIME:
-        lasts = recording.ticks * recording.period
         yield Fault(
             "too short",
             "recording",
-            f"it lasts {lasts:.3g} s; a comparison needs at least {SHORTEST_TIME:g} s (is the time's unit right?)",
+            f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}",
         )
+    elif lasts < SHORTEST_TIME:
+        message = f"it lasts {lasts:.3g} s; a comparison needs at least {SHORTEST_TIME:g} s (is the time's unit right?)"
+        yield Fault("too short", "recording", message)
 
 
-def _values(machine: Machine, recording: Recording, _setup: Setup) -> Iterator[Fault]:
-    yield from _lasts(recording)
-    yield from gaps(recording)
-    moving = [machine.components[replay.moved_by[0]].channel for replay in machine.replays]
+def _values(machine: Machine, recording: Recording) -> Iterator[Fault]:
+    steps = np.diff(recording.time)
+    gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
+    if len(gaps):
+        first = gaps[0]
+        message = f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} s at {recording.time[first]:.3f} s"
+        yield Fault("gap", "recording", message)
     for topic, name in channels(machine):
         signal, where = recording.column(topic, name), f"{topic}.{name}"
         wrong = ~np.isfinite(signal)
         if wrong.any():
-            yield Fault("not a number", where, f"{where} is not a number at {recording.time[np.argmax(wrong)]:.3f} s")
-            continue
-        spread = float(np.subtract(*np.quantile(signal, [0.999, 0.001])))
-        middle = float(np.median(signal))
-        if spread > 0.0 and float(np.max(np.abs(signal - middle))) > OUTLIER * spread:
-            at = int(np.argmax(np.abs(signal - middle)))
-            when = recording.time[at]
             yield Fault(
-                "implausible", where, f"{where} is {signal[at]:.4g} at {when:.3f} s, far outside of all else ({spread:.3g})"
+                "not a number",
+                where,
+                f"{where} is not a number at {recording.time[np.argmax(wrong)]:.3f} s",
             )
             continue
-        if np.ptp(signal) == 0.0 and ((topic, name) in moving or topic == "/sensor"):
-            yield Fault("dead", where, f"{where} does not change throughout: a dead or disconnected channel")
-        elif topic == "/sensor" and (cut := cut_off(signal)).any():
-            yield Fault("clipped", where, f"{where} is cut off ({100 * cut.mean():.2g} % of the ticks)", fatal=False)
+        spread = float(np.subtract(*np.quantile(signal, [0.999, 0.001])))
+        away = np.abs(signal - float(np.median(signal)))
+        at = int(np.argmax(away))
+        if (spread > 0.0 and away[at] > OUTLIER * spread) or abs(signal[at]) > PLAUSIBLE:
+            when = f"{signal[at]:.4g} at {recording.time[at]:.3f} s"
+            yield Fault(
+                "implausible", where, f"{where} is {when}, far outside of all else ({spread:.3g})"
+            )
 
 
-def _scale(machine: Machine, recording: Recording, setup: Setup) -> Iterator[Fault]:
+def _alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+    still = {
+        row.name
+        for row, model in zip(machine.rows, predicted, strict=True)
+        if _rests(machine, row, model)
+    }
+    for name, component in machine.components.items():
+        if component.channel is None or not recording.has(*component.channel):
+            continue
+        where, signal = ".".join(component.channel), recording.column(*component.channel)
+        if component.element != "sensor" and name not in _movers(machine):
+            continue
+        first, length = longest_run(signal, np.ones(len(signal), bool))
+        if length == len(signal):
+            if name not in still and (component.element == "sensor" or machine.rough):
+                yield Fault(
+                    "dead",
+                    where,
+                    f"{where} does not change throughout: a dead or disconnected channel",
+                )
+            continue
+        if component.element != "sensor":
+            continue
+        bit = getattr(getattr(machine.plant, name), "resolution", 0.0)
+        if bit > 0.0 and length >= STUCK and smallest_step(signal) <= COARSE * bit:
+            since = f"for {length * recording.period:.3g} s from {recording.time[first]:.3f} s"
+            yield Fault(
+                "dead", where, f"{where} does not change {since}: a dead or disconnected sensor"
+            )
+            continue
+        yield from _cut(where, signal)
+
+
+def _movers(machine: Machine) -> set[str]:
+    """What the recording moves a machine by."""
+    return {name for replay in machine.replays if not replay.closed for name in replay.moved_by}
+
+
+def _rests(machine: Machine, row: Row, predicted: Array) -> bool:
+    """Whether a signal should not change: commands that stay put move nothing."""
+    bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
+    return float(np.ptp(predicted)) <= bit
+
+
+def _cut(where: str, signal: Array) -> Iterator[Fault]:
+    at_end = cut_off(signal)
+    for end, extreme in (("above", signal.max()), ("below", signal.min())):
+        share = 100 * float(np.mean(at_end & (signal == extreme)))
+        if share > 0.0:
+            message = f"{where} is cut off {end} {extreme:.4g} ({share:.2g} % of the ticks)"
+            yield Fault("clipped", where, message, fatal=False)
+
+
+def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+    """Swapped channels: another order of the sensors of one unit fits far better."""
+    for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
+        rows = [
+            (n, row)
+            for n, row in enumerate(machine.rows)
+            if row.unit == unit and row.kind != "command"
+        ]
+        if machine.rough or not 1 < len(rows) <= MOST_SWAPPED:
+            continue
+        names = [row.name for _, row in rows]
+        left = {}
+        for _, row in rows:
+            for number, model in rows:
+                difference = recording.column(*row.channel) - predicted[number]
+                left[row.name, model.name] = rms(difference - np.mean(difference)) ** 2
+
+        def total(
+            order: tuple[str, ...],
+            names: list[str] = names,
+            left: dict[tuple[str, str], float] = left,
+        ) -> float:
+            return sum(left[name, model] for name, model in zip(names, order, strict=True)) ** 0.5
+
+        orders = list(permutations(names))
+        least = min(total(order) for order in orders)
+        if least < total(tuple(names)) / 3:
+            # Orders that fit about as well differ in what these data cannot tell; the fewest swaps are the likeliest.
+            likely = [order for order in orders if total(order) < 1.5 * least]
+            best = min(
+                likely, key=lambda order: sum(n != m for n, m in zip(names, order, strict=True))
+            )
+            swapped = ", ".join(
+                f"{name} holds {model}"
+                for name, model in zip(names, best, strict=True)
+                if name != model
+            )
+            yield Fault("swapped", "/sensor", f"channels of /sensor are swapped: {swapped}")
+
+
+def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Signs and units, by how a signal goes with what the nominal machine would show."""
-    predicted = predictor(machine, recording, setup, STEPS).sensed(machine.plant)
+    rule = ROUGH if machine.rough else KNOWN
+    odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
-        signal = recording.column(*row.channel)
-        a, b = signal - signal.mean(), model - model.mean()
+        signal, where = recording.column(*row.channel), ".".join(row.channel)
+        # Motions have a zero that may be displaced; a known force has its preload, which says its scale even at rest.
+        whole = row.kind == "force" and not machine.rough
+        a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
-        alike = float(a @ b) / float(np.sqrt((a @ a) * (b @ b)))
-        where = f"{row.channel[0]}.{row.channel[1]}"
-        if alike < -ALIKE:
-            yield Fault("sign", where, f"{where} has the wrong sign: it goes against what the description predicts")
-        slope = float(a @ b / (b @ b))
-        for factor, unit in UNITS.get(row.unit, ()):
-            if alike > ALIKE and abs(slope / factor - 1.0) < CLOSE:
-                yield Fault(
-                    "unit", where, f"{where} is {slope:.4g} times what is predicted, as if in {unit}; expected {row.unit}"
-                )
+        alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))
+        if alike < -rule.sign:
+            yield Fault(
+                "sign", where, f"{where} has the wrong sign: it goes against what is predicted"
+            )
+        elif alike > rule.unit:
+            near = any(
+                abs(np.log(factor / slope)) < rule.close for factor, _ in UNITS.get(row.unit, ())
+            )
+            if not 1 / rule.far < slope < rule.far or (machine.rough and near):
+                odd[row] = slope
+    for row, slope in _beyond_gain(machine, recording, odd).items():
+        known = UNITS.get(row.unit, ((1.0, ""),))
+        factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
+        as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < KNOWN.close and guess else ""
+        where = ".".join(row.channel)
+        yield Fault(
+            "unit",
+            where,
+            f"{where} is {slope:.3g} times what is predicted{as_if}; expected {row.unit}",
+        )
+
+
+def _beyond_gain(
+    machine: Machine, recording: Recording, odd: Mapping[Row, float]
+) -> dict[Row, float]:
+    """Odd scales less those that physics explains."""
+    found = dict(odd)
+    for row in odd:
+        if row.kind == "force" and _wound_up(machine, recording):
+            # A loop at its limit says that the force is not to be had; whose fault it is, is for the diagnosis.
+            del found[row]
+    for unit in {row.unit for row in odd}:
+        alike = [row for row in odd if row.unit == unit]
+        if len(alike) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
+            one, other = (odd[row] for row in alike)
+            if 0.5 < one / other < 2.0:
+                # Two sensors that agree on something that hardly moves: it hardly moves.
+                found = {row: slope for row, slope in found.items() if row not in alike}
+    return found
+
+
+def _wound_up(machine: Machine, recording: Recording) -> bool:
+    """Whether a force actuator's command stands at its limit for long."""
+    for name in _movers(machine):
+        component = machine.components[name]
+        if component.channel is None or component.element != "actuator":
+            continue
+        size = np.abs(recording.column(*component.channel))
+        if float(np.mean(size >= 0.99 * float(size.max()))) > WOUND_UP:
+            return True
+    return False

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from rigtwin.components import Effect, find, title, with_parameters
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
-from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Judged, judged, power, with_effects
-from rigtwin.diagnosis.data_checks import faults_of
+from rigtwin.diagnosis.cross_validation import Judged, gap_level, judged, with_effects
+from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import (
-    Diagnosis,
+    Answer,
     Estimate,
     Finding,
     Gap,
@@ -31,21 +31,19 @@ from rigtwin.diagnosis.finding import (
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.formula_replay import formula_deviation
 from rigtwin.diagnosis.leftover import leftovers, missed, steps
-from rigtwin.diagnosis.levels import closed_loop, replay_levels, signal_levels
+from rigtwin.diagnosis.levels import compute_levels
 from rigtwin.diagnosis.localisation import placed
-from rigtwin.diagnosis.next_test import Test, proposed
+from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import Sampled, outstanding
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.unknown_input import Disturbed, located
-from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.effects import Effect, find, title
 from rigtwin.machine.machine import Machine
-from rigtwin.models.replaying import Setup, setup_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.simulation.experiment import Experiment
 
 SURE = 0.98
 """Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
@@ -65,87 +63,94 @@ SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
 
-Setting = TypeVar("Setting", Configuration, Setup, "Configuration | Setup")
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """A diagnosis, what pictures of it are drawn from, and the corrected twin's configuration. otherwise: other explanations
-    that are not out of the question, with their probability."""
-
-    diagnosis: Diagnosis
-    evidence: Evidence | None
-    corrected: Configuration | Setup
-    otherwise: tuple[tuple[Fit, float], ...] = ()
-
-
-def unusable(
-    machine: Machine, recordings: Sequence[Recording], configurations: Sequence[Configuration | Setup], started: float
-) -> Diagnosis | None:
+def _unusable(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    configurations: Sequence[Configuration],
+    started: float,
+) -> Answer | None:
     """The answer if some data are not fit to be diagnosed, else None."""
-    faults: list[str] = []
-    for recording, configuration in zip(recordings, configurations, strict=True):
-        faults += [
-            f"{recording.path}: {fault.message}" for fault in faults_of(machine, recording, configuration) if fault.fatal
-        ]
+    faults = [
+        f"{recording.path}: {fault.message}"
+        for recording, configuration in zip(recordings, configurations, strict=True)
+        for fault in find_faults(machine, recording, configuration)
+        if fault.fatal
+    ]
     if not faults:
         return None
-    sentence = f"The data cannot be diagnosed: {faults[0]}."
-    names = tuple(str(recording.path) for recording in recordings)
-    seconds = time.perf_counter() - started
-    return Diagnosis(
-        "unusable", sentence, (), (), None, (), None, (), tuple(faults), _notes(recordings), names, seconds, machine.name
+    return Answer(
+        verdict="unusable",
+        sentence=f"The data cannot be diagnosed: {faults[0]}.",
+        faults=tuple(faults),
+        notes=_notes(recordings),
+        recordings=tuple(str(recording.path) for recording in recordings),
+        seconds=time.perf_counter() - started,
+        machine=machine.name,
     )
 
 
 def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes)
+    return tuple(
+        f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
+    )
 
 
 def diagnose(
     machine: Machine,
     recordings: Sequence[Recording],
-    base: Configuration | Setup,
+    base: Configuration | None = None,
     held_out: Sequence[Recording] = (),
-    tests: Sequence[Test] = (),
+    tests: Sequence[Experiment] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
-) -> Outcome:
-    """Diagnoses recordings of one machine against the twin of `base`. tests: the menu that a next one is chosen from;
-    progress is called with a stage's name and the steps done in it.
+) -> Diagnosis:
+    """Says why recordings of one machine and its twin disagree.
 
-    Raises RigtwinError if the recordings' settings are unknown here, or held-out data are not fit to be compared.
+    Parameters
+    ----------
+    machine
+        Its description.
+    recordings
+        Explained together.
+    base
+        The twin that they are compared with; by default the described one.
+    held_out
+        Recordings that the correction is judged on; without any, each half of the others on a fit to the other half.
+    tests
+        The menu that a next test is chosen from.
+    progress
+        Called with a stage's name and the steps done in it.
+
+    Raises
+    ------
+    RigtwinError
+        If the recordings' settings are unknown here, or held-out data are not fit to be compared.
     """
     started = time.perf_counter()
     with threadpool_limits(1):
-        configurations = [setting(machine, recording, base) for recording in recordings]
-        if (bad := unusable(machine, recordings, configurations, started)) is not None:
-            return Outcome(bad, None, configurations[0])
-        others = [setting(machine, recording, base) for recording in held_out]
+        configurations = [machine.configuration_of(recording, base) for recording in recordings]
+        if (bad := _unusable(machine, recordings, configurations, started)) is not None:
+            return Diagnosis(bad, machine, None, configurations[0])
+        others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
-            for fault in faults_of(machine, recording, configuration):
-                if fault.fatal:
-                    raise RigtwinError(f"{recording.path}: {fault.message}")
+            require_fit(machine, recording, configuration)
         evidence = Evidence(machine, recordings, configurations)
         apart = Evidence(machine, held_out, others) if held_out else None
-        return _diagnosed(evidence, apart, tests, progress, started)
+        return _diagnose(evidence, apart, tests, progress, started)
 
 
-def setting(machine: Machine, recording: Recording, base: Configuration | Setup) -> Configuration | Setup:
-    """What the twin of a recording is set to."""
-    if isinstance(base, Configuration):
-        return configuration_of(recording, base)
-    return setup_of(machine, recording, base)
-
-
-def _diagnosed(
+def _diagnose(
     evidence: Evidence,
     held_out: Evidence | None,
-    tests: Sequence[Test],
+    tests: Sequence[Experiment],
     progress: Callable[[str, int], object],
     started: float,
-) -> Outcome:
+) -> Diagnosis:
     found = attribute(evidence, lambda steps: progress("fitting effects", steps))
-    best = found.best.fit if found.best is not None else Fit((), (), found.nothing.misfit, (), evidence.plant)
+    best = (
+        found.best.fit
+        if found.best is not None
+        else Fit((), (), found.nothing.misfit, (), evidence.plant)
+    )
     notes = [*_notes(evidence.recordings), *_clipped(evidence)]
     progress("judging on held-out data", 1)
     verdict_of_data = judged(evidence, best, held_out)
@@ -158,18 +163,29 @@ def _diagnosed(
     progress("looking where", 1)
     disturbed = located(evidence, plant, verdict_of_data.kept, follow=found.unknown)
     left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
-    something = found.unknown or bool(verdict_of_data.rejected) or (left - disturbed[0].misfit) > SOMETHING * found.expected
+    something = (
+        found.unknown
+        or bool(verdict_of_data.rejected)
+        or (left - disturbed[0].misfit) > SOMETHING * found.expected
+    )
     deviations = _deviations(evidence)
     sampled = outstanding(
-        evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(plant)], evidence.plant
+        evidence.names,
+        evidence.recordings,
+        [list(rows) for rows in evidence.predicted(plant)],
+        evidence.plant,
     )
     attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
     lost = missed(evidence, best) if evidence.machine.rough else {}
-    traces = tuple(each for each in attributed if lost and each.share < TRACE and lost[str(each.name)] < NOTICED)
+    traces = tuple(
+        each
+        for each in attributed
+        if lost and each.share < TRACE and lost[str(each.name)] < NOTICED
+    )
     effects = [
         *(each for each in attributed if each not in traces),
-        *(_sampled(each) for each in sampled),
+        *(_sampled(each, evidence.plant) for each in sampled),
         *(_deviation(each) for each in deviations if each.kind != "unknown"),
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
@@ -182,46 +198,62 @@ def _diagnosed(
     claimed = tuple(effect for effect in verdict_of_data.kept if effect.name not in small)
     where = _where(evidence, found, plant, claimed, disturbed if something else (), best)
     if odd_controller:
-        where.append(Place("controller", 1.0, (0.0, 0.0), "throughout", "its commands are not those of its settings"))
+        where.append(
+            Place(
+                "controller",
+                1.0,
+                (0.0, 0.0),
+                "throughout",
+                "its commands are not those of its settings",
+            )
+        )
     progress("replaying components", 1)
     gap = _gap(evidence, plant, verdict_of_data, sampled)
     progress("choosing the next test", 1)
     suggestion = _next(evidence.machine, found, effects, verdict_of_data.kept, tests)
     corrected = _corrected(evidence.configurations[0], plant, sampled)
-    seconds = time.perf_counter() - started
-    diagnosis = Diagnosis(
-        verdict,
-        sentence(verdict, effects, where, gap),
-        tuple(effects),
-        tuple(where),
-        gap,
-        tuple((" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]),
-        suggestion,
-        _unseen(found, attributed),
-        (),
-        tuple(notes),
-        tuple(str(recording.path) for recording in evidence.recordings),
-        seconds,
-        evidence.machine.name,
-        steps(evidence, found.chain if verdict != "no gap" else (), held_out or evidence) if evidence.machine.rough else (),
-        {row.name: row.unit for row in evidence.machine.rows},
-        tuple(leftovers(evidence, plant, disturbed)) if verdict != "no gap" and evidence.machine.rough else (),
-        traces,
+    rough = evidence.machine.rough
+    gone = verdict == "no gap"
+    answer = Answer(
+        verdict=verdict,
+        sentence=sentence(verdict, effects, where, gap),
+        effects=tuple(effects),
+        where=tuple(where),
+        gap=gap,
+        ranking=tuple(
+            (" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]
+        ),
+        next_test=suggestion,
+        not_observable=_unseen(found, attributed),
+        notes=tuple(notes),
+        recordings=tuple(str(recording.path) for recording in evidence.recordings),
+        seconds=time.perf_counter() - started,
+        machine=evidence.machine.name,
+        steps=steps(evidence, () if gone else found.chain, held_out or evidence) if rough else (),
+        units={row.name: row.unit for row in evidence.machine.rows},
+        leftovers=tuple(leftovers(evidence, plant, disturbed)) if rough and not gone else (),
+        traces=traces,
     )
-    return Outcome(diagnosis, evidence, corrected, _otherwise(found, verdict_of_data.kept))
+    return Diagnosis(
+        answer, evidence.machine, evidence, corrected, _otherwise(found, verdict_of_data.kept)
+    )
 
 
 def _otherwise(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, float], ...]:
     """Explanations other than the one that is named, the likeliest first."""
-    others = [each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)]
+    others = [
+        each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)
+    ]
     return tuple((each.fit, each.probability) for each in others if each.probability >= POSSIBLE)
 
 
 def _clipped(evidence: Evidence) -> list[str]:
     return [
         f"{recording.path.name}: {fault.message}; those ticks are left out"
-        for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True)
-        for fault in faults_of(evidence.machine, recording, configuration)
+        for recording, configuration in zip(
+            evidence.recordings, evidence.configurations, strict=True
+        )
+        for fault in find_faults(evidence.machine, recording, configuration)
         if not fault.fatal
     ]
 
@@ -230,11 +262,11 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     """What the controller did other than told, once for all recordings."""
     found: dict[tuple[str, str], Deviation] = {}
     for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
-        deviation = None
-        if isinstance(configuration, Setup):
-            deviation = formula_deviation(evidence.machine, recording, configuration)
-        elif recording.controller:
-            deviation = ControllerReplay(recording, configuration.controller).deviation()
+        control = evidence.machine.control
+        if control is None or not (recording.controller or control.exact is not None):
+            # Nobody said what the controller was told to do.
+            continue
+        deviation = ControllerReplay(control, recording, configuration.controller).deviation()
         if deviation is not None:
             found[deviation.kind, deviation.name] = deviation
     return list(found.values())
@@ -248,7 +280,9 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
         tuple(
             # A rough model's error is no noise: how far it leads astray shows between one half of the data and the other.
             max(width, abs(one - other) / WIDER) if evidence.machine.rough else width
-            for width, one, other in zip(own, *(half.values[number] for half in outcome.halves), strict=True)
+            for width, one, other in zip(
+                own, *(half.values[number] for half in outcome.halves), strict=True
+            )
         )
         if len(outcome.halves) == 2
         else own
@@ -269,7 +303,9 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
     ]
 
 
-def estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], evidence: Evidence) -> dict[str, Estimate]:
+def estimates(
+    effect: Effect, values: Sequence[float], widths: Sequence[float], evidence: Evidence
+) -> dict[str, Estimate]:
     """The parameters of an effect as fitted, with their intervals."""
     nominal = effect.nominal(evidence.plant)
     # A delay cannot be known better than when in a tick the samples were taken.
@@ -283,7 +319,9 @@ def estimates(effect: Effect, values: Sequence[float], widths: Sequence[float], 
             nominal[name],
             evidence.machine.unit(effect.group, quantity),
         )
-        for (name, quantity), value, width in zip(effect.quantities().items(), values, widths, strict=True)
+        for (name, quantity), value, width in zip(
+            effect.quantities().items(), values, widths, strict=True
+        )
     }
 
 
@@ -296,7 +334,11 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     names = [Name(effect.component, effect.kind.name)]
     rest = [other for other in best.fit.effects if other != effect]
     for each in ranking:
-        if each.probability < MEMBER or len(each.fit.effects) != len(best.fit.effects) or effect in each.fit.effects:
+        if (
+            each.probability < MEMBER
+            or len(each.fit.effects) != len(best.fit.effects)
+            or effect in each.fit.effects
+        ):
             continue
         for other in each.fit.effects:
             if other not in rest and len([e for e in each.fit.effects if e in rest]) == len(rest):
@@ -304,8 +346,8 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     return tuple(dict.fromkeys(names))
 
 
-def _sampled(each: Sampled) -> Finding:
-    effect = find(f"{each.kind}@{each.component}")
+def _sampled(each: Sampled, plant: Plant) -> Finding:
+    effect = find(f"{each.kind}@{each.component}", plant)
     unit = effect.quantities()[each.parameter].unit
     spread = 0.05 * each.value
     estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
@@ -323,7 +365,7 @@ def _deviation(each: Deviation) -> Finding:
 def _where(
     evidence: Evidence,
     found: Attribution,
-    plant: Any,
+    plant: Plant,
     kept: tuple[Effect, ...],
     disturbed: tuple[Disturbed, ...],
     best: Fit,
@@ -339,7 +381,11 @@ def _where(
     if disturbed:
         foremost = disturbed[0]
         share = 1.0 - (found.explained if kept else 0.0)
-        words = "what is left goes with " + ", ".join(foremost.forms) if foremost.forms else "what is left has no plain form"
+        words = (
+            "what is left goes with " + ", ".join(foremost.forms)
+            if foremost.forms
+            else "what is left has no plain form"
+        )
         left = evidence.differences(plant)
         place = placed(evidence, foremost.component, share, left, words)
         if all(place.component != foremost.component for place in places.values()):
@@ -347,46 +393,45 @@ def _where(
     return sorted(places.values(), key=lambda place: -place.share)
 
 
-def _gap(evidence: Evidence, plant: Any, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
-    def level(of: Any) -> float:
-        powers = [p[e.fade.max(axis=0) > 0.5] for p, e in zip(power(evidence, of), evidence.lines, strict=True)]
-        ticks = sum(len(each) for each in powers)
-        return float((sum(each.sum() for each in powers) / max(ticks, 1)) ** 0.5)
-
-    recording, nominal = evidence.recordings[0], evidence.configurations[0]
-    corrected = _corrected(nominal, plant, sampled)
-    loop = None
-    if isinstance(nominal, Configuration) and isinstance(corrected, Configuration):
-        replays = replay_levels(recording, nominal, nominal._replace(plant=plant))
-        loop = closed_loop(recording, nominal, corrected, _noisy(corrected.plant, evidence))
-    else:
-        replays = signal_levels(evidence, plant)
-    held_out = outcome.held_out
-    return Gap(level(evidence.plant), level(plant), 1.0, outcome.predicted, held_out, outcome.data, replays, loop)
+def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
+    corrected = _corrected(evidence.configurations[0], plant, sampled)
+    replays, loop = compute_levels(evidence, plant, corrected)
+    return Gap(
+        before=gap_level(evidence, evidence.plant),
+        after=gap_level(evidence, plant),
+        floor=1.0,
+        shrinkage_predicted=outcome.predicted,
+        shrinkage_held_out=outcome.held_out,
+        held_out=outcome.data,
+        replays=replays,
+        closed_loop=loop,
+    )
 
 
-def _noisy(plant: Any, evidence: Evidence) -> Any:
-    """The plant with the white noise that the recording has."""
-    for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
-        plant = plant._replace(**{name: getattr(plant, name)._replace(white=float(noise))})
-    return plant
-
-
-def _corrected(nominal: Setting, plant: Any, sampled: Sequence[Sampled]) -> Setting:
+def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled]) -> Configuration:
     for each in sampled:
-        plant = plant._replace(**{each.component: getattr(plant, each.component)._replace(**{each.parameter: each.value})})
+        plant = with_parameters(plant, each.component, {each.parameter: each.value})
     return nominal._replace(plant=plant)
 
 
 def _next(
-    machine: Machine, found: Attribution, effects: Sequence[Finding], kept: tuple[Effect, ...], tests: Sequence[Test]
+    machine: Machine,
+    found: Attribution,
+    effects: Sequence[Finding],
+    kept: tuple[Effect, ...],
+    tests: Sequence[Experiment],
 ) -> NextTest | None:
     if not tests or found.best is None or not kept:
         return None
     likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]
-    if all(effect.confidence >= UNSURE and len(effect.alternatives) == 1 for effect in effects) or len(likely) < 2:
+    if (
+        all(effect.confidence >= UNSURE and len(effect.alternatives) == 1 for effect in effects)
+        or len(likely) < 2
+    ):
         return None
-    return proposed(machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests)
+    return proposed(
+        machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests
+    )
 
 
 def _unseen(found: Attribution, effects: Sequence[Finding]) -> tuple[Unseen, ...]:

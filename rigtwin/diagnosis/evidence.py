@@ -17,16 +17,17 @@ from numpy.fft import rfft, rfftfreq
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
+from rigtwin.components.plant import Plant
 from rigtwin.machine.configuration import Configuration
 from rigtwin.machine.machine import Machine
 from rigtwin.machine.tolerance import Tolerance
-from rigtwin.models.predictor import Predictor
-from rigtwin.models.replaying import Setup, predictor
+from rigtwin.models.choose import model_of
+from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smallest_step, white_noise, without_mains
-from rigtwin.signals.runs import FLAT, longest_run
+from rigtwin.signals.runs import cut_off
 
 HIGHEST = 150.0
 """Hz; above it no component moves and lines would only add noise."""
@@ -69,7 +70,9 @@ class Lines:
     length: int
 
 
-def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, counted: Array) -> Lines:
+def lines(
+    machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
+) -> Lines:
     """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1,
     shape (ticks,)."""
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
@@ -93,7 +96,9 @@ def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, 
         power = np.abs(rfft(swing, length)[kept]) ** 2
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
         if carried is not None:
-            spread[row] += 0.5 * _smoothed(np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY)
+            spread[row] += 0.5 * _smoothed(
+                np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY
+            )
         if machine.rough:
             # A rough model does not know how what it lacks is spread over the lines.
             variance = spread[row] + 0.5 * form**2 * float(np.mean(power)) + 1e-300
@@ -106,19 +111,6 @@ def lines(machine: Machine, recording: Recording, model: Predictor, plant: Any, 
         floor = np.sqrt(floor**2 + np.var(carried, axis=1))
     floor = np.maximum(floor, 1e-300)
     return Lines(frequency[kept], weight, spread, fade, measured, floor, resolution, length)
-
-
-def cut_off(row: Array) -> NDArray[np.bool_]:
-    """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
-    found = np.zeros(len(row), bool)
-    if white_noise(row) < smallest_step(row):
-        # Bits coarser than the noise stand still at rest too.
-        return found
-    for extreme in (row.min(), row.max()):
-        at_end = row == extreme
-        if longest_run(row, at_end)[1] >= FLAT:
-            found |= at_end
-    return found
 
 
 def _smoothed(power: Array, lines: int = SMOOTHED) -> Array:
@@ -166,60 +158,78 @@ class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
     Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if nothing but white noise is
-    left. Several recordings stand one after another. plants: the reduced plant under each one's commands.
+    left. Several recordings stand one after another. models: under each one's inputs.
     """
 
     def __init__(
         self,
         machine: Machine,
         recordings: Sequence[Recording],
-        configurations: Sequence[Configuration | Setup],
+        configurations: Sequence[Configuration],
         counted: Sequence[Array] | None = None,
         steps: int = 4,
     ) -> None:
         """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0
         to 1; steps: of integration a tick."""
         counted = counted or [np.ones(recording.ticks) for recording in recordings]
-        self.machine, self.recordings, self.configurations = machine, tuple(recordings), tuple(configurations)
+        self.machine, self.recordings, self.configurations = (
+            machine,
+            tuple(recordings),
+            tuple(configurations),
+        )
         self.names = [row.name for row in machine.rows]
-        self.plant: Any = self.configurations[0].plant
-        self.plants = [predictor(machine, r, c, steps) for r, c in zip(recordings, configurations, strict=True)]
+        self.plant: Plant = self.configurations[0].plant
+        self.models = [
+            model_of(machine, r, c, steps) for r, c in zip(recordings, configurations, strict=True)
+        ]
         self.lines = [
             lines(machine, recording, model, c.plant, part)
-            for recording, model, c, part in zip(recordings, self.plants, configurations, counted, strict=True)
+            for recording, model, c, part in zip(
+                recordings, self.models, configurations, counted, strict=True
+            )
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
-        for each, recording, predicted in zip(self.lines, self.recordings, self.predicted(self.plant), strict=True):
-            for row, model in zip(each.measured, predicted, strict=True):
-                row -= (row - model) - without_mains(row - model, recording.period, self.plant.mains.frequency)
+        for each, recording, predicted in zip(
+            self.lines, self.recordings, self.predicted(self.plant), strict=True
+        ):
+            for row, expected in zip(each.measured, predicted, strict=True):
+                row -= (row - expected) - without_mains(
+                    row - expected, recording.period, self.plant.mains.frequency
+                )
         self._loosen()
         self._round()
-        self.expected = sum(float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines)
+        self.expected = sum(
+            float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines
+        )
         if machine.rough:
             # What such a model is not held to is no gap either.
             self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
         self._counted = counted
 
-    def expected_at(self, plant: Any) -> float:
+    def expected_at(self, plant: Plant) -> float:
         """The same about another plant, where the noise of what drives the model may do more."""
         if not self.machine.rough:
             return self.expected
         more = 0.0
-        for recording, model, each, part in zip(self.recordings, self.plants, self.lines, self._counted, strict=True):
+        for recording, model, each, part in zip(
+            self.recordings, self.models, self.lines, self._counted, strict=True
+        ):
             there = lines(self.machine, recording, model, plant, part)
-            more += float(np.sum(2.0 * np.maximum(there.spread - each.spread, 0.0) * each.weight**2))
+            more += float(
+                np.sum(2.0 * np.maximum(there.spread - each.spread, 0.0) * each.weight**2)
+            )
         return self.expected + more
 
     def coarser(self) -> Evidence:
         """The same with half as many integration steps: for a search, not for its result."""
         like = copy(self)
-        like.plants = [plant.coarser() for plant in self.plants]
+        like.models = [model.coarser() for model in self.models]
         return like
 
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
-        for each, reduced in zip(self.lines, self.plants, strict=True):
-            change = each.fade * (reduced.sensed(self.plant) - reduced.finer().sensed(self.plant))
+        for each, model in zip(self.lines, self.models, strict=True):
+            change = each.fade * (model.sensed(self.plant) - model.finer().sensed(self.plant))
             power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
             for row in range(len(self.names)):
                 variance = COARSE * 0.5 * _smoothed(power[row])
@@ -231,16 +241,18 @@ class Evidence:
             for row in range(len(self.names)):
                 bit = float(each.bit[row])
                 if bit > COARSE_BIT * each.noise[row]:
-                    rounded = each.fade[row] * (np.round(predicted[row] / bit) * bit - predicted[row])
+                    rounded = each.fade[row] * (
+                        np.round(predicted[row] / bit) * bit - predicted[row]
+                    )
                     power = np.abs(rfft(rounded, each.length))[: len(each.frequency)] ** 2
                     variance = 0.5 * COARSER * _smoothed(power)
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
-    def predicted(self, plant: Any) -> list[Array]:
+    def predicted(self, plant: Plant) -> list[Array]:
         """The sensors of every recording, shape (rows, ticks) each."""
-        return [reduced.sensed(plant) for reduced in self.plants]
+        return [model.sensed(plant) for model in self.models]
 
-    def differences(self, plant: Any) -> list[Array]:
+    def differences(self, plant: Plant) -> list[Array]:
         """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early
         or late leaves says nothing of its size, and jumps when anything changes."""
         return self._despiked(self.predicted(plant))
@@ -257,14 +269,23 @@ class Evidence:
 
     def whitened(self, differences: Sequence[Array]) -> Array:
         """Differences in the time domain, shape (rows, ticks) each, as one whitened vector."""
-        return np.concatenate([part.ravel() for each in self.transforms(differences) for part in (each.real, each.imag)])
+        return np.concatenate(
+            [
+                part.ravel()
+                for each in self.transforms(differences)
+                for part in (each.real, each.imag)
+            ]
+        )
 
     def transforms(self, differences: Sequence[Array]) -> Iterator[NDArray[np.complex128]]:
         """The same before it becomes a vector, shape (rows, lines) for each recording."""
         for each, difference in zip(self.lines, differences, strict=True):
-            yield rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)] * each.weight
+            yield (
+                rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)]
+                * each.weight
+            )
 
-    def residual(self, plant: Any) -> Array:
+    def residual(self, plant: Plant) -> Array:
         """Measured less predicted."""
         return self.whitened(self.differences(plant))
 
@@ -276,14 +297,14 @@ class Evidence:
         """A tolerance's half width here, in its parameter's unit."""
         return tolerance.width(self.plant, self.recordings[0].period)
 
-    def shifted(self, plant: Any, widths: Sequence[float]) -> Any:
+    def shifted(self, plant: Plant, widths: Sequence[float]) -> Plant:
         """The plant with each tolerance used by so many half widths."""
         for tolerance, share in zip(self.machine.tolerances, widths, strict=True):
             if share:
                 plant = tolerance.shifted(plant, share * self.width(tolerance))
         return plant
 
-    def nuisances(self, plant: Any) -> Array:
+    def nuisances(self, plant: Plant) -> Array:
         """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""
         before = self.predicted(plant)
         columns = []
@@ -294,5 +315,7 @@ class Evidence:
             if tolerance.mechanical and width > 0.0:
                 # Friction answers a change unevenly: from both sides, half of it is gone.
                 start, scale = self.predicted(tolerance.shifted(plant, -width)), 0.5
-            columns.append(self.whitened([scale * (b - a) for a, b in zip(start, after, strict=True)]))
+            columns.append(
+                self.whitened([scale * (b - a) for a, b in zip(start, after, strict=True)])
+            )
         return np.stack(columns, axis=1)

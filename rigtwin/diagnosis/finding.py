@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from rigtwin.recording.channels import SUSPENSION_RIG
-
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
 
 
@@ -121,25 +119,25 @@ class Step:
     left: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, kw_only=True)
+class Answer:
     """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know;
     steps: what each effect changed as they were found one after another, the nominal machine first; units: of their signals;
     leftovers: where what is still left lies; traces: effects that close a little more of the gap, too small to be claimed."""
 
     verdict: Verdict
     sentence: str
-    effects: tuple[Finding, ...]
-    where: tuple[Place, ...]
-    gap: Gap | None
-    ranking: tuple[tuple[str, float], ...]
-    next_test: NextTest | None
-    not_observable: tuple[Unseen, ...]
-    faults: tuple[str, ...]
-    notes: tuple[str, ...]
+    effects: tuple[Finding, ...] = ()
+    where: tuple[Place, ...] = ()
+    gap: Gap | None = None
+    ranking: tuple[tuple[str, float], ...] = ()
+    next_test: NextTest | None = None
+    not_observable: tuple[Unseen, ...] = ()
+    faults: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     recordings: tuple[str, ...]
     seconds: float
-    machine: str = SUSPENSION_RIG
+    machine: str
     steps: tuple[Step, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
     leftovers: tuple[Place, ...] = ()
@@ -158,7 +156,10 @@ class Diagnosis:
             "traces": [_finding(effect) for effect in self.traces],
             "where": [asdict(place) for place in self.where],
             "gap": gap,
-            "ranking": [{"explanation": name, "probability": probability} for name, probability in self.ranking],
+            "ranking": [
+                {"explanation": name, "probability": probability}
+                for name, probability in self.ranking
+            ],
             "next_test": None if self.next_test is None else asdict(self.next_test),
             "not_observable": [asdict(each) for each in self.not_observable],
             "faults": list(self.faults),

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.components.parts import Guide
+from rigtwin.components import Effect, Guide, Scales, Starts
+from rigtwin.components.effect import Swing
+from rigtwin.components.guide import THROUGH_FRICTION
+from rigtwin.components.plant import Plant, with_parameters
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
-from rigtwin.diagnosis.joint_trials import Scales, scales
-from rigtwin.diagnosis.trial import Trials, swings
-from rigtwin.diagnosis.trials import trials
-from rigtwin.machine.effects import Effect
+from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 
 PRIOR = 1.0
@@ -33,8 +33,6 @@ LOOKALIKES, RESEMBLES = 3, 0.6
 """Effects that are tried in another's place at most, if they can explain this share of what it does."""
 LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
-THROUGH_FRICTION = ("stribeck", "asymmetry", "backlash", "compliance")
-"""Kinds of a guide that change its dry friction."""
 NOTHING = 1e-3
 """χ² below which an effect does nothing at all."""
 Values = tuple[tuple[float, ...], ...]
@@ -50,18 +48,18 @@ class Fit:
     values: Values
     misfit: float
     widths: Values
-    plant: Any = field(repr=False)
+    plant: Plant = field(repr=False)
 
     @property
     def name(self) -> str:
         return " + ".join(effect.name for effect in self.effects) or "none"
 
 
-def with_values(plant: Any, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
+def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
     """The plant with effects of these values, one tuple an effect in the order of its parameters."""
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
-        plant = plant._replace(**{effect.group: getattr(plant, effect.group)._replace(**changes)})
+        plant = with_parameters(plant, effect.group, changes)
     return plant
 
 
@@ -71,7 +69,7 @@ def clashing(effect: Effect, others: Sequence[Effect]) -> bool:
     return any(other.group == effect.group and own & set(other.kind.parameters) for other in others)
 
 
-def possible(effects: Sequence[Effect], plant: Any) -> bool:
+def possible(effects: Sequence[Effect], plant: Plant) -> bool:
     """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry
     friction."""
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
@@ -87,20 +85,36 @@ def possible(effects: Sequence[Effect], plant: Any) -> bool:
 def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]]:
     """Each effect of a fit in turn, the others, and their values."""
     for number, effect in enumerate(fit.effects):
-        yield effect, (*fit.effects[:number], *fit.effects[number + 1 :]), (*fit.values[:number], *fit.values[number + 1 :])
+        yield (
+            effect,
+            (*fit.effects[:number], *fit.effects[number + 1 :]),
+            (*fit.values[:number], *fit.values[number + 1 :]),
+        )
 
 
 class Space:
     """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
 
-    def __init__(self, evidence: Evidence, plant: Any, used: Array | None = None, effects: Sequence[Effect] = ()) -> None:
+    def __init__(
+        self,
+        evidence: Evidence,
+        plant: Plant,
+        used: Array | None = None,
+        effects: Sequence[Effect] = (),
+    ) -> None:
         """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
         self._columns = evidence.nuisances(plant)
         machine = evidence.machine
-        own = [machine.tolerance_of(effect.group, parameter) for effect in effects for parameter in effect.kind.parameters]
+        own = [
+            machine.tolerance_of(effect.group, parameter)
+            for effect in effects
+            for parameter in effect.kind.parameters
+        ]
         # With a delay to be found, when samples were taken is no question of its own any more.
         timed = any("delay" in effect.kind.parameters for effect in effects)
-        fixed = [tolerance in own or (timed and tolerance.ticks) for tolerance in machine.tolerances]
+        fixed = [
+            tolerance in own or (timed and tolerance.ticks) for tolerance in machine.tolerances
+        ]
         self._columns[:, fixed] = 0.0
         self._used = np.zeros(len(machine.tolerances)) if used is None else used
         self._taken = self._columns @ self._used
@@ -127,7 +141,9 @@ class Space:
 
     def apart(self, responses: Array) -> Array:
         """Responses, shape (size, count), less what tolerances without bounds take up."""
-        return responses - self._columns @ np.linalg.solve(self._normal, self._columns.T @ responses)
+        return responses - self._columns @ np.linalg.solve(
+            self._normal, self._columns.T @ responses
+        )
 
     def misfit(self, residual: Array) -> float:
         """min over tolerances of |residual − what they do|² + their prior."""
@@ -142,7 +158,9 @@ class Space:
         free = np.abs(found) < BEYOND
         columns = self._columns[:, free]
         shared = columns.T @ jacobian
-        normal = jacobian.T @ jacobian - shared.T @ np.linalg.solve(self._normal[np.ix_(free, free)], shared)
+        normal = jacobian.T @ jacobian - shared.T @ np.linalg.solve(
+            self._normal[np.ix_(free, free)], shared
+        )
         return normal, jacobian.T @ (residual + self._columns @ (self._used - found))
 
 
@@ -168,30 +186,42 @@ class Fitter:
         self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
         self._responses: dict[Effect, list[tuple[tuple[float, ...], Array]]] = {}
 
-    def trials(self, effect: Effect) -> Trials:
-        return trials(effect, self.plant, self.swing, self._scale)
+    def starts(self, effect: Effect) -> Starts:
+        """Where a search for an effect starts."""
+        own = self.swing.get(effect.component, Swing())
+        return effect.starts(self.plant, own, lambda: self._scale(effect.group))
 
     def _scale(self, component: str) -> Scales:
         """What a component goes through on these recordings, by the nominal plant and by what is measured of the force."""
         if component not in self._scales:
-            longest = max(range(len(self.evidence.plants)), key=lambda n: self.evidence.recordings[n].ticks)
+            longest = max(
+                range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
+            )
             measured = self.evidence.lines[longest].measured
-            forces = [measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS]
+            forces = [
+                measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
+            ]
             force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
-            motion = self.evidence.plants[longest].motion(component, self.plant)
-            self._scales[component] = scales(motion, force, self.evidence.recordings[longest].period)
+            motion = self.evidence.models[longest].motion(component, self.plant)
+            self._scales[component] = Scales.of(
+                motion, force, self.evidence.recordings[longest].period
+            )
         return self._scales[component]
 
     def single(self, effect: Effect) -> Fit:
         """The best fit of one effect."""
         if not possible((effect,), self.plant):
-            start = self.trials(effect).starts
-            self._responses[effect] = [(values, np.zeros_like(self._nominal, np.float32)) for values in start]
-            return Fit((effect,), (start[0],), self.nothing.misfit, ((0.0,) * len(start[0]),), self.plant)
+            start = self.starts(effect).values
+            self._responses[effect] = [
+                (values, np.zeros_like(self._nominal, np.float32)) for values in start
+            ]
+            return Fit(
+                (effect,), (start[0],), self.nothing.misfit, ((0.0,) * len(start[0]),), self.plant
+            )
         scored: list[tuple[float, tuple[float, ...]]] = []
         responses = []
-        found = self.trials(effect)
-        for start in found.starts:
+        found = self.starts(effect)
+        for start in found.values:
             residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
             scored.append((self.space.misfit(residual), start))
             responses.append((start, (self._nominal - residual).astype(np.float32)))
@@ -201,8 +231,14 @@ class Fitter:
         scored.sort()
         # Another start is followed too where it comes near the best; where none helps, the best is followed alone.
         enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
-        followed = [start for number, (misfit, start) in enumerate(scored[:REFINED]) if number == 0 or misfit < enough]
-        return min((self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit)
+        followed = [
+            start
+            for number, (misfit, start) in enumerate(scored[:REFINED])
+            if number == 0 or misfit < enough
+        ]
+        return min(
+            (self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit
+        )
 
     def _blended(
         self, effect: Effect, responses: list[tuple[tuple[float, ...], Array]]
@@ -215,16 +251,26 @@ class Fitter:
             strengths = np.linalg.lstsq(apart, left, rcond=None)[0]
             gain = float(np.sum((apart @ strengths) ** 2))
             amplitude = start[0] * float(np.hypot(*strengths))
-            blends.append((gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0])))))
+            blends.append(
+                (gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0]))))
+            )
         blends.sort(reverse=True)
         return [
-            (self.space.misfit(self.evidence.residual(with_values(self.plant, (effect,), (start,)))), start)
+            (
+                self.space.misfit(
+                    self.evidence.residual(with_values(self.plant, (effect,), (start,)))
+                ),
+                start,
+            )
             for _, start in blends[:REFINED]
         ]
 
     def largest(self, effect: Effect) -> float:
         """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
-        return max(self.space.misfit(response.astype(np.float64)) for _, response in self._responses[effect])
+        return max(
+            self.space.misfit(response.astype(np.float64))
+            for _, response in self._responses[effect]
+        )
 
     def _beside(self, effect: Effect, first: Fit) -> list[tuple[tuple[float, ...], Array]]:
         """The responses of an effect: at the nominal plant, or beside `first` if it does nothing without that, as a play does
@@ -245,7 +291,9 @@ class Fitter:
         left = space.less(self.evidence.residual(first.plant))
         found = []
         for effect in effects:
-            if clashing(effect, first.effects) or not possible((*first.effects, effect), self.plant):
+            if clashing(effect, first.effects) or not possible(
+                (*first.effects, effect), self.plant
+            ):
                 continue
             starts, responses = zip(*self._beside(effect, first), strict=True)
             apart = space.apart(np.stack(responses, axis=1).astype(np.float64))
@@ -257,7 +305,9 @@ class Fitter:
             if gains[best] > least:
                 promised = first.misfit - float(gains[best])
                 start = self._scaled(effect, starts[best], float(share[best]))
-                found.append(Hope(promised, (*first.effects, effect), (*first.values, start), space))
+                found.append(
+                    Hope(promised, (*first.effects, effect), (*first.values, start), space)
+                )
         return found
 
     def _scaled(self, effect: Effect, start: tuple[float, ...], share: float) -> tuple[float, ...]:
@@ -274,12 +324,18 @@ class Fitter:
         here = self.evidence.residual(fit.plant)
         for number in range(len(fit.effects)):
             rest = [place for place in range(len(fit.effects)) if place != number]
-            plant = with_values(self.plant, [fit.effects[p] for p in rest], [fit.values[p] for p in rest])
+            plant = with_values(
+                self.plant, [fit.effects[p] for p in rest], [fit.values[p] for p in rest]
+            )
             own = self.space.apart((self.evidence.residual(plant) - here)[:, None])[:, 0]
             scored = []
             for other in effects:
                 kept = [fit.effects[place] for place in rest]
-                if other in fit.effects or clashing(other, kept) or not possible((*kept, other), self.plant):
+                if (
+                    other in fit.effects
+                    or clashing(other, kept)
+                    or not possible((*kept, other), self.plant)
+                ):
                     continue
                 starts, responses = zip(*self._responses[other], strict=True)
                 apart = self.space.apart(np.stack(responses, axis=1).astype(np.float64))
@@ -287,7 +343,14 @@ class Fitter:
                 resemblance = np.maximum(along, 0.0) ** 2 / power
                 best = int(np.argmax(resemblance))
                 share = min(float(along[best] / power[best]), 3.0)
-                scored.append((float(resemblance[best]), number, other, self._scaled(other, starts[best], share)))
+                scored.append(
+                    (
+                        float(resemblance[best]),
+                        number,
+                        other,
+                        self._scaled(other, starts[best], share),
+                    )
+                )
             scored.sort(key=lambda item: -item[0])
             for gain, place, other, start in scored[:LOOKALIKES]:
                 if gain > RESEMBLES * float(own @ own):
@@ -304,14 +367,18 @@ class Fitter:
         residual = self.evidence.residual(fit.plant)
         for _ in range(SETTLING):
             found = space.nuisances(residual)
-            used = np.array([share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)])
+            used = np.array(
+                [share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)]
+            )
             base = self.evidence.shifted(self.plant, used.tolist())
-            space = Space(self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects)
+            space = Space(
+                self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
+            )
             fit = self._shaken(self.refined(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
         return fit
 
-    def _shaken(self, fit: Fit, space: Space, base: Any) -> Fit:
+    def _shaken(self, fit: Fit, space: Space, base: Plant | None) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
         Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):
@@ -320,9 +387,20 @@ class Fitter:
                 nominal = 0.0
             for share in SHAKES:
                 magnitude = nominal + share * (fit.values[number][0] - nominal)
-                values = (*fit.values[:number], (magnitude, *fit.values[number][1:]), *fit.values[number + 1 :])
-                if space.misfit(self.evidence.residual(with_values(base, fit.effects, values))) < fit.misfit:
-                    fit = min(fit, self.refined(fit.effects, values, space, base), key=lambda each: each.misfit)
+                values = (
+                    *fit.values[:number],
+                    (magnitude, *fit.values[number][1:]),
+                    *fit.values[number + 1 :],
+                )
+                if (
+                    space.misfit(self.evidence.residual(with_values(base, fit.effects, values)))
+                    < fit.misfit
+                ):
+                    fit = min(
+                        fit,
+                        self.refined(fit.effects, values, space, base),
+                        key=lambda each: each.misfit,
+                    )
         return fit
 
     def refined(
@@ -330,7 +408,7 @@ class Fitter:
         effects: tuple[Effect, ...],
         start: Sequence[Sequence[float]],
         space: Space | None = None,
-        base: Any = None,
+        base: Plant | None = None,
     ) -> Fit:
         """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
         base: the plant without the effects."""
@@ -338,10 +416,10 @@ class Fitter:
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
         sizes = [len(effect.kind.parameters) for effect in effects]
-        steps = np.concatenate([self.trials(effect).steps for effect in effects])
+        steps = np.concatenate([self.starts(effect).steps for effect in effects])
         quantities = [quantity for effect in effects for quantity in effect.quantities().values()]
         low, high = np.array([q.low for q in quantities]), np.array([q.high for q in quantities])
-        narrower = [self.trials(effect).bounds for effect in effects]
+        narrower = [self.starts(effect).bounds for effect in effects]
         cuts = np.concatenate([[0], np.cumsum(sizes)])
         for number, bounds in enumerate(narrower):
             if bounds is not None:
@@ -363,7 +441,11 @@ class Fitter:
         for _ in range(ITERATIONS):
             columns = []
             for number in range(len(here)):
-                step = steps[number] if here[number] + steps[number] <= high[number] else -steps[number]
+                step = (
+                    steps[number]
+                    if here[number] + steps[number] <= high[number]
+                    else -steps[number]
+                )
                 beside = here.copy()
                 beside[number] += step
                 columns.append((residual(beside) - left) / (step / steps[number]))
@@ -382,4 +464,10 @@ class Fitter:
             if gained < 0.2:
                 break
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
-        return Fit(effects, split(here), misfit, split(spread), with_values(self.plant, effects, split(here)))
+        return Fit(
+            effects,
+            split(here),
+            misfit,
+            split(spread),
+            with_values(self.plant, effects, split(here)),
+        )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
 from rigtwin.diagnosis.fit import Fit, Fitter, possible, without_each
@@ -34,13 +34,17 @@ def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[S
             for (name, quantity), value in zip(effect.quantities().items(), numbers, strict=True):
                 unit = evidence.machine.unit(effect.group, quantity)
                 values[name] = Estimate(value, value, value, nominal[name], unit)
-        said = " ".join(part for part in (f"with {added}" if added else "", f"without {gone}" if gone else "") if part)
+        said = " ".join(
+            part
+            for part in (f"with {added}" if added else "", f"without {gone}" if gone else "")
+            if part
+        )
         found.append(Step(said, values, remaining(judged, fit.plant)))
         before = names
     return tuple(found)
 
 
-def remaining(evidence: Evidence, plant: Any) -> dict[str, float]:
+def remaining(evidence: Evidence, plant: Plant) -> dict[str, float]:
     """rms of what each signal has left, over all recordings."""
     rows: dict[str, float] = {}
     predicted = evidence.predicted(plant)
@@ -59,19 +63,26 @@ def missed(evidence: Evidence, fit: Fit) -> dict[str, float]:
     found = {}
     for effect, others, values in without_each(fit):
         there = possible(others, evidence.plant)
-        found[effect.name] = fitter.refined(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
+        found[effect.name] = (
+            fitter.refined(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
+        )
     return found
 
 
-def leftovers(evidence: Evidence, plant: Any, disturbed: Sequence[Disturbed]) -> list[Place]:
+def leftovers(evidence: Evidence, plant: Plant, disturbed: Sequence[Disturbed]) -> list[Place]:
     """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
     differences = evidence.differences(plant)
     levels = remaining(evidence, plant)
     found = []
-    total = sum((levels[name] / float(evidence.lines[0].noise[n])) ** 2 for n, name in enumerate(evidence.names))
+    total = sum(
+        (levels[name] / float(evidence.lines[0].noise[n])) ** 2
+        for n, name in enumerate(evidence.names)
+    )
     foremost = disturbed[0]
     goes_with = (
-        f"it goes with {', '.join(foremost.forms)} at {foremost.component}" if foremost.forms else "it has no plain form"
+        f"it goes with {', '.join(foremost.forms)} at {foremost.component}"
+        if foremost.forms
+        else "it has no plain form"
     )
     for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
         noise = float(evidence.lines[0].noise[number])

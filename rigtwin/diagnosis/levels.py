@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from controllers import Measurements
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant, with_parameters
+from rigtwin.components.plant import Plant
+from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
-from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.machine import Structure
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, spectrum
@@ -31,11 +33,42 @@ SHORTEST = 5.0
 """s; spectra of shorter tests are chance."""
 
 
-def replay_levels(recording: Recording, before: Configuration, after: Configuration) -> dict[str, Level]:
+def compute_levels(
+    evidence: Evidence, plant: Plant, corrected: Configuration
+) -> tuple[dict[str, Level], Level | None]:
+    """The gaps of the first recording before and after a correction.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+    plant
+        The corrected plant.
+    corrected
+        The corrected twin: with it, and with what the signals say of their sensors.
+
+    Returns
+    -------
+    Level of each component's replay, or of each signal of joints; and that of the closed loop's spectra, None where the machine
+    has no twin of it or the test is too short for spectra.
+    """
+    if evidence.machine.structure is Structure.JOINTS:
+        return _signal_levels(evidence, plant), None
+    recording, nominal = evidence.recordings[0], evidence.configurations[0]
+    replays = _component_levels(recording, nominal, nominal._replace(plant=plant))
+    noisy: Any = corrected.plant
+    for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
+        noisy = with_parameters(noisy, name, {"white": float(noise)})
+    return replays, _closed_loop(recording, nominal, corrected, noisy)
+
+
+def _component_levels(
+    recording: Recording, before: Configuration, after: Configuration
+) -> dict[str, Level]:
     """Each component's replay, in units of its noise floor."""
 
     def ratios(configuration: Configuration) -> dict[str, float]:
-        replays = Replays(recording, configuration)
+        replays = ComponentReplays(recording, configuration)
         found = {}
         for name in COMPONENTS:
             try:
@@ -50,42 +83,61 @@ def replay_levels(recording: Recording, before: Configuration, after: Configurat
     return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
 
 
-def signal_levels(evidence: Evidence, corrected: Any) -> dict[str, Level]:
+def _signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
     """Each signal's own gap in the first recording, rms in units of its noise, before and after."""
     each = evidence.lines[0]
     counted = each.fade.max(axis=0) > 0.5
     found = {}
-    before, after = (evidence.differences(plant)[0][:, counted] for plant in (evidence.plant, corrected))
+    before, after = (
+        evidence.differences(plant)[0][:, counted] for plant in (evidence.plant, corrected)
+    )
     for row, name in enumerate(evidence.names):
         noise = float(each.noise[row])
         found[name] = Level(rms(before[row]) / noise, rms(after[row]) / noise, 1.0)
     return found
 
 
-def closed_loop(recording: Recording, before: Configuration, after: Configuration, own: Plant) -> Level | None:
+def _closed_loop(
+    recording: Recording, before: Configuration, after: Configuration, own: RigPlant
+) -> Level | None:
     """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too
     short. own: the corrected plant with the noise that the recording has.
     """
     if recording.ticks * recording.period < SHORTEST:
         return None
-    demands = np.column_stack([recording.column("/command", name) for name in ("ground", "structure", "force")])
-    measured = _bands(np.stack([recording.column("/sensor", name) for name in Measurements._fields]), recording.period)
+    demands = np.column_stack(
+        [recording.column("/command", name) for name in ("ground", "structure", "force")]
+    )
+    measured = _bands(
+        np.stack([recording.column("/sensor", name) for name in Measurements._fields]),
+        recording.period,
+    )
     nominal = before._replace(plant=_with_noise_of(own, before.plant))
     corrected = after._replace(plant=own)
     runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
     with ThreadPoolExecutor(2) as pool:
         found = dict(
-            zip(runs, pool.map(lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs), strict=True)
+            zip(
+                runs,
+                pool.map(lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs),
+                strict=True,
+            )
         )
-    one, other, again = found[nominal, SEEDS[0]], found[corrected, SEEDS[0]], found[corrected, SEEDS[1]]
+    one, other, again = (
+        found[nominal, SEEDS[0]],
+        found[corrected, SEEDS[0]],
+        found[corrected, SEEDS[1]],
+    )
     return Level(_apart(measured, one), _apart(measured, other), _apart(other, again))
 
 
-def _with_noise_of(noisy: Plant, plant: Plant) -> Plant:
+def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
     """The plant with the white noise and hum of another's sensors."""
     for name in Measurements._fields:
         like = getattr(noisy, name)
-        plant = plant._replace(**{name: getattr(plant, name)._replace(white=like.white, hum=like.hum)})
+        plant = plant._replace(
+            **{name: getattr(plant, name)._replace(white=like.white, hum=like.hum)}
+        )
     return plant
 
 
@@ -95,7 +147,9 @@ def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
 
 def _bands(signals: Array, period: float) -> Array:
     """Mean spectral density of each signal in bands of equal ratio, shape (4, bands)."""
-    edges = LOWEST * 2.0 ** (np.arange(math.ceil(BANDS_PER_OCTAVE * math.log2(HIGHEST / LOWEST)) + 1) / BANDS_PER_OCTAVE)
+    edges = LOWEST * 2.0 ** (
+        np.arange(math.ceil(BANDS_PER_OCTAVE * math.log2(HIGHEST / LOWEST)) + 1) / BANDS_PER_OCTAVE
+    )
     rows = []
     for signal in signals:
         frequency, density = spectrum(signal - np.mean(signal), period)

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rigtwin.components.effect import Motion
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Place
-from rigtwin.models.predictor import Motion
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import band
 
@@ -76,27 +76,38 @@ def region(difference: Array, motion: Motion, period: float) -> str:
         stretch[start:end] = True
         regions[f"{start * period:.1f} to {end * period:.1f} s"] = stretch
     after = travelled(motion.position)
-    near = np.sort(after)[np.searchsorted(np.cumsum(power[np.argsort(after)]), MOST * total).clip(0, len(power) - 1)]
+    near = np.sort(after)[
+        np.searchsorted(np.cumsum(power[np.argsort(after)]), MOST * total).clip(0, len(power) - 1)
+    ]
     regions[f"within {1e3 * near:.2g} mm after a reversal"] = after <= near
     best, name = 0.0, "throughout"
     for label, inside in regions.items():
         share = float(np.sum(power[inside])) / total
         concentration = share / max(float(np.mean(inside)), 1e-9)
         # A stretch of time is no explanation where a signal's own swing is.
-        threshold = CONCENTRATED * (1.6 if label.endswith(" s") else CLEARER if label.startswith("within") else 1.0)
+        threshold = CONCENTRATED * (
+            1.6 if label.endswith(" s") else CLEARER if label.startswith("within") else 1.0
+        )
         if share > LEAST and concentration > threshold and concentration / threshold > best:
             best, name = concentration / threshold, label
     return name
 
 
-def placed(evidence: Evidence, component: str, share: float, differences: list[Array], words: str = "") -> Place:
+def placed(
+    evidence: Evidence, component: str, share: float, differences: list[Array], words: str = ""
+) -> Place:
     """The place of differences, shape (rows, ticks) for each recording, that a component causes."""
     noise = evidence.lines[0].noise
-    power = [sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2 for row in range(len(noise))]
+    power = [
+        sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2
+        for row in range(len(noise))
+    ]
     row = int(np.argmax(power))
     longest = int(np.argmax([d.shape[1] for d in differences]))
     difference, recording = differences[longest][row], evidence.recordings[longest]
-    motion = evidence.plants[longest].motion(component, evidence.plant)
+    motion = evidence.models[longest].motion(component, evidence.plant)
     where = region(difference, motion, recording.period)
     low, high = band(difference, recording.period)
-    return Place(component, share, (low, high), where, words or f"most of it seen by {evidence.names[row]}")
+    return Place(
+        component, share, (low, high), where, words or f"most of it seen by {evidence.names[row]}"
+    )

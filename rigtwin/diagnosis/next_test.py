@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from rigtwin.diagnosis.fit import Fit, Space
 from rigtwin.machine.configuration import Configuration, flattened
 from rigtwin.machine.machine import Machine
 from rigtwin.recording import Recording
-from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.runner import simulated, unlimited
 
 SEED = 1
@@ -24,12 +24,11 @@ LONGEST = 20.0
 WORTH = 25.0
 """χ² below which a test would separate nothing."""
 
-Test = tuple[str, Configuration, Callable[[Configuration, int], np.ndarray]]
-"""Name, settings, and what it demands of the rig for (settings, seed)."""
 
-
-def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recording:
-    """The recording that a test would make on a rig of that configuration."""
+def record_on_twin(
+    machine: Machine, name: str, configuration: Configuration, demands: np.ndarray
+) -> Recording:
+    """The recording that a test would make on a machine of that configuration."""
     ran = simulated(unlimited(configuration), demands, SEED)
     columns = {
         "/command": dict(zip(Commands._fields, ran.commands.T.copy(), strict=True)),
@@ -37,19 +36,30 @@ def tried(name: str, configuration: Configuration, demands: np.ndarray) -> Recor
     }
     period = configuration.timing.period
     controller = flattened(configuration)["controller"]
-    return Recording(Path(name), SUSPENSION_RIG, name, period, np.arange(len(ran.commands)) * period, columns, controller)
+    return Recording(
+        Path(name),
+        machine.name,
+        name,
+        period,
+        np.arange(len(ran.commands)) * period,
+        columns,
+        controller,
+    )
 
 
-def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Test]) -> NextTest | None:
+def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]) -> NextTest | None:
     """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
     if len(fits) < 2:
         return None
     best: NextTest | None = None
-    for name, configuration, demanded in tests:
+    for test in tests:
+        name, configuration = test.name, test.configuration
         timing = configuration.timing._replace(duration=min(configuration.timing.duration, LONGEST))
         twin = configuration._replace(plant=fits[0].plant, timing=timing)
-        recording = tried(name, twin, demanded(twin, SEED))
-        evidence = Evidence(machine, [recording], [configuration._replace(plant=fits[0].plant, timing=timing)])
+        recording = record_on_twin(machine, name, twin, test.demands(twin, SEED))
+        evidence = Evidence(
+            machine, [recording], [configuration._replace(plant=fits[0].plant, timing=timing)]
+        )
         space = Space(evidence, fits[0].plant)
         own = evidence.predicted(fits[0].plant)
         apart = []
@@ -58,5 +68,7 @@ def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Test]) -> Ne
             apart.append(space.misfit(evidence.whitened(difference)))
         least = min(apart)
         if least > WORTH and (best is None or least > best.separates):
-            best = NextTest(name, f"rigtwin run {name} --seed {SEED}", least, tuple(fit.name for fit in fits))
+            best = NextTest(
+                name, f"rigtwin run {name} --seed {SEED}", least, tuple(fit.name for fit in fits)
+            )
     return best

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -14,12 +14,14 @@ from matplotlib.figure import Figure
 
 from rigtwin import __version__
 from rigtwin.diagnosis.attribute import library
-from rigtwin.diagnosis.diagnose import Outcome
-from rigtwin.diagnosis.finding import Diagnosis
+from rigtwin.diagnosis.finding import Answer
 from rigtwin.diagnosis.text import number
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import spectrum
+
+if TYPE_CHECKING:
+    from rigtwin.diagnosis.result import Diagnosis
 
 BEFORE, AFTER, FLOOR = "#c2410c", "#0f766e", "#94a3b8"
 BINS = 24
@@ -40,14 +42,16 @@ class Bar:
     floor_width: float
 
 
-def bars(diagnosis: Diagnosis) -> list[Bar]:
+def bars(answer: Answer) -> list[Bar]:
     """All sensors together, then each component's replay; widths on a scale common to all, of square roots so that small ones
     show beside large ones."""
-    if diagnosis.gap is None:
+    if answer.gap is None:
         return []
-    gap = diagnosis.gap
+    gap = answer.gap
     levels = [("all sensors", gap.before, gap.after)]
-    levels += [(name.replace("_", " "), level.before, level.after) for name, level in gap.replays.items()]
+    levels += [
+        (name.replace("_", " "), level.before, level.after) for name, level in gap.replays.items()
+    ]
     largest = max(max(before, after, 1.0) for _, before, after in levels)
 
     def width(value: float) -> float:
@@ -74,20 +78,25 @@ def _axes(title: str, x: str, y: str) -> tuple[Figure, Any]:
     return figure, axes
 
 
-def plots(outcome: Outcome) -> list[str]:
+def plots(diagnosis: Diagnosis) -> list[str]:
     """What is left of the sensor with the largest gap by velocity, frequency and time, before and after, as SVG."""
-    evidence = outcome.evidence
+    evidence = diagnosis.evidence
     if evidence is None:
         return []
-    before, after = evidence.differences(evidence.plant)[0], evidence.differences(outcome.corrected.plant)[0]
+    before, after = (
+        evidence.differences(evidence.plant)[0],
+        evidence.differences(diagnosis.corrected.plant)[0],
+    )
     each, recording = evidence.lines[0], evidence.recordings[0]
     row = int(np.argmax(np.mean(before**2, axis=1) / each.noise**2))
     name, unit = evidence.names[row], evidence.machine.rows[row].unit
     scale, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
-    corrected = bool(outcome.diagnosis.effects)
-    curves = [("before", BEFORE, scale * before[row])] + ([("after", AFTER, scale * after[row])] if corrected else [])
-    component = outcome.diagnosis.where[0].component if outcome.diagnosis.where else name
-    speed = evidence.plants[0].motion(component, evidence.plant).speed
+    corrected = bool(diagnosis.answer.effects)
+    curves = [("before", BEFORE, scale * before[row])] + (
+        [("after", AFTER, scale * after[row])] if corrected else []
+    )
+    component = diagnosis.answer.where[0].component if diagnosis.answer.where else name
+    speed = evidence.models[0].motion(component, evidence.plant).speed
     noise = scale * float(each.noise[row])
     return [
         _by_velocity(curves, speed, noise, name, unit),
@@ -96,32 +105,45 @@ def plots(outcome: Outcome) -> list[str]:
     ]
 
 
-def _by_velocity(curves: list[tuple[str, str, Array]], speed: Array, noise: float, name: str, unit: str) -> str:
+def _by_velocity(
+    curves: list[tuple[str, str, Array]], speed: Array, noise: float, name: str, unit: str
+) -> str:
     figure, axes = _axes(f"{name} by velocity", "velocity, m/s", f"mean of what is left, {unit}")
     slowest, fastest = np.quantile(speed, [0.002, 0.998])
     edges = np.linspace(slowest, fastest, BINS + 1)
     place = np.digitize(speed, edges) - 1
     centres = 0.5 * (edges[1:] + edges[:-1])
     for label, colour, values in curves:
-        means = [float(np.mean(values[place == b])) if np.sum(place == b) >= COUNTED else np.nan for b in range(BINS)]
+        means = [
+            float(np.mean(values[place == b])) if np.sum(place == b) >= COUNTED else np.nan
+            for b in range(BINS)
+        ]
         axes.plot(centres, means, "o-", color=colour, markersize=3, linewidth=1.4, label=label)
-    axes.axhspan(-noise, noise, color=FLOOR, alpha=0.25, linewidth=0, label="noise, 1 σ of one sample")
+    axes.axhspan(
+        -noise, noise, color=FLOOR, alpha=0.25, linewidth=0, label="noise, 1 σ of one sample"
+    )
     axes.legend(fontsize=9, frameon=False)
     return _svg(figure)
 
 
-def _by_frequency(curves: list[tuple[str, str, Array]], period: float, noise: float, name: str, unit: str) -> str:
+def _by_frequency(
+    curves: list[tuple[str, str, Array]], period: float, noise: float, name: str, unit: str
+) -> str:
     figure, axes = _axes(f"{name} by frequency", "Hz", f"{unit}/√Hz")
     for label, colour, values in curves:
         frequency, density = spectrum(values, period)
         shown = (frequency > 0) & (frequency <= 200)
-        axes.loglog(frequency[shown], np.sqrt(density[shown]), color=colour, linewidth=1.1, label=label)
+        axes.loglog(
+            frequency[shown], np.sqrt(density[shown]), color=colour, linewidth=1.1, label=label
+        )
     axes.axhline(noise * np.sqrt(2 * period), color=FLOOR, linewidth=1.4, label="noise")
     axes.legend(fontsize=9, frameon=False)
     return _svg(figure)
 
 
-def _by_time(curves: list[tuple[str, str, Array]], time: Array, noise: float, name: str, unit: str) -> str:
+def _by_time(
+    curves: list[tuple[str, str, Array]], time: Array, noise: float, name: str, unit: str
+) -> str:
     figure, axes = _axes(f"{name} by time", "s", f"rms of what is left, {unit}")
     block = max(1, len(time) // 80)
     count = len(time) // block
@@ -135,7 +157,7 @@ def _by_time(curves: list[tuple[str, str, Array]], time: Array, noise: float, na
     return _svg(figure)
 
 
-def html(outcome: Outcome) -> str:
+def html(diagnosis: Diagnosis) -> str:
     """The page."""
     environment = Environment(
         loader=PackageLoader("rigtwin.diagnosis"),
@@ -144,24 +166,29 @@ def html(outcome: Outcome) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    diagnosis = outcome.diagnosis
-    guilty = {effect.name.component for effect in diagnosis.effects} | {place.component for place in diagnosis.where}
+    answer = diagnosis.answer
+    guilty = {effect.name.component for effect in answer.effects} | {
+        place.component for place in answer.where
+    }
     return environment.get_template("report.html").render(
-        diagnosis=diagnosis,
+        diagnosis=answer,
         guilty=guilty,
-        bars=bars(diagnosis),
-        plots=plots(outcome),
+        bars=bars(answer),
+        plots=plots(diagnosis),
         number=number,
-        title=outcome.evidence.machine.title if outcome.evidence is not None else diagnosis.machine,
-        components=list(outcome.evidence.machine.components) if outcome.evidence is not None else [],
-        tried=len(library(outcome.evidence)) if outcome.evidence is not None else 0,
+        title=diagnosis.described.title,
+        components=list(diagnosis.evidence.machine.components)
+        if diagnosis.evidence is not None
+        else [],
+        tried=len(library(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
         version=__version__,
     )
 
 
-def write(path: Path, outcome: Outcome) -> None:
+def write(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes the page. Raises RigtwinError if it cannot."""
     try:
-        path.write_text(html(outcome), encoding="utf-8")
+        path.write_text(html(diagnosis), encoding="utf-8")
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    return path

@@ -31,10 +31,14 @@ class Residual:
 def single(difference: Array, floor: float, unit: str, period: float) -> Residual:
     """The residual of one output."""
     left = rms(difference)
-    return Residual(left, floor, left / floor if floor > 0 else math.inf, unit, band(difference, period))
+    return Residual(
+        left, floor, left / floor if floor > 0 else math.inf, unit, band(difference, period)
+    )
 
 
-def together(outputs: dict[str, Residual], differences: dict[str, Array], period: float) -> Residual:
+def together(
+    outputs: dict[str, Residual], differences: dict[str, Array], period: float
+) -> Residual:
     """Several outputs as one, each in units of its own noise floor."""
     ratio = math.sqrt(sum(output.ratio**2 for output in outputs.values()) / len(outputs))
     loudest = max(outputs, key=lambda name: outputs[name].ratio)
@@ -46,4 +50,6 @@ def rounding(recorded: Array) -> float:
     largest = float(np.max(np.abs(recorded)))
     if largest == 0.0:
         return 1e-12
-    return float(10.0 ** (math.floor(math.log10(largest)) + 1 - SIGNIFICANT_DIGITS) / math.sqrt(12.0))
+    return float(
+        10.0 ** (math.floor(math.log10(largest)) + 1 - SIGNIFICANT_DIGITS) / math.sqrt(12.0)
+    )

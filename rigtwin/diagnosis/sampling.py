@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from rigtwin.components.parameters import LoadCell, Lvdt
+from rigtwin.components import LoadCell, Lvdt
+from rigtwin.components.plant import Plant
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
@@ -33,7 +33,7 @@ class Sampled:
     nominal: float
 
 
-def properties(recording: Recording, name: str, predicted: Array, plant: Any) -> dict[str, float]:
+def properties(recording: Recording, name: str, predicted: Array, plant: Plant) -> dict[str, float]:
     """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should read."""
     signal = recording.column("/sensor", name)
     difference = signal - predicted
@@ -45,7 +45,10 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Any) ->
 
 
 def outstanding(
-    sensors: Sequence[str], recordings: Sequence[Recording], predicted: Sequence[Sequence[Array]], plant: Any
+    sensors: Sequence[str],
+    recordings: Sequence[Recording],
+    predicted: Sequence[Sequence[Array]],
+    plant: Plant,
 ) -> tuple[Sampled, ...]:
     """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
     order of the rows of predicted: one list a recording, one array a sensor."""
@@ -58,7 +61,10 @@ def outstanding(
     for number, name in enumerate(sensors):
         if name not in declared:
             continue
-        each = [properties(r, name, p[number], plant) for r, p in zip(recordings, predicted, strict=True)]
+        each = [
+            properties(r, name, p[number], plant)
+            for r, p in zip(recordings, predicted, strict=True)
+        ]
         table[name] = {key: float(np.median([one[key] for one in each])) for key in names}
     for parameter, kind in names.items():
         ratios: dict[str, float] = {}

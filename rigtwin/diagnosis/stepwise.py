@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from rigtwin.components.parts import Guide
+from rigtwin.components import Effect, Guide
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values, without_each
-from rigtwin.machine.effects import Effect
 
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
@@ -51,7 +50,9 @@ def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
     for fit in tried:
         names = {(e.kind.name, e.group) for e in fit.effects}
         simpler = [
-            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)}) for kind, group in names if kind in CONTAINED
+            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)})
+            for kind, group in names
+            if kind in CONTAINED
         ]
         enough = max(least, SLIGHT * (most - fit.misfit))
         if not any(other in misfits and misfits[other] - fit.misfit < enough for other in simpler):
@@ -61,7 +62,10 @@ def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
 
 def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
     """Whether one of the effects is no more than its declared tolerance."""
-    return any(_tolerated(effect, values[0], evidence) for effect, values in zip(fit.effects, fit.values, strict=True))
+    return any(
+        _tolerated(effect, values[0], evidence)
+        for effect, values in zip(fit.effects, fit.values, strict=True)
+    )
 
 
 def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
@@ -93,7 +97,9 @@ class Growth:
     most: int
 
 
-def grown(tried: Sequence[Fit], first: Fit, growth: Growth, mapped: Mapped) -> tuple[list[Fit], list[Fit]]:
+def grown(
+    tried: Sequence[Fit], first: Fit, growth: Growth, mapped: Mapped
+) -> tuple[list[Fit], list[Fit]]:
     """(further fits, the chain of fits that leads to the best one, from its first effect on). tried: of one and two."""
     found: list[Fit] = []
     before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
@@ -132,9 +138,14 @@ def _leaders(level: Sequence[Fit]) -> list[Fit]:
 def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
     """Fits of one effect more that explain enough of what a leader leaves."""
     evidence = growth.fitter.evidence
-    hopes = sorted(growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised)[:TRIED]
+    hopes = sorted(
+        growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised
+    )[:TRIED]
     found = mapped(lambda hope: growth.search.refined(hope.effects, hope.values, hope.space), hopes)
-    found += mapped(lambda start: growth.search.refined(*start), [*_through(leader, growth), *_unfolded(leader, growth)])
+    found += mapped(
+        lambda start: growth.search.refined(*start),
+        [*_through(leader, growth), *_unfolded(leader, growth)],
+    )
     found = mapped(growth.fitter.settled, sorted(found, key=priced)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
     left = max(leader.misfit - evidence.expected_at(leader.plant), 0.0)
@@ -154,27 +165,46 @@ def _through(leader: Fit, growth: Growth) -> list[Start]:
         if gate.kind.name != GATEWAY or gate.of is not Guide or clashing(gate, leader.effects):
             continue
         for other in growth.effects:
-            if other.group != gate.group or other.kind.name not in BEHIND or len(leader.effects) + 2 > growth.most:
+            if (
+                other.group != gate.group
+                or other.kind.name not in BEHIND
+                or len(leader.effects) + 2 > growth.most
+            ):
                 continue
             found.append(_beside(search, leader.effects, leader.values, (gate, other)))
     return found
 
 
-def _beside(search: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]) -> Start:
+def _beside(
+    search: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]
+) -> Start:
     """A pair of effects beside others, with the best of all pairs of their starts."""
     both = (*effects, *pair)
-    one, two = (search.trials(effect).starts for effect in pair)
+    one, two = (search.starts(effect).values for effect in pair)
     starts = [(*values, *start) for start in product(one, two)]
-    residuals = (search.evidence.residual(with_values(search.plant, both, start)) for start in starts)
-    return both, min((search.space.misfit(residual), start) for residual, start in zip(residuals, starts, strict=True))[1]
+    residuals = (
+        search.evidence.residual(with_values(search.plant, both, start)) for start in starts
+    )
+    return both, min(
+        (search.space.misfit(residual), start)
+        for residual, start in zip(residuals, starts, strict=True)
+    )[1]
 
 
 def _unfolded(leader: Fit, growth: Growth) -> list[Start]:
     """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
     found = []
     for effect, rest, values in without_each(leader):
-        pair = [each for each in growth.effects if each.group == effect.group and each.kind.name in ("lag", "delay")]
-        if effect.kind.name in SECOND_ORDER and len(pair) == 2 and not any(clashing(each, rest) for each in pair):
+        pair = [
+            each
+            for each in growth.effects
+            if each.group == effect.group and each.kind.name in ("lag", "delay")
+        ]
+        if (
+            effect.kind.name in SECOND_ORDER
+            and len(pair) == 2
+            and not any(clashing(each, rest) for each in pair)
+        ):
             found.append(_beside(growth.search, rest, values, (pair[0], pair[1])))
     return found
 
@@ -183,7 +213,11 @@ def _pruned(best: Fit, growth: Growth) -> list[Fit]:
     """The fit with one effect after another taken out that explains nothing any more, now that the others are there."""
     found: list[Fit] = []
     while len(best.effects) > 1:
-        fewer = [(rest, values) for _, rest, values in without_each(best) if possible(rest, growth.fitter.plant)]
+        fewer = [
+            (rest, values)
+            for _, rest, values in without_each(best)
+            if possible(rest, growth.fitter.plant)
+        ]
         tries = [growth.fitter.refined(*each) for each in fewer]
         simpler = min(tries, key=priced, default=best)
         if simpler is best or simpler.misfit - best.misfit > growth.least:
@@ -196,7 +230,11 @@ def _pruned(best: Fit, growth: Growth) -> list[Fit]:
 def _replaced(best: Fit, tried: Sequence[Fit], growth: Growth, mapped: Mapped) -> list[Fit]:
     """What may stand in each effect's place, now that the others are known."""
     known = {frozenset(fit.effects) for fit in tried}
-    alike = [pair for pair in growth.search.alike(best, growth.effects) if frozenset(pair[0]) not in known]
+    alike = [
+        pair
+        for pair in growth.search.alike(best, growth.effects)
+        if frozenset(pair[0]) not in known
+    ]
     others = sorted(mapped(lambda pair: growth.search.refined(*pair), alike), key=priced)
     far = best.misfit + NEAR * max(growth.fitter.nothing.misfit - best.misfit, 0.0)
     return mapped(growth.fitter.settled, [fit for fit in others[:REPLACED] if fit.misfit < far])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rigtwin.diagnosis.finding import Diagnosis, Estimate, Finding, Gap, Place, Verdict
+from rigtwin.diagnosis.finding import Answer, Estimate, Finding, Gap, Place, Verdict
 
 UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands, and change no replay."""
@@ -17,7 +17,7 @@ def number(estimate: Estimate) -> str:
     return f"{estimate.value:.4g}{unit} (95 %: {estimate.low:.4g} to {estimate.high:.4g}), nominal {nominal}"
 
 
-def described(diagnosis: Diagnosis) -> str:
+def described(diagnosis: Answer) -> str:
     """The answer, what it rests on, and what to do next."""
     lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
     for fault in diagnosis.faults:
@@ -28,23 +28,33 @@ def described(diagnosis: Diagnosis) -> str:
         for name, estimate in effect.parameters.items():
             lines.append(f"    {name} = {number(estimate)}")
         if len(effect.alternatives) > 1:
-            lines.append(f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}")
+            lines.append(
+                f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}"
+            )
     for effect in diagnosis.traces:
-        values = ", ".join(f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items())
+        values = ", ".join(
+            f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items()
+        )
         lines.append(
             f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} % of the gap: too little to be claimed"
         )
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
         for step in diagnosis.steps:
-            amounts = ", ".join(f"{name} {value:.4g} {diagnosis.units[name]}" for name, value in step.left.items())
+            amounts = ", ".join(
+                f"{name} {value:.4g} {diagnosis.units[name]}" for name, value in step.left.items()
+            )
             values = ", ".join(f"{name} {each.value:.4g}" for name, each in step.values.items())
             lines.append(f"    {step.added}{f' ({values})' if values else ''}: {amounts}")
     for place in diagnosis.where:
         low, high = place.band_hz
-        lines.append(f"  where: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}")
+        lines.append(
+            f"  where: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}"
+        )
     if (gap := diagnosis.gap) is not None:
-        lines.append(f"  gap of all sensors: {gap.before:.3g} noise floors before, {gap.after:.3g} after; 1 is noise alone")
+        lines.append(
+            f"  gap of all sensors: {gap.before:.3g} noise floors before, {gap.after:.3g} after; 1 is noise alone"
+        )
         if diagnosis.effects and gap.before > 1.05:
             held = gap.shrinkage_held_out
             lines.append(
@@ -53,7 +63,9 @@ def described(diagnosis: Diagnosis) -> str:
             )
     for place in diagnosis.leftovers:
         low, high = place.band_hz
-        lines.append(f"  left over: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}")
+        lines.append(
+            f"  left over: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}"
+        )
     if diagnosis.next_test is not None:
         between = " from ".join(diagnosis.next_test.between[:2])
         lines.append(f"  next test: {diagnosis.next_test.command}  (separates {between})")
@@ -82,7 +94,9 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         title = f"setting {name}" if effect.name.kind == "setting" else effect.title
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
         article = "an" if title[0] in "aeiou" else "a"
-        parts.append(f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})")
+        parts.append(
+            f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})"
+        )
     closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
     moves = any(effect.name.kind not in UNMOVING for effect in effects)
     shown = closes if gap.before > 1.05 and moves else ""

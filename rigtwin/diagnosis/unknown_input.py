@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rigtwin.components import Effect
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Space
-from rigtwin.machine.effects import Effect
 from rigtwin.numerics.arrays import Array
 
 PRICE = 20.0
@@ -39,24 +39,32 @@ class Disturbed:
 class _Disturbance:
     """All forms of one component's disturbance in every recording, and what they do."""
 
-    def __init__(self, component: str, evidence: Evidence, plant: Any) -> None:
-        forms = list(zip(*(each.forms(component, plant) for each in evidence.plants), strict=True))
+    def __init__(self, component: str, evidence: Evidence, plant: Plant) -> None:
+        forms = list(zip(*(each.forms(component, plant) for each in evidence.models), strict=True))
         self.component, self.names = component, [same[0].name for same in forms]
         self._evidence, self._plant = evidence, plant
         self._enter = forms[0][0].entry
-        strength = max(each.strength(self._enter) for each in evidence.plants)
-        sizes = [float(np.sqrt(np.mean(np.concatenate([form.signal for form in same]) ** 2))) for same in forms]
+        strength = max(each.strength(self._enter) for each in evidence.models)
+        sizes = [
+            float(np.sqrt(np.mean(np.concatenate([form.signal for form in same]) ** 2)))
+            for same in forms
+        ]
         # One row a form, one column a tick; each of the same strength.
         self._forms = [
-            np.stack([strength / max(size, 1e-300) * same[number].signal for same, size in zip(forms, sizes, strict=True)])
-            for number in range(len(evidence.plants))
+            np.stack(
+                [
+                    strength / max(size, 1e-300) * same[number].signal
+                    for same, size in zip(forms, sizes, strict=True)
+                ]
+            )
+            for number in range(len(evidence.models))
         ]
 
     def predicted(self, strengths: Array) -> list[Array]:
         """The signals under the disturbance, shape (rows, ticks) for each recording."""
         return [
             each.disturbed(self._plant, self._enter, strengths @ forms)
-            for each, forms in zip(self._evidence.plants, self._forms, strict=True)
+            for each, forms in zip(self._evidence.models, self._forms, strict=True)
         ]
 
     def fitted(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
@@ -70,7 +78,11 @@ class _Disturbance:
             for number in range(len(here)):
                 there = here.copy()
                 there[number] += 1.0
-                columns.append(self._evidence.whitened([b - a for a, b in zip(predicted, self.predicted(there), strict=True)]))
+                columns.append(
+                    self._evidence.whitened(
+                        [b - a for a, b in zip(predicted, self.predicted(there), strict=True)]
+                    )
+                )
             normal, gradient = space.normal_equations(np.stack(columns, axis=1), residual)
             normal += np.diag(1e-6 * np.diag(normal) + 1e-9)
             move = np.linalg.solve(normal, gradient)
@@ -88,11 +100,15 @@ class _Disturbance:
         return misfit, here, worth
 
 
-def located(evidence: Evidence, plant: Any, effects: Sequence[Effect] = (), follow: bool = True) -> tuple[Disturbed, ...]:
+def located(
+    evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True
+) -> tuple[Disturbed, ...]:
     """Every component disturbed freely, the one that explains most first. plant: with the effects that are known already;
     follow: fit the foremost anew at what was found, as large disturbances need."""
     space = Space(evidence, plant, None, effects)
-    disturbances = [_Disturbance(component, evidence, plant) for component in evidence.plants[0].places()]
+    disturbances = [
+        _Disturbance(component, evidence, plant) for component in evidence.models[0].places()
+    ]
     found = sorted((_found(each, space, 1) for each in disturbances), key=lambda each: each.misfit)
     if follow:
         foremost = [each.component for each in found[:FOLLOWED]]
@@ -104,5 +120,7 @@ def located(evidence: Evidence, plant: Any, effects: Sequence[Effect] = (), foll
 def _found(disturbance: _Disturbance, space: Space, rounds: int) -> Disturbed:
     misfit, _, worth = disturbance.fitted(space, rounds)
     order = np.argsort(-worth)
-    forms = tuple(dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE))
+    forms = tuple(
+        dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE)
+    )
     return Disturbed(disturbance.component, misfit + PRICE * len(disturbance.names), forms)

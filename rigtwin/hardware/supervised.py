@@ -12,7 +12,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from controllers import Commands, Controller, Demand, Measurements, Mode, State, controller, initial_state, update
+from controllers import (
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    Mode,
+    State,
+    controller,
+    initial_state,
+    update,
+)
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import Lateness, monotonic
@@ -21,7 +31,16 @@ from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.rig import DrivenRig
-from rigtwin.simulation.safety import Trip, beyond, commanded_wrong, explained, held, sensed_wrong, watching, within
+from rigtwin.simulation.safety import (
+    Trip,
+    beyond,
+    commanded_wrong,
+    explained,
+    held,
+    sensed_wrong,
+    watching,
+    within,
+)
 
 LOOKING = 0.3
 """s for which the sensors are looked at before the rig is armed; it also warms up everything that a tick needs."""

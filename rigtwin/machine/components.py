@@ -7,29 +7,30 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from controllers.quantity import Quantity, fields
-from rigtwin.components import parameters, parts
-from rigtwin.machine.effects import KINDS
-from rigtwin.machine.machine import Component
+from rigtwin import components
+from rigtwin.components import KINDS, UNLIMITED, RigPlant
+from rigtwin.components.quantity import Quantity, fields
+from rigtwin.machine.machine import Component, Structure
 from rigtwin.machine.mechanism import Mechanism
 from rigtwin.machine.mistakes import Mistakes, near
 from rigtwin.machine.tolerance import Tolerance
 
 TYPES: dict[str, type] = {
-    "mass": parts.Mass,
-    "guide": parts.Guide,
-    "force actuator": parts.ForceActuator,
-    "position actuator": parts.PositionActuator,
-    "position sensor": parts.PositionSensor,
-    "velocity sensor": parts.VelocitySensor,
-    "force sensor": parts.ForceSensor,
-    "carriage": parameters.Carriage,
-    "rail": parameters.Rail,
-    "tyre": parameters.Tyre,
-    "motor": parameters.Motor,
-    "cylinder": parameters.Cylinder,
-    "lvdt": parameters.Lvdt,
-    "load cell": parameters.LoadCell,
+    "mass": components.Mass,
+    "guide": components.Guide,
+    "force actuator": components.ForceActuator,
+    "position actuator": components.PositionActuator,
+    "position sensor": components.PositionSensor,
+    "velocity sensor": components.VelocitySensor,
+    "force sensor": components.ForceSensor,
+    "carriage": components.Carriage,
+    "rail": components.Rail,
+    "tyre": components.Tyre,
+    "motor": components.Motor,
+    "cylinder": components.Cylinder,
+    "lvdt": components.Lvdt,
+    "load cell": components.LoadCell,
+    "gas spring": components.GasSpring,
 }
 """Type of component as a description calls it."""
 ELEMENTS = ("body", "joint", "tendon", "contact", "actuator", "sensor")
@@ -47,14 +48,17 @@ UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", 
 """What is measured → its unit where the joint slides, and where it turns."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-QUARTER_CAR = ("carriage", "rail", "tyre", "motor", "cylinder", "cylinder", "lvdt", "lvdt", "lvdt", "load cell")
-QUARTER_CAR_NAMES = tuple(name for name in parameters.Plant._fields if name not in ("gas_spring", "computer", "mains"))
-"""Components of a quarter car between two cylinders, which has a faster solver of its own (rigtwin.models.quarter_car)."""
+QUARTER_CAR = {
+    name: type(part)
+    for name, part in RigPlant()._asdict().items()
+    if name not in ("computer", "mains")
+}
+"""Components of a quarter car between two cylinders, by name; it may do without a gas spring."""
 
 
 class Components:
-    """Components as they are read. found, types, values: name → component, type, NamedTuple of its values; sources: of values,
-    `component.parameter` → text."""
+    """Components as they are read. found, types, values: name → component, type, NamedTuple of its values; sources, told: of
+    `component.parameter`, a text, and the controller's setting that says it in recordings."""
 
     def __init__(self, mechanism: Mechanism, mistakes: Mistakes) -> None:
         self._mechanism, self.mistakes = mechanism, mistakes
@@ -63,11 +67,15 @@ class Components:
         self.values: dict[str, Any] = {}
         self.tolerances: list[Tolerance] = []
         self.sources: dict[str, str] = {}
+        self.told: dict[str, str] = {}
 
     @property
-    def quarter_car(self) -> bool:
-        """Whether its components are those of a quarter car between two cylinders."""
-        return sorted(self.types.values()) == sorted(QUARTER_CAR) and tuple(self.found) == QUARTER_CAR_NAMES
+    def structure(self) -> Structure:
+        """What the components make up."""
+        types = {"gas_spring": components.GasSpring} | {
+            name: type(value) for name, value in self.values.items()
+        }
+        return Structure.QUARTER_CAR if types == QUARTER_CAR else Structure.JOINTS
 
     def add(self, name: str, table: object) -> None:
         """Reads one component's table."""
@@ -77,17 +85,22 @@ class Components:
             self.mistakes.note(where, "expected a table")
             return
         if not NAME.fullmatch(name) or name in ("computer", "mains", "controller"):
-            self.mistakes.note(where, f"{name!r} cannot be a component's name; expected letters, digits and _")
+            self.mistakes.note(
+                where, f"{name!r} cannot be a component's name; expected letters, digits and _"
+            )
             return
         elements = [key for key in ELEMENTS if key in table]
         if len(elements) != 1:
             self.mistakes.note(
-                where, f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}"
+                where,
+                f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}",
             )
             return
         element, mjcf = elements[0], str(table[elements[0]])
         if mjcf not in mechanism.names(element):
-            self.mistakes.note(where, f"the MJCF has no {element} {mjcf!r}; {near(mjcf, mechanism.names(element))}")
+            self.mistakes.note(
+                where, f"the MJCF has no {element} {mjcf!r}; {near(mjcf, mechanism.names(element))}"
+            )
             return
         kind = self._type(where, table, element, mjcf)
         if kind is None:
@@ -106,7 +119,8 @@ class Components:
             channel = ("/sensor", str(table.get("channel", name)))
             if table.get("unit", unit) != unit:
                 self.mistakes.note(
-                    where, f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts"
+                    where,
+                    f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts",
                 )
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
@@ -114,13 +128,20 @@ class Components:
                 unit = UNITS["position"][turns]
         for key, fits in (("channel", kind in SENSED), ("command", kind in MOVING)):
             if key in table and not fits:
-                self.mistakes.note(where, f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}")
-        self.found[name] = Component(name, element, mjcf, joint, channel, unit, self._kinds(where, kind, table))
+                self.mistakes.note(
+                    where,
+                    f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}",
+                )
+        self.found[name] = Component(
+            name, element, mjcf, joint, channel, unit, self._kinds(where, kind, table)
+        )
 
     def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:
         if "type" in table:
             if table["type"] not in TYPES:
-                self.mistakes.note(where, f"unknown type {table['type']!r}; {near(table['type'], TYPES)}")
+                self.mistakes.note(
+                    where, f"unknown type {table['type']!r}; {near(table['type'], TYPES)}"
+                )
                 return None
             return str(table["type"])
         if element == "body":
@@ -140,11 +161,16 @@ class Components:
         possible = sorted({each.name for each in KINDS if TYPES[kind] in each.at})
         wanted = table["effects"]
         if not isinstance(wanted, list) or not all(isinstance(each, str) for each in wanted):
-            self.mistakes.note(where, 'effects: expected a list of kinds, such as ["gain", "offset"], or [] for none')
+            self.mistakes.note(
+                where,
+                'effects: expected a list of kinds, such as ["gain", "offset"], or [] for none',
+            )
             return None
         for each in wanted:
             if each not in possible:
-                self.mistakes.note(where, f"effects: a {kind} has no {each!r}; {near(each, possible)}")
+                self.mistakes.note(
+                    where, f"effects: a {kind} has no {each!r}; {near(each, possible)}"
+                )
         return frozenset(wanted)
 
     def _filled(
@@ -159,7 +185,11 @@ class Components:
     ) -> Any:
         """The component's values: those of its type, then of the MJCF, then of the description."""
         component = TYPES[kind]()
-        meanings = {key: meaning for key, meaning in fields(TYPES[kind]).items() if isinstance(meaning, Quantity)}
+        meanings = {
+            key: meaning
+            for key, meaning in fields(TYPES[kind]).items()
+            if isinstance(meaning, Quantity)
+        }
         if kind == "mass" and joint:
             component = component._replace(mass=self._mechanism.joint(joint).inertia)
         elif kind == "guide" and joint:
@@ -167,26 +197,39 @@ class Components:
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
             if constant <= 0.0:
-                self.mistakes.note(where, f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0")
+                self.mistakes.note(
+                    where,
+                    f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
+                )
                 return component
-            component = component._replace(constant=constant, force_limit=min(limit, parameters.UNLIMITED))
+            component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
         for key, given in table.items():
             if key in COMPONENT_KEYS:
                 continue
             if key not in meanings:
-                known = [each for each in (*meanings, *COMPONENT_KEYS) if each not in ELEMENTS or each == element]
+                known = [
+                    each
+                    for each in (*meanings, *COMPONENT_KEYS)
+                    if each not in ELEMENTS or each == element
+                ]
                 self.mistakes.note(where, f"unknown key {key!r}; {near(key, known)}")
                 continue
             component = self._value(name, where, component, key, given, meanings[key])
         return component
 
-    def _value(self, name: str, where: str, component: Any, key: str, given: object, meaning: Quantity) -> Any:
+    def _value(
+        self, name: str, where: str, component: Any, key: str, given: object, meaning: Quantity
+    ) -> Any:
         """One parameter: a number, or a table of value, tolerance and source."""
         here = f"{where} {key}"
         table: Mapping[str, Any] = given if isinstance(given, Mapping) else {"value": given}
-        self.mistakes.unknown(here, table, ("value", "tolerance", "source"))
+        self.mistakes.unknown(here, table, ("value", "tolerance", "source", "setting"))
         if "value" in table:
-            component = component._replace(**{key: self.mistakes.number(here, table["value"], meaning.low, meaning.high)})
+            component = component._replace(
+                **{key: self.mistakes.number(here, table["value"], meaning.low, meaning.high)}
+            )
+        if "setting" in table:
+            self.told[f"{name}.{key}"] = str(table["setting"])
         if "source" in table:
             self.sources[f"{name}.{key}"] = str(table["source"])
         if "tolerance" in table:
@@ -194,11 +237,16 @@ class Components:
             share = share_of(width) if isinstance(width, str) else None
             if share is not None and 0.0 < share <= 1.0:
                 self.tolerances.append(Tolerance(name, key, share, True))
-            elif isinstance(width, int | float) and not isinstance(width, bool) and 0.0 < width < math.inf:
+            elif (
+                isinstance(width, int | float)
+                and not isinstance(width, bool)
+                and 0.0 < width < math.inf
+            ):
                 self.tolerances.append(Tolerance(name, key, float(width)))
             else:
                 self.mistakes.note(
-                    here, f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"'
+                    here,
+                    f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"',
                 )
         return component
 

@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
-from rigtwin.components import parameters
+from rigtwin.components import Computer, Mains, RigPlant
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.components import MOVING, Components
-from rigtwin.machine.machine import Control, Machine
+from rigtwin.machine.control import PYTHON, Channel, Control, FormulaControl
+from rigtwin.machine.machine import Machine, Structure
 from rigtwin.machine.mechanism import Mechanism
 from rigtwin.machine.mistakes import Mistakes, near
 from rigtwin.machine.replays import Replays
 
+TABLES = ("machine", "components", "controller", "replays", "mains", "experiments")
 NOMINAL = ("known", "rough")
 """How well the nominal values are known."""
 
@@ -27,7 +29,11 @@ def load(path: Path) -> Machine:
     """The machine of a description. Raises RigtwinError with the first mistake in it."""
     machine, mistakes = examined(path)
     if mistakes or machine is None:
-        more = f" (and {len(mistakes) - 1} more; rigtwin machine check {path})" if len(mistakes) > 1 else ""
+        more = (
+            f" (and {len(mistakes) - 1} more; rigtwin machine check {path})"
+            if len(mistakes) > 1
+            else ""
+        )
         raise RigtwinError(f"{path}: {mistakes[0]}{more}")
     return machine
 
@@ -53,9 +59,11 @@ class _Reader:
     def machine(self) -> Machine | None:
         note = self._mistakes.note
         for key in self._document:
-            if key not in ("machine", "components", "controller", "replays", "mains"):
-                note("", f"unknown table [{key}]; {near(key, ('machine', 'components', 'controller', 'replays', 'mains'))}")
-        about = self._table("machine", ("name", "title", "model", "nominal", "form"), required=("name", "model"))
+            if key not in TABLES:
+                note("", f"unknown table [{key}]; {near(key, TABLES)}")
+        about = self._table(
+            "machine", ("name", "title", "model", "nominal", "form"), required=("name", "model")
+        )
         name = str(about.get("name", ""))
         if "name" in about and not isinstance(about["name"], str):
             note("[machine] name", f"{name}: expected a text, in quotes")
@@ -64,11 +72,18 @@ class _Reader:
         nominal = about.get("nominal", "rough")
         if nominal not in NOMINAL:
             note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(NOMINAL)}")
-        form = self._mistakes.number("[machine] form", about["form"], 1e-6, 0.5) if "form" in about else None
+        form = (
+            self._mistakes.number("[machine] form", about["form"], 1e-6, 0.5)
+            if "form" in about
+            else None
+        )
         mechanism = self._mechanism(about)
         given = self._document.get("components")
         if not isinstance(given, Mapping) or not given:
-            note("", "it has no [components.NAME]; expected at least what moves it and what is observed")
+            note(
+                "",
+                "it has no [components.NAME]; expected at least what moves it and what is observed",
+            )
             given = {}
         if mechanism is None:
             return None
@@ -83,29 +98,38 @@ class _Reader:
         if self._mistakes:
             return None
         reader.tolerate_timing(replays)
-        names = [*components.found, "computer", "mains"]
-        values = [*components.values.values(), parameters.Computer(), parameters.Mains(mains)]
-        made = parameters.Plant if components.quarter_car else namedtuple("Plant", names)  # type: ignore[misc]
-        plant: Any = made(**dict(zip(names, values, strict=True)))
-        title = str(about.get("title", name))
-        model = self._model_path(about)
-        tolerances = tuple(components.tolerances)
+        values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
+        made = (
+            RigPlant
+            if components.structure is Structure.QUARTER_CAR
+            else namedtuple("Plant", list(values))
+        )  # type: ignore[misc]
+        plant: Any = made(**values)
         return Machine(
-            name,
-            title,
-            self._path,
-            model,
-            plant,
-            components.found,
-            tolerances,
-            replays,
-            control,
-            nominal == "rough",
-            form,
-            components.sources,
+            name=name,
+            title=str(about.get("title", name)),
+            path=self._path,
+            model=self._model_path(about),
+            plant=plant,
+            structure=components.structure,
+            components=components.found,
+            tolerances=tuple(components.tolerances),
+            replays=replays,
+            control=control,
+            rough=nominal == "rough",
+            form=form,
+            sources=components.sources,
+            told=components.told,
+            experiments=self._experiments(),
         )
 
-    def _table(self, name: str, known: tuple[str, ...], required: tuple[str, ...] = ()) -> Mapping[str, Any]:
+    def _experiments(self) -> str | Mapping[str, Any]:
+        given = self._document.get("experiments", {})
+        return str(given["python"]) if isinstance(given.get("python"), str) else given
+
+    def _table(
+        self, name: str, known: tuple[str, ...], required: tuple[str, ...] = ()
+    ) -> Mapping[str, Any]:
         table = self._document.get(name, {})
         if not isinstance(table, Mapping):
             self._mistakes.note(f"[{name}]", "expected a table")
@@ -136,31 +160,60 @@ class _Reader:
     def _control(self, components: Components) -> Control | None:
         if "controller" not in self._document:
             return None
-        table = self._table("controller", ("output", "formula", "inputs", "settings", "exact"), required=("output", "formula"))
+        if "python" in self._document["controller"]:
+            return self._python_control()
+        return self._formula_control(components)
+
+    def _python_control(self) -> Control | None:
+        name = self._table("controller", ("python",))["python"]
+        if name not in PYTHON:
+            self._mistakes.note("[controller] python", f"{name!r}; {near(name, PYTHON)}")
+        return PYTHON.get(str(name))
+
+    def _formula_control(self, components: Components) -> Control | None:
+        table = self._table(
+            "controller",
+            ("output", "formula", "inputs", "settings", "exact"),
+            required=("output", "formula"),
+        )
         settings, inputs = table.get("settings", {}), table.get("inputs", {})
-        if not isinstance(settings, Mapping) or not all(isinstance(v, int | float) for v in settings.values()):
+        if not isinstance(settings, Mapping) or not all(
+            isinstance(v, int | float) for v in settings.values()
+        ):
             self._mistakes.note("[controller] settings", "expected a table of numbers")
             return None
-        outputs = {c.channel[1]: n for n, c in components.found.items() if components.types[n] in MOVING and c.channel}
+        outputs = {
+            c.channel[1]: n
+            for n, c in components.found.items()
+            if components.types[n] in MOVING and c.channel
+        }
         output = str(table.get("output", ""))
         if "output" in table and output not in outputs:
-            self._mistakes.note("[controller] output", f"no actuator takes the command {output!r}; {near(output, outputs)}")
+            self._mistakes.note(
+                "[controller] output",
+                f"no actuator takes the command {output!r}; {near(output, outputs)}",
+            )
         try:
-            compiled: Formula = formula(str(table.get("formula", "0")), {key: float(v) for key, v in settings.items()})
+            compiled: Formula = formula(
+                str(table.get("formula", "0")), {key: float(v) for key, v in settings.items()}
+            )
         except ValueError as error:
             self._mistakes.note("[controller] formula", str(error))
             return None
         unused = [key for key in settings if not re.search(rf"\b{re.escape(key)}\b", compiled.text)]
         if unused:
             self._mistakes.note("[controller] settings", f"{', '.join(unused)} not in the formula")
-        channels: dict[str, tuple[str, str]] = {}
+        channels: dict[str, Channel] = {}
         for name in compiled.inputs:
             known = components.found.get(name)
             wanted = inputs.get(name) if isinstance(inputs, Mapping) else None
             if wanted is not None:
                 topic, _, field = str(wanted).partition(".")
                 if topic not in ("/command", "/sensor") or not field:
-                    self._mistakes.note("[controller] inputs", f"{name} = {wanted!r}: expected /command.NAME or /sensor.NAME")
+                    self._mistakes.note(
+                        "[controller] inputs",
+                        f"{name} = {wanted!r}: expected /command.NAME or /sensor.NAME",
+                    )
                 channels[name] = (topic, field)
             elif known is not None and known.channel is not None and known.element == "sensor":
                 channels[name] = known.channel
@@ -169,4 +222,4 @@ class _Reader:
         exact = None
         if "exact" in table:
             exact = self._mistakes.number("[controller] exact", table["exact"], 1e-300, 1e9)
-        return Control(output, compiled, channels, exact)
+        return FormulaControl(output, compiled, channels, exact)

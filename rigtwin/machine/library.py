@@ -30,4 +30,6 @@ def find(name: str) -> Machine:
     path = Path(name)
     if path.suffix == ".toml" or path.exists():
         return load(path)
-    raise RigtwinError(f"unknown machine {name!r}; there are {', '.join(shipped())}, or give the path of a description, F.toml")
+    raise RigtwinError(
+        f"unknown machine {name!r}; there are {', '.join(shipped())}, or give the path of a description, F.toml"
+    )

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from controllers.formula import Formula
-from controllers.quantity import Quantity
-from rigtwin.machine.effects import Effect, candidates
+from rigtwin.components import Effect, candidates
+from rigtwin.components.quantity import Quantity
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Configuration, Nothing, overridden
+from rigtwin.machine.control import Control
 from rigtwin.machine.tolerance import Tolerance
+from rigtwin.recording import Recording
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
 """Kind of signal → share of it that no model is held to, where a description does not say: of forces less is known."""
@@ -25,6 +30,13 @@ TURNING = {
     "Ns^2/m^2": "Nms^2/rad^2",
 }
 """Unit of a joint that slides → that of one that turns."""
+
+
+class Structure(Enum):
+    """What a machine's components make up, by which its solver is chosen, once."""
+
+    QUARTER_CAR = "a quarter car between two hydraulic cylinders"
+    JOINTS = "joints that do not act on each other"
 
 
 @dataclass(frozen=True)
@@ -80,27 +92,20 @@ class ReplayOf:
 
 
 @dataclass(frozen=True)
-class Control:
-    """The controller that was running. output: the command that it computes; inputs: name → channel; exact: rms in the
-    command's unit within which its replay counts as exact, None for the recording's rounding."""
-
-    output: str
-    formula: Formula
-    inputs: Mapping[str, tuple[str, str]]
-    exact: float | None
-
-
-@dataclass(frozen=True)
 class Machine:
-    """The whole description. plant: a NamedTuple of components, as rigtwin.components.parts and rigtwin.components.parameters define them; rough:
-    whether its nominal values are only a start; form: share of a signal that no model is held to, None for
-    the usual one."""
+    """The whole description.
+
+    plant: a NamedTuple of components with their nominal values; structure: what they make up; rough: whether nominal values are
+    only a start; form: share of a signal that no model is held to, None for the usual one; told: `component.parameter` → setting
+    of the recording's controller that says its value; experiments: Python module that has them, or tables of the description.
+    """
 
     name: str
     title: str
     path: Path
     model: Path
     plant: Any = field(repr=False)
+    structure: Structure
     components: Mapping[str, Component]
     tolerances: tuple[Tolerance, ...]
     replays: tuple[ReplayOf, ...]
@@ -108,6 +113,44 @@ class Machine:
     rough: bool
     form: float | None
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
+    told: Mapping[str, str] = field(default_factory=dict, repr=False)
+    experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def configuration(self) -> Configuration:
+        """The settings of its twin as described."""
+        settings = Nothing() if self.control is None else self.control.settings
+        if self.structure is Structure.QUARTER_CAR:
+            return Configuration(plant=self.plant, controller=settings)
+        nothing: Any = Nothing()
+        return Configuration(plant=self.plant, controller=settings, safety=nothing, road=nothing)
+
+    def configuration_of(
+        self, recording: Recording, base: Configuration | None = None
+    ) -> Configuration:
+        """The settings of the twin of a recording: what the operator wrote down over `base`, by default the description's.
+
+        Raises RigtwinError for settings that the machine does not have.
+        """
+        start = self.configuration if base is None else base
+        period = recording.period
+        steps = max(1, math.ceil(period / start.timing.timestep - 1e-9))
+        duration = max(recording.ticks * period, 0.01)
+        changes: dict[str, dict[str, object]] = {
+            "timing": {"period": period, "duration": duration, "timestep": period / steps},
+        }
+        given = dict(recording.controller)
+        if given and self.control is not None:
+            changes["controller"] = given
+        for parameter, setting in self.told.items():
+            group, _, name = parameter.partition(".")
+            # What the operator says is there is there, unless the twin was given another.
+            if setting in given and getattr(start.plant, group) == getattr(self.plant, group):
+                changes.setdefault(group, {})[name] = given[setting]
+        try:
+            return overridden(start, changes)
+        except RigtwinError as error:
+            raise RigtwinError(f"{recording.path}: {error}") from None
 
     @property
     def rows(self) -> tuple[Row, ...]:

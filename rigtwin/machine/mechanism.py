@@ -76,7 +76,11 @@ class Mechanism:
         if element == "body":
             while number > 0 and model.body_jntnum[number] == 0:
                 number = int(model.body_parentid[number])
-            return self.joint_name(int(model.body_jntadr[number])) if model.body_jntnum[number] == 1 else ""
+            return (
+                self.joint_name(int(model.body_jntadr[number]))
+                if model.body_jntnum[number] == 1
+                else ""
+            )
         if element == "actuator":
             through = int(model.actuator_trntype[number])
             if through in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
@@ -87,12 +91,16 @@ class Mechanism:
             if kind == mujoco.mjtObj.mjOBJ_JOINT:
                 return self.joint_name(what)
             if kind == mujoco.mjtObj.mjOBJ_ACTUATOR:
-                return self.joint_of("actuator", mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or "")
+                return self.joint_of(
+                    "actuator", mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or ""
+                )
         return ""
 
     def measures(self, name: str) -> str:
         """What a sensor measures: position, velocity or force; empty for anything else."""
-        return SENSORS.get(mujoco.mjtSensor(int(self.model.sensor_type[self.number("sensor", name)])), "")
+        return SENSORS.get(
+            mujoco.mjtSensor(int(self.model.sensor_type[self.number("sensor", name)])), ""
+        )
 
     def positions(self, name: str) -> bool:
         """Whether an actuator takes a position as its command."""
@@ -101,7 +109,10 @@ class Mechanism:
     def force_per_command(self, name: str) -> tuple[float, float]:
         """A force actuator's constant and limit, N or Nm (infinite if there is none)."""
         number = self.number("actuator", name)
-        gear, gain = float(self.model.actuator_gear[number, 0]), float(self.model.actuator_gainprm[number, 0])
+        gear, gain = (
+            float(self.model.actuator_gear[number, 0]),
+            float(self.model.actuator_gainprm[number, 0]),
+        )
         limit = np.inf
         if self.model.actuator_ctrllimited[number]:
             limit = abs(gear * gain) * float(self.model.actuator_ctrlrange[number, 1])

@@ -23,7 +23,11 @@ class Mistakes(list[str]):
 
     def number(self, where: str, value: object, low: float, high: float) -> float:
         """The value if it is a number between the bounds; else the lower one, and a mistake."""
-        number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+        number = (
+            float(value)
+            if isinstance(value, int | float) and not isinstance(value, bool)
+            else math.nan
+        )
         if low <= number <= high:
             return number
         shown = repr(value) if isinstance(value, str) else str(value)
@@ -35,4 +39,6 @@ def near(word: object, known: Iterable[str]) -> str:
     """What was probably meant, and what there is."""
     names = list(known)
     close = difflib.get_close_matches(str(word), names, 1)
-    return (f"did you mean {close[0]!r}? " if close else "") + f"there are {', '.join(names) or 'none'}"
+    return (
+        f"did you mean {close[0]!r}? " if close else ""
+    ) + f"there are {', '.join(names) or 'none'}"

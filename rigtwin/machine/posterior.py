@@ -15,7 +15,14 @@ import numpy as np
 
 from controllers.quantity import Quantity, fields
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import POSTERIOR, Configuration, groups, overridden, read_toml, values_of
+from rigtwin.machine.configuration import (
+    POSTERIOR,
+    Configuration,
+    groups,
+    overridden,
+    read_toml,
+    values_of,
+)
 
 NORMAL_95 = 1.959964
 """Standard deviations from the middle to the end of a 95 % interval."""
@@ -53,7 +60,9 @@ class Posterior:
         configuration = self.at_best(configuration)
         for key, (low, high) in self.intervals.items():
             there, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
-            configuration = shifted_within(configuration, key, amount * (high - there if amount > 0.0 else there - low))
+            configuration = shifted_within(
+                configuration, key, amount * (high - there if amount > 0.0 else there - low)
+            )
         return configuration
 
 
@@ -74,11 +83,25 @@ def shifted_within(configuration: Configuration, key: str, amount: float) -> Con
 
 def written(posterior: Posterior) -> list[str]:
     """The table's lines in TOML. Full precision, so that a twin read again is the same to the bit."""
-    lines = [f"[{POSTERIOR}]", f"probability = {posterior.probability!r}", "", f"[{POSTERIOR}.intervals]"]
+    lines = [
+        f"[{POSTERIOR}]",
+        f"probability = {posterior.probability!r}",
+        "",
+        f"[{POSTERIOR}.intervals]",
+    ]
     lines += [f'"{key}" = [{low!r}, {high!r}]' for key, (low, high) in posterior.intervals.items()]
     for other in posterior.otherwise:
-        lines += ["", f"[[{POSTERIOR}.otherwise]]", f'effect = "{other.effect}"', f"probability = {other.probability!r}"]
-        lines += [f"changes.{group}.{name} = {value!r}" for group, own in other.changes.items() for name, value in own.items()]
+        lines += [
+            "",
+            f"[[{POSTERIOR}.otherwise]]",
+            f'effect = "{other.effect}"',
+            f"probability = {other.probability!r}",
+        ]
+        lines += [
+            f"changes.{group}.{name} = {value!r}"
+            for group, own in other.changes.items()
+            for name, value in own.items()
+        ]
     return lines
 
 
@@ -95,13 +118,19 @@ def _parsed(tables: Mapping[str, Any]) -> Posterior:
     configuration = _of_rig("it", changes)
     table = tables.get(POSTERIOR, {})
     if not isinstance(table, Mapping):
-        raise RigtwinError(f"{POSTERIOR} = {table!r}: expected a table, as rigtwin diagnose --save-twin writes it")
+        raise RigtwinError(
+            f"{POSTERIOR} = {table!r}: expected a table, as rigtwin diagnose --save-twin writes it"
+        )
     for key in table:
         if key not in ("probability", "intervals", "otherwise"):
-            raise RigtwinError(f"unknown {POSTERIOR}.{key}; there are probability, intervals, otherwise")
+            raise RigtwinError(
+                f"unknown {POSTERIOR}.{key}; there are probability, intervals, otherwise"
+            )
     intervals, others = table.get("intervals", {}), table.get("otherwise", [])
     if not isinstance(intervals, Mapping):
-        raise RigtwinError(f"{POSTERIOR}.intervals = {intervals!r}: expected a table of component.parameter = [low, high]")
+        raise RigtwinError(
+            f"{POSTERIOR}.intervals = {intervals!r}: expected a table of component.parameter = [low, high]"
+        )
     if not isinstance(others, list) or not all(isinstance(other, Mapping) for other in others):
         raise RigtwinError(f"{POSTERIOR}.otherwise: expected tables, [[{POSTERIOR}.otherwise]]")
     return Posterior(
@@ -117,7 +146,9 @@ def _of_rig(where: str, changes: Changes) -> Configuration:
     configuration = overridden(Configuration(), changes)
     for group in changes:
         if group not in configuration.plant._fields:
-            raise RigtwinError(f"{where} changes {group}; a rig is described by {', '.join(configuration.plant._fields)} alone")
+            raise RigtwinError(
+                f"{where} changes {group}; a rig is described by {', '.join(configuration.plant._fields)} alone"
+            )
     return configuration
 
 
@@ -129,16 +160,26 @@ def _probability(value: object) -> float:
 
 def _interval(configuration: Configuration, key: str, ends: object) -> tuple[float, float]:
     group, _, name = key.partition(".")
-    known = fields(type(getattr(configuration.plant, group))) if group in configuration.plant._fields else {}
+    known = (
+        fields(type(getattr(configuration.plant, group)))
+        if group in configuration.plant._fields
+        else {}
+    )
     if not isinstance(known.get(name), Quantity):
-        raise RigtwinError(f"{POSTERIOR}.intervals: unknown parameter {key!r}; expected component.parameter of the rig")
+        raise RigtwinError(
+            f"{POSTERIOR}.intervals: unknown parameter {key!r}; expected component.parameter of the rig"
+        )
     try:
         low, high = (float(end) for end in ends if not isinstance(end, bool | str))  # type: ignore[union-attr]
     except (TypeError, ValueError, OverflowError):
         low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low <= value_of(configuration, key) <= high):
+    if not (
+        math.isfinite(low) and math.isfinite(high) and low <= value_of(configuration, key) <= high
+    ):
         there = value_of(configuration, key)
-        raise RigtwinError(f"{POSTERIOR}.intervals: {key} = {ends!r}; expected [low, high] about its value, {there:g}")
+        raise RigtwinError(
+            f"{POSTERIOR}.intervals: {key} = {ends!r}; expected [low, high] about its value, {there:g}"
+        )
     return low, high
 
 
@@ -150,6 +191,8 @@ def _otherwise(table: Mapping[str, Any]) -> Otherwise:
         )
     effect = str(table["effect"])
     if not effect.isprintable():
-        raise RigtwinError(f"{POSTERIOR}.otherwise: effect = {effect!r}; expected a name of one line")
+        raise RigtwinError(
+            f"{POSTERIOR}.otherwise: effect = {effect!r}; expected a name of one line"
+        )
     _of_rig(f"{POSTERIOR}.otherwise {effect}", changes)
     return Otherwise(effect, _probability(table.get("probability", 0.0)), changes)

@@ -7,7 +7,8 @@ from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.components import MOVING, SENSED, Components
-from rigtwin.machine.machine import Control, Joint, ReplayOf, Row
+from rigtwin.machine.control import Control, FormulaControl
+from rigtwin.machine.machine import Joint, ReplayOf, Row, Structure
 from rigtwin.machine.mechanism import Mechanism
 from rigtwin.machine.mistakes import Mistakes, near
 from rigtwin.machine.tolerance import Tolerance
@@ -19,12 +20,30 @@ TICKS_LATE = 0.5
 class Replays:
     """Reads the replays of a machine whose components and controller are known."""
 
-    def __init__(self, mechanism: Mechanism, components: Components, control: Control | None, mistakes: Mistakes) -> None:
-        self._mechanism, self._components, self._control, self._mistakes = mechanism, components, control, mistakes
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        components: Components,
+        control: Control | None,
+        mistakes: Mistakes,
+    ) -> None:
+        self._mechanism, self._components, self._control, self._mistakes = (
+            mechanism,
+            components,
+            control,
+            mistakes,
+        )
 
     def all(self, given: object) -> tuple[ReplayOf, ...]:
-        if not isinstance(given, list) or not given or not all(isinstance(each, Mapping) for each in given):
-            self._mistakes.note("", "it has no [[replays]]; expected one that says what moves the joint and what is observed")
+        if (
+            not isinstance(given, list)
+            or not given
+            or not all(isinstance(each, Mapping) for each in given)
+        ):
+            self._mistakes.note(
+                "",
+                "it has no [[replays]]; expected one that says what moves the joint and what is observed",
+            )
             return ()
         found = []
         for number, table in enumerate(given, start=1):
@@ -37,13 +56,14 @@ class Replays:
         return tuple(found)
 
     def _replay(self, where: str, table: Mapping[str, Any], number: int) -> ReplayOf | None:
-        control = self._control
         before = len(self._mistakes)
         self._mistakes.unknown(where, table, ("name", "moved_by", "observe"))
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
         known = [
-            name for name, kind in self._components.types.items() if kind in (*MOVING, "position sensor", "velocity sensor")
+            name
+            for name, kind in self._components.types.items()
+            if kind in (*MOVING, "position sensor", "velocity sensor")
         ]
         if not isinstance(movers, list) or not movers:
             said = "is missing" if "moved_by" not in table else "is no name"
@@ -55,46 +75,72 @@ class Replays:
             movers = []
         for mover in movers:
             if mover not in known:
-                self._mistakes.note(where, f"moved_by {mover!r} is no actuator or sensor of the motion; {near(mover, known)}")
-        rows = [row for name in self._observed(where, table) if (row := self._row(where, name, movers)) is not None]
+                self._mistakes.note(
+                    where,
+                    f"moved_by {mover!r} is no actuator or sensor of the motion; {near(mover, known)}",
+                )
+        rows = [
+            row
+            for name in self._observed(where, table)
+            if (row := self._row(where, name, movers)) is not None
+        ]
         if len(self._mistakes) > before:
             return None
-        quarter_car = self._components.quarter_car
+        quarter_car = self._components.structure is Structure.QUARTER_CAR
         joint_name = "" if quarter_car else self._components.found[movers[0]].joint
         if len(movers) > 1 and not quarter_car:
             self._mistakes.note(
-                where, f"moved by {len(movers)} components; expected one, and another replay for each other joint"
+                where,
+                f"moved by {len(movers)} components; expected one, and another replay for each other joint",
             )
             return None
         if not joint_name and not quarter_car:
-            self._mistakes.note(where, f"{movers[0]} acts on no joint of its own; expected one that does")
+            self._mistakes.note(
+                where, f"{movers[0]} acts on no joint of its own; expected one that does"
+            )
             return None
         try:
-            joint = self._mechanism.joint(joint_name) if joint_name else Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
+            joint = (
+                self._mechanism.joint(joint_name)
+                if joint_name
+                else Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
+            )
         except RigtwinError as error:
             self._mistakes.note(where, str(error))
             return None
         at = {
-            kind: [n for n, t in self._components.types.items() if t == kind and self._components.found[n].joint == joint_name]
+            kind: [
+                n
+                for n, t in self._components.types.items()
+                if t == kind and self._components.found[n].joint == joint_name
+            ]
             for kind in ("mass", "guide")
         }
         for kind, names in at.items():
             if len(names) > 1:
-                self._mistakes.note(where, f"joint {joint_name} has {len(names)} components of type {kind}; expected one")
+                self._mistakes.note(
+                    where,
+                    f"joint {joint_name} has {len(names)} components of type {kind}; expected one",
+                )
         if not quarter_car:
             for row in rows:
                 other = self._components.found.get(row.name)
                 if other is not None and other.joint != joint_name:
                     self._mistakes.note(
-                        where, f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}"
+                        where,
+                        f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}",
                     )
-        closed = control is not None and self._components.found[movers[0]].channel == ("/command", control.output)
+        closed = self._closes(movers[0])
         if self._components.types[movers[0]] == "force actuator" and not at["mass"]:
             self._mistakes.note(
-                where, f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass"
+                where,
+                f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass",
             )
         if self._components.types[movers[0]] == "force actuator" and not at["guide"]:
-            self._mistakes.note(where, f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide")
+            self._mistakes.note(
+                where,
+                f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide",
+            )
         return ReplayOf(
             str(table.get("name", f"replay {number}")),
             joint,
@@ -105,11 +151,22 @@ class Replays:
             closed,
         )
 
+    def _closes(self, mover: str) -> bool:
+        """Whether the described controller commands it, and can be run along."""
+        control, channel = self._control, self._components.found[mover].channel
+        return isinstance(control, FormulaControl) and channel == ("/command", control.output)
+
     def _observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
         observed = table.get("observe", [])
-        if not isinstance(observed, list) or not observed or not all(isinstance(each, str) for each in observed):
+        if (
+            not isinstance(observed, list)
+            or not observed
+            or not all(isinstance(each, str) for each in observed)
+        ):
             said = "is missing" if "observe" not in table else f"= {str(observed)[:40]!r}"
-            self._mistakes.note(where, f"observe {said}; expected a list of sensors, or of the controller's command")
+            self._mistakes.note(
+                where, f"observe {said}; expected a list of sensors, or of the controller's command"
+            )
             return []
         return observed
 
@@ -117,16 +174,26 @@ class Replays:
         control = self._control
         known = self._components.found.get(name)
         sensors = [each for each, kind in self._components.types.items() if kind in SENSED]
-        if known is not None and self._components.types[name] in SENSED and known.channel is not None:
+        if (
+            known is not None
+            and self._components.types[name] in SENSED
+            and known.channel is not None
+        ):
             if name in movers:
-                self._mistakes.note(where, f"{name} moves the joint, so it cannot be observed there too")
+                self._mistakes.note(
+                    where, f"{name} moves the joint, so it cannot be observed there too"
+                )
                 return None
             return Row(name, SENSED[self._components.types[name]], known.channel, known.unit)
-        if control is not None and name == control.output:
-            unit = next(c.unit for c in self._components.found.values() if c.channel == ("/command", name))
+        if control is not None and name in control.outputs:
+            unit = next(
+                c.unit for c in self._components.found.values() if c.channel == ("/command", name)
+            )
             return Row(name, "command", ("/command", name), unit or "1")
-        there = [*sensors, *([control.output] if control else [])]
-        self._mistakes.note(where, f"observe: {name!r} is no sensor or controller's command; {near(name, there)}")
+        there = [*sensors, *(control.outputs if control else ())]
+        self._mistakes.note(
+            where, f"observe: {name!r} is no sensor or controller's command; {near(name, there)}"
+        )
         return None
 
     def tolerate_timing(self, replays: tuple[ReplayOf, ...]) -> None:
@@ -134,8 +201,13 @@ class Replays:
         recording's."""
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
-            names = [*replay.moved_by[:1], *(row.name for row in replay.rows if row.kind != "command")]
+            names = [
+                *replay.moved_by[:1],
+                *(row.name for row in replay.rows if row.kind != "command"),
+            ]
             for name in names:
                 # What is in one loop with the controller was sampled with it.
-                if (name, "delay") not in declared and not replay.closed and not self._components.quarter_car:
-                    self._components.tolerances.append(Tolerance(name, "delay", TICKS_LATE, ticks=True))
+                if (name, "delay") not in declared and not replay.closed:
+                    self._components.tolerances.append(
+                        Tolerance(name, "delay", TICKS_LATE, ticks=True)
+                    )

@@ -24,7 +24,11 @@ class Tolerance:
         """Its half width in the parameter's unit, at that plant. period: s, of a tick."""
         if self.ticks:
             return self.half_width * period
-        return self.half_width * (abs(float(getattr(getattr(plant, self.group), self.parameter))) if self.relative else 1.0)
+        return self.half_width * (
+            abs(float(getattr(getattr(plant, self.group), self.parameter)))
+            if self.relative
+            else 1.0
+        )
 
     def shifted(self, plant: Any, amount: float) -> Any:
         """The plant with this parameter higher by that much, in its unit."""

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from scipy.linalg import expm
 
-from rigtwin.components.parameters import UNLIMITED
-from rigtwin.components.parts import PositionActuator
+from rigtwin.components import UNLIMITED, PositionActuator
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
@@ -18,7 +17,15 @@ HELD = 0.5
 
 @kernel
 def _followed(
-    wanted: Array, play: float, gain: float, offset: float, limit: float, rate: float, shares: Array, second: Array, out: Array
+    wanted: Array,
+    play: float,
+    gain: float,
+    offset: float,
+    limit: float,
+    rate: float,
+    shares: Array,
+    second: Array,
+    out: Array,
 ) -> None:
     """wanted, out: shape (steps,); rate: greatest change a step; shares: of each lag a step; second: transition of the
     resonance and its entry, shape (2, 3), or of no size."""
@@ -53,20 +60,39 @@ def _followed(
             out[step] = two
 
 
-def followed(actuator: PositionActuator, command: Array, late: float, period: float, steps: int) -> Array:
+def followed(
+    actuator: PositionActuator, command: Array, late: float, period: float, steps: int
+) -> Array:
     """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of the computer."""
     ticks, h = len(command), period / steps
     count = (ticks - 1) * steps + 1
     time = np.arange(count) * h
     delay = actuator.delay + late + HELD * period
     wanted = np.interp(time - delay, np.arange(ticks) * period, command)
-    shares = np.array([1.0 if lag <= 0.0 else 1.0 - math.exp(-h / lag) for lag in (actuator.lag, actuator.second_lag)])
+    shares = np.array(
+        [
+            1.0 if lag <= 0.0 else 1.0 - math.exp(-h / lag)
+            for lag in (actuator.lag, actuator.second_lag)
+        ]
+    )
     second = np.zeros((0, 3))
     if actuator.natural_frequency < 0.25 / h:
         w = 2.0 * math.pi * actuator.natural_frequency
-        both = np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * actuator.damping_ratio * w, w * w], [0.0, 0.0, 0.0]])
+        both = np.array(
+            [[0.0, 1.0, 0.0], [-w * w, -2.0 * actuator.damping_ratio * w, w * w], [0.0, 0.0, 0.0]]
+        )
         second = np.ascontiguousarray(expm(both * h)[:2])
     out = np.empty(count)
     rate = actuator.rate_limit * h if actuator.rate_limit < UNLIMITED else UNLIMITED
-    _followed(wanted, actuator.deadband, actuator.gain, actuator.offset, actuator.saturation, rate, shares, second, out)
+    _followed(
+        wanted,
+        actuator.deadband,
+        actuator.gain,
+        actuator.offset,
+        actuator.saturation,
+        rate,
+        shares,
+        second,
+        out,
+    )
     return np.ascontiguousarray(out[::steps])

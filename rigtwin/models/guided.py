@@ -14,11 +14,12 @@ import numpy as np
 
 from controllers.compiled import compilable
 from controllers.formula import Program, run
+from rigtwin.components import Guide
 from rigtwin.components.conditioning import Actuator, ActuatorState, conditioned
-from rigtwin.components.parts import Guide
+from rigtwin.components.guide import Friction, damping, dry_limits, resting, slid
+from rigtwin.components.sensors import Transducer, TransducerState, transduced
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Transducer, TransducerState, transduced
 
 RIGID = 1e6
 """Times inertia / step², above which a spring cannot be told from a rigid one."""
@@ -57,68 +58,33 @@ def gravity(inertia: Inertia, position: float) -> float:
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
 
 
-@compilable
-def limits(guide: Guide, velocity: float) -> tuple[float, float]:
-    """What dry friction can bear against positive and against negative motion, N."""
-    size = guide.coulomb
-    if guide.stribeck != 0.0:
-        ratio = velocity / guide.stribeck_velocity
-        size += guide.stribeck * math.exp(-ratio * ratio)
-    return max(size + 0.5 * guide.asymmetry, 0.0), max(size - 0.5 * guide.asymmetry, 0.0)
-
-
-@compilable
-def stretched(apart: float, half: float) -> float:
-    """How far the spring behind a play of 2·half is stretched."""
-    return apart - half if apart > half else (apart + half if apart < -half else 0.0)
-
-
-@compilable
-def slid(apart: float, half: float, spring: float, forward: float, backward: float) -> tuple[float, float]:
-    """(dry friction, how far the slider slid) for a distance between the joint and its slider."""
-    force = spring * stretched(apart, half)
-    if force > forward:
-        return forward, apart - half - forward / spring
-    if force < -backward:
-        return -backward, apart + half + backward / spring
-    return force, 0.0
-
-
-@compilable
-def damping(guide: Guide, velocity: float) -> float:
-    """Viscous friction's coefficient in the direction of a velocity, Ns/m."""
-    more = 0.5 * guide.viscous_asymmetry
-    return guide.viscous + (more if velocity > 0.0 else -more)
-
-
-@compilable
-def resting(guide: Guide, position: float, rest: float) -> float:
-    """The forces that depend on the position alone."""
-    force = guide.stiffness * (position - rest) + guide.offset
-    if guide.cogging != 0.0:
-        force += guide.cogging * math.sin(2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase)
-    return force
-
-
 @kernel
-def carried(guide: Guide, inertia: Inertia, spring: float, period: float, motion: Array, out: Array) -> None:
+def carried(
+    guide: Guide,
+    dry_friction: Friction,
+    inertia: Inertia,
+    spring: float,
+    period: float,
+    motion: Array,
+    out: Array,
+) -> None:
     """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape (3, ticks)."""
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
         x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
-        forward, backward = limits(guide, v)
+        transmitted = inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest)
+        forward, backward = dry_limits(dry_friction, v, transmitted)
         dry, by = slid(x - slider, 0.5 * guide.backlash, spring, forward, backward)
         slider += by
         viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = (
-            inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest) + dry + viscous + guide.drag * v * abs(v)
-        )
+        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
 
 
 @kernel
 def pushed(
     guide: Guide,
+    dry_friction: Friction,
     inertia: Inertia,
     spring: float,
     start: tuple[float, float],
@@ -152,7 +118,9 @@ def pushed(
                 loop.registers[number] = loop.recorded[tick, number]
                 for each in range(len(sensors)):
                     if each == which:
-                        loop.registers[number] = transduced(sensors[each], states[each], x if kinds[each] == 0 else v)
+                        loop.registers[number] = transduced(
+                            sensors[each], states[each], x if kinds[each] == 0 else v
+                        )
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
             earlier = force
@@ -168,7 +136,7 @@ def pushed(
             )
             total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
             rhs = inertia.mass * v + h * load
-            forward, backward = limits(guide, v)
+            forward, backward = dry_limits(dry_friction, v, 0.5 * (earlier + force))
             velocity = rhs / total
             apart = x + h * velocity - slider
             if apart > half or apart < -half:

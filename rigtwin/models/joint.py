@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from controllers.formula import formula
+from rigtwin.components import (
+    UNLIMITED,
+    ForceActuator,
+    Guide,
+    PositionActuator,
+    PositionSensor,
+    VelocitySensor,
+)
 from rigtwin.components.conditioning import actuator, holding
-from rigtwin.components.parameters import UNLIMITED
-from rigtwin.components.parts import ForceActuator, Guide, PositionActuator, PositionSensor, VelocitySensor
+from rigtwin.components.effect import Motion
+from rigtwin.components.guide import friction
+from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import fresh, seen, transducer
+from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.control import FormulaControl
 from rigtwin.machine.machine import Machine, ReplayOf, Row
+from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import followed
-from rigtwin.models.forms import joint_forms
 from rigtwin.models.guided import RIGID, Inertia, Loop, carried, pushed
-from rigtwin.models.predictor import Form, Motion
+from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smoothed, white_noise
-from rigtwin.simulation.converters import fresh, seen, transducer
 
 KEPT = 24
 """Motions that are kept."""
@@ -35,21 +44,36 @@ SEED = 7
 NO_COMMAND = formula("0", {})
 
 
-class JointReplay:
+class JointModel:
     """One replay of one recording."""
 
     def __init__(
-        self, machine: Machine, replay: ReplayOf, recording: Recording, settings: dict[str, float], steps: int
+        self,
+        machine: Machine,
+        replay: ReplayOf,
+        recording: Recording,
+        configuration: Configuration,
+        steps: int,
     ) -> None:
-        """settings: of the controller. Raises RigtwinError if a channel is missing."""
-        self._machine, self._replay, self._recording, self._steps = machine, replay, recording, steps
-        self._settings = settings
+        """Raises RigtwinError if a channel is missing."""
+        self._machine, self._replay, self._recording, self._steps = (
+            machine,
+            replay,
+            recording,
+            steps,
+        )
+        self._configuration = configuration
+        self._settings = dict(configuration.controller._asdict())
         self._period = recording.period
         self.rows: tuple[Row, ...] = replay.rows
         self._mover = machine.components[replay.moved_by[0]]
         assert self._mover.channel is not None
         topic, name = self._mover.channel
-        control = machine.control
+        self._control = control = (
+            machine.control
+            if isinstance(machine.control, FormulaControl) and replay.closed
+            else None
+        )
         self._command = np.zeros(recording.ticks)
         self._motion: Array | None = None
         self._error = 0.0
@@ -60,7 +84,7 @@ class JointReplay:
         elif not replay.closed:
             self._command = recording.column(topic, name)
         self._inputs = {}
-        if replay.closed and control is not None:
+        if control is not None:
             self._inputs = {name: channel for name, channel in control.inputs.items()}
             for channel in self._inputs.values():
                 recording.column(*channel)
@@ -74,21 +98,23 @@ class JointReplay:
         self._last: dict[tuple[object, ...], Array] = {}
         self._start = self._started()
 
-    def coarser(self) -> JointReplay:
+    def coarser(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
 
-    def finer(self) -> JointReplay:
+    def finer(self) -> JointModel:
         return self._with_steps(2 * self._steps)
 
-    def _with_steps(self, steps: int) -> JointReplay:
-        return JointReplay(self._machine, self._replay, self._recording, self._settings, steps)
+    def _with_steps(self, steps: int) -> JointModel:
+        return JointModel(self._machine, self._replay, self._recording, self._configuration, steps)
 
     def _started(self) -> tuple[float, float]:
         """Position and velocity at the start, as measured."""
         measured = [row.channel for row in self.rows if row.kind == "position"]
         for name in self._sensors:
             channel = self._machine.components[name].channel
-            if channel is not None and isinstance(getattr(self._machine.plant, name), PositionSensor):
+            if channel is not None and isinstance(
+                getattr(self._machine.plant, name), PositionSensor
+            ):
                 measured.append(channel)
         for channel in measured:
             ticks = min(max(8, round(BEGINNING / self._period)), self._recording.ticks)
@@ -97,7 +123,7 @@ class JointReplay:
             return float(curve(0.0)), float(curve.deriv()(0.0))
         return 0.0, 0.0
 
-    def _parts(self, plant: Any) -> tuple[Guide, Inertia]:
+    def _parts(self, plant: Plant) -> tuple[Guide, Inertia]:
         replay = self._replay
         guide = Guide() if replay.guide is None else getattr(plant, replay.guide)
         mass = 0.0 if replay.mass is None else getattr(plant, replay.mass).mass
@@ -108,14 +134,14 @@ class JointReplay:
         guide = Guide(*(float(value) for value in guide))
         return guide, Inertia(float(mass), joint.positions[0], spacing, load, joint.rest)
 
-    def _key(self, plant: Any) -> tuple[object, ...]:
+    def _key(self, plant: Plant) -> tuple[object, ...]:
         """What the motion depends on."""
         names = [self._replay.guide, self._replay.mass, self._mover.name, "computer"]
         if self._replay.closed:
             names += self._sensors
         return tuple(getattr(plant, name) for name in names if name is not None)
 
-    def moved(self, plant: Any, force: Array | None = None, shift: Array | None = None) -> Array:
+    def moved(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
         """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its
         prescribed motion, m; shape (ticks,)."""
         key = self._key(plant)
@@ -123,10 +149,14 @@ class JointReplay:
             return self._last[key]
         mover = getattr(plant, self._mover.name)
         if isinstance(mover, ForceActuator):
-            out = self._pushed(plant, mover, np.zeros(len(self._command)) if force is None else force)
+            out = self._pushed(
+                plant, mover, np.zeros(len(self._command)) if force is None else force
+            )
         else:
             if isinstance(mover, PositionActuator):
-                position = followed(mover, self._command, plant.computer.delay, self._period, self._steps)
+                position = followed(
+                    mover, self._command, plant.computer.delay, self._period, self._steps
+                )
                 error = 0.0
             else:
                 position = self._unsensed(mover)
@@ -153,19 +183,23 @@ class JointReplay:
         signal = (signal - sensor.offset) / sensor.gain
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
-    def _carried(self, plant: Any, position: Array, error: float) -> Array:
+    def _carried(self, plant: Plant, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
         motion = np.ascontiguousarray(np.stack([position, velocity, acceleration]))
         size = max(guide.coulomb + abs(guide.stribeck) + 0.5 * abs(guide.asymmetry), 1e-300)
-        softest = max(guide.compliance, ELASTIC * error / size, 1e-9 * max(float(np.ptp(position)), 1e-12) / size)
+        softest = max(
+            guide.compliance,
+            ELASTIC * error / size,
+            1e-9 * max(float(np.ptp(position)), 1e-12) / size,
+        )
         out = np.zeros((4, len(position)))
         out[:2] = motion[:2]
-        carried(guide, inertia, 1.0 / softest, self._period, motion, out[2])
+        carried(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
         return out
 
-    def _pushed(self, plant: Any, mover: ForceActuator, besides: Array) -> Array:
+    def _pushed(self, plant: Plant, mover: ForceActuator, besides: Array) -> Array:
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * max(inertia.mass, 1e-12) / h**2
@@ -180,6 +214,7 @@ class JointReplay:
         out = np.zeros((4, len(command)))
         pushed(
             guide,
+            friction(guide),
             inertia,
             spring,
             self._start,
@@ -201,38 +236,52 @@ class JointReplay:
         return out
 
     def _loop(self) -> Loop:
-        control = self._machine.control
-        if not self._replay.closed or control is None:
+        control = self._control
+        if control is None:
             program = NO_COMMAND.program
-            return Loop(False, program, program.registers.copy(), NO_COMMAND.memory(), np.zeros((1, 1)), np.zeros(0, np.int64))
+            return Loop(
+                False,
+                program,
+                program.registers.copy(),
+                NO_COMMAND.memory(),
+                np.zeros((1, 1)),
+                np.zeros(0, np.int64),
+            )
         program = control.formula.with_settings(self._settings)
         names = [self._machine.components[name].channel for name in self._sensors]
         channels = [control.inputs[name] for name in control.formula.inputs]
-        which = np.array([names.index(channel) if channel in names else -1 for channel in channels], np.int64)
+        which = np.array(
+            [names.index(channel) if channel in names else -1 for channel in channels], np.int64
+        )
         recorded = np.column_stack(
-            [np.zeros(self._recording.ticks), *(self._recording.column(*channel) for channel in channels)]
+            [
+                np.zeros(self._recording.ticks),
+                *(self._recording.column(*channel) for channel in channels),
+            ]
         )
         recorded = np.ascontiguousarray(recorded[:, 1:])
-        return Loop(True, program, program.registers.copy(), control.formula.memory(), recorded, which)
+        return Loop(
+            True, program, program.registers.copy(), control.formula.memory(), recorded, which
+        )
 
-    def true(self, plant: Any) -> Array:
+    def true(self, plant: Plant) -> Array:
         return self._rows(self.moved(plant))
 
     def _rows(self, moved: Array) -> Array:
         places = {"position": 0, "velocity": 1, "force": 2, "command": 3}
         return moved[[places[row.kind] for row in self.rows]]
 
-    def _seen(self, plant: Any, true: Array) -> Array:
+    def _seen(self, plant: Plant, true: Array) -> Array:
         found = true.copy()
         for number, row in enumerate(self.rows):
             if row.kind != "command":
                 found[number] = seen(getattr(plant, row.name), true[number], self._period)
         return found
 
-    def sensed(self, plant: Any) -> Array:
+    def sensed(self, plant: Plant) -> Array:
         return self._seen(plant, self.true(plant))
 
-    def disturbed(self, plant: Any, entry: str, amount: Array) -> Array:
+    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         if entry == "force":
             return self._seen(plant, self._rows(self.moved(plant, force=amount)))
         if entry == "motion":
@@ -243,7 +292,11 @@ class JointReplay:
 
     def places(self) -> tuple[str, ...]:
         replay = self._replay
-        moving = [replay.guide, replay.mass] if any(row.kind != "position" for row in self.rows) or self._free else []
+        moving = (
+            [replay.guide, replay.mass]
+            if any(row.kind != "position" for row in self.rows) or self._free
+            else []
+        )
         sensors = [row.name for row in self.rows if row.kind != "command"]
         return tuple(name for name in (*moving, self._mover.name, *sensors) if name is not None)
 
@@ -251,15 +304,19 @@ class JointReplay:
     def _free(self) -> bool:
         return isinstance(getattr(self._machine.plant, self._mover.name), ForceActuator)
 
-    def forms(self, component: str, plant: Any) -> list[Form]:
+    def forms(self, component: str, plant: Plant) -> list[Form]:
         moved = self.moved(plant)
         names = [row.name for row in self.rows]
+        role, entry, signal = "guide", "force", moved[2]
         if component in names:
-            return joint_forms("sensor", component, self.sensed(plant)[names.index(component)], moved, self._period)
-        if component == self._mover.name and not self._free:
-            return joint_forms("motion", "motion", moved[0], moved, self._period)
-        kind = "drive" if component == self._mover.name else "mass" if component == self._replay.mass else "guide"
-        return joint_forms(kind, "force", moved[2], moved, self._period)
+            role, entry, signal = "sensor", component, self.sensed(plant)[names.index(component)]
+        elif component == self._mover.name:
+            role, entry, signal = (
+                ("force", "force", moved[2]) if self._free else ("position", "motion", moved[0])
+            )
+        elif component == self._replay.mass:
+            role = "mass"
+        return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._period))
 
     def strength(self, entry: str) -> float:
         moved = self.moved(self._machine.plant)
@@ -268,11 +325,11 @@ class JointReplay:
         number = [row.name for row in self.rows].index(entry)
         return SMALL * max(float(np.std(self._rows(moved)[number])), 1e-9)
 
-    def motion(self, component: str, plant: Any) -> Motion:  # noqa: ARG002
+    def motion(self, component: str, plant: Plant) -> Motion:  # noqa: ARG002
         moved = self.moved(plant)
         return Motion(moved[0], moved[1], moved[2])
 
-    def carried_noise(self, plant: Any) -> Array | None:
+    def carried_noise(self, plant: Plant) -> Array | None:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
@@ -280,20 +337,25 @@ class JointReplay:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smoothed(self._motion + level * random.standard_normal(ticks), self._period)
-            return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(self.moved(plant))
-        if not self._replay.closed or not self._sensors:
+            return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(
+                self.moved(plant)
+            )
+        control = self._control
+        if control is None or not self._sensors:
             return None
-        control = self._machine.control
-        assert control is not None
         sensed = [self._machine.components[name].channel for name in self._sensors]
         noisy, quiet = [], []
         for name in control.formula.inputs:
             channel = control.inputs[name]
             column = self._recording.column(*channel)
             quiet.append(column)
-            noisy.append(column + white_noise(column) * random.standard_normal(ticks) if channel in sensed else column)
-        settings = self._settings
-        difference = control.formula.replayed(settings, noisy, self._period) - control.formula.replayed(
+            noisy.append(
+                column + white_noise(column) * random.standard_normal(ticks)
+                if channel in sensed
+                else column
+            )
+        settings = self._configuration.controller
+        difference = control.replay(settings, noisy, self._period) - control.replay(
             settings, quiet, self._period
         )
         found = np.zeros((len(self.rows), ticks))

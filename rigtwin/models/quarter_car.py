@@ -17,25 +17,56 @@ import numpy as np
 from controllers import Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
+from rigtwin.components import Computer, Cylinder, Motor, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
-from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
-from rigtwin.components.friction import breakaway
+from rigtwin.components.cylinder import (
+    CylinderModel,
+    CylinderState,
+    advance_cylinder,
+    next_position,
+    sampled,
+    settled,
+)
+from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.parameters import Computer, Cylinder, Motor, Plant
+from rigtwin.components.guide import breakaway
+from rigtwin.components.sensors import seen
 from rigtwin.machine.configuration import Configuration
-from rigtwin.models.predictor import Form, Motion
-from rigtwin.models.quarter_car_forms import PLACES, STRENGTH, quarter_car_forms, signals
+from rigtwin.models.basis import Passage, forms
+from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import seen, sensors
+from rigtwin.recording import Recording
+from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import YIELDING, Contacts, contacts, deflected, stiffening
 
+PLACES = (
+    "motor",
+    "rail",
+    "tyre",
+    "carriage",
+    "ground_cylinder",
+    "structure_cylinder",
+    *Measurements._fields,
+)
+"""Components that are disturbed in turn."""
+STRENGTH = {"m": 1e-4, "N": 4.0}
+"""rms of each disturbance as tried; its response is taken as in proportion to it."""
 KEPT = 64
 """Motions of plates that are kept."""
 
 KEPT_MOTIONS = 7
 """Motions of the whole plant that are kept."""
-MECHANICAL = ("carriage", "rail", "tyre", "motor", "gas_spring", "ground_cylinder", "structure_cylinder", "computer")
+MECHANICAL = (
+    "carriage",
+    "rail",
+    "tyre",
+    "motor",
+    "gas_spring",
+    "ground_cylinder",
+    "structure_cylinder",
+    "computer",
+)
 """Components that the true motion depends on."""
 
 
@@ -89,19 +120,36 @@ def _plate(
 
 
 def plate(
-    cylinder: Cylinder, computer: Computer, commands: Array, start: float, at: float | None, timestep: float, steps: int
+    cylinder: Cylinder,
+    computer: Computer,
+    commands: Array,
+    start: float,
+    at: float | None,
+    timestep: float,
+    steps: int,
 ) -> Plate:
     """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where that command holds it."""
     conditioning = actuator(cylinder, computer, timestep)
     held = holding(conditioning, start)
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
     state = settled(cylinder, float(held.memory[3]) if at is None else at)
-    _plate(sampled(cylinder, timestep), state, conditioning, held, commands, steps, out.position, out.onward)
+    _plate(
+        sampled(cylinder, timestep),
+        state,
+        conditioning,
+        held,
+        commands,
+        steps,
+        out.position,
+        out.onward,
+    )
     return out
 
 
 @compilable
-def sliding(rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float) -> float:
+def sliding(
+    rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
+) -> float:
     """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
     against positive and negative v; motor: against positive and negative plate − v, plate being the plate's velocity."""
     below = (rhs + rail[1] + motor[0]) / inertia
@@ -110,13 +158,22 @@ def sliding(rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[
     above = (rhs - rail[0] - motor[1]) / inertia
     if above > max(0.0, plate):
         return above
-    between = (rhs - rail[0] + motor[0]) / inertia if plate > 0.0 else (rhs + rail[1] - motor[1]) / inertia
+    between = (
+        (rhs - rail[0] + motor[0]) / inertia
+        if plate > 0.0
+        else (rhs + rail[1] - motor[1]) / inertia
+    )
     return min(max(between, min(0.0, plate)), max(0.0, plate))
 
 
 @compilable
 def motor_friction(
-    rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float, velocity: float
+    rhs: float,
+    inertia: float,
+    rail: tuple[float, float],
+    motor: tuple[float, float],
+    plate: float,
+    velocity: float,
 ) -> float:
     """The dry friction of the motor at that solution, as an impulse on the carriage in Ns."""
     if velocity < plate:
@@ -168,27 +225,42 @@ def _mechanics(
                 ground_there, structure_there = ground[place + 1], structure[place + 1]
             plate_velocity = (structure_there - structure_here) / h
             ground_velocity = (ground_there - ground_here) / h
-            structure_now, ground_now = structure_here + now.yielded[1], ground_here + now.yielded[0]
+            structure_now, ground_now = (
+                structure_here + now.yielded[1],
+                ground_here + now.yielded[0],
+            )
             if step > 0 or (step == 0 and tick > 0):
                 plate_velocity += (now.yielded[1] - structure_before) / h
                 ground_velocity += (now.yielded[0] - ground_before) / h
             travel = structure_now - x
             deflection = ground_now - x
-            rail, motor = (h * now.rail.coulomb, h * now.rail.coulomb), (h * now.motor.coulomb, h * now.motor.coulomb)
+            rail, motor = (
+                (h * now.rail.coulomb, h * now.rail.coulomb),
+                (h * now.motor.coulomb, h * now.motor.coulomb),
+            )
             bias = beside = 0.0
             if now.changing:
-                forward, backward = breakaway(now.rail, now.rail_gap, x, v)
+                forward, backward = breakaway(now.rail, now.rail_gap, x, v, force)
                 rail = (h * forward, h * backward)
-                forward, backward = breakaway(now.motor, now.motor_gap, travel, plate_velocity - v)
+                forward, backward = breakaway(
+                    now.motor, now.motor_gap, travel, plate_velocity - v, force
+                )
                 motor = (h * forward, h * backward)
-                bias = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
+                bias = now.cogging * math.sin(
+                    2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase
+                )
             if now.gas.force > 0.0:
                 beside = spring_force(now.gas, -travel)
-            free = carriage.mass * v + h * (carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick])
+            free = carriage.mass * v + h * (
+                carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick]
+            )
             rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
                 spring = now.stiffness * deflection * stiffening(now, deflection)
-                rhs, total = free + h * (spring + now.damping * ground_velocity), inertia + h * now.damping
+                rhs, total = (
+                    free + h * (spring + now.damping * ground_velocity),
+                    inertia + h * now.damping,
+                )
             velocity = sliding(rhs, total, rail, motor, plate_velocity)
             tyre = 0.0
             if deflection > 0.0:
@@ -199,7 +271,12 @@ def _mechanics(
             dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
             cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
             if step < 0:
-                out[0, tick], out[1, tick], out[2, tick], out[3, tick] = ground_now, structure_now, travel, cell
+                out[0, tick], out[1, tick], out[2, tick], out[3, tick] = (
+                    ground_now,
+                    structure_now,
+                    travel,
+                    cell,
+                )
                 continue
             ground_before, structure_before = now.yielded[0], now.yielded[1]
             now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
@@ -211,48 +288,92 @@ def _mechanics(
             x += h * v
 
 
-class Reduced:
+class QuarterCarModel:
     """The plant under the commands of one test. Plates' motions are kept: most candidates leave them as they are."""
 
-    def __init__(self, ground: Array, structure: Array, voltage: Array, configuration: Configuration, steps: int) -> None:
+    def __init__(
+        self,
+        ground: Array,
+        structure: Array,
+        voltage: Array,
+        configuration: Configuration,
+        steps: int,
+    ) -> None:
         """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a tick."""
-        self._ground, self._structure, self._voltage = (np.ascontiguousarray(c) for c in (ground, structure, voltage))
+        self._ground, self._structure, self._voltage = (
+            np.ascontiguousarray(c) for c in (ground, structure, voltage)
+        )
         self._configuration = configuration
-        self._start, self._preload = configuration.controller.start, configuration.controller.preload
+        self._start, self._preload = (
+            configuration.controller.start,
+            configuration.controller.preload,
+        )
         self._period, self._steps = configuration.timing.period, steps
         self._last: dict[tuple[object, ...], Array] = {}
         self._plates: dict[tuple[object, ...], Plate] = {}
 
-    def coarser(self) -> Reduced:
+    @classmethod
+    def of(cls, recording: Recording, configuration: Configuration, steps: int) -> QuarterCarModel:
+        """Under the commands of a recording. Raises RigtwinError if one is missing."""
+        ground, structure, voltage = (
+            recording.column("/command", name) for name in ("ground", "structure", "voltage")
+        )
+        return cls(ground, structure, voltage, configuration, steps)
+
+    def coarser(self) -> QuarterCarModel:
         """The same with half as many steps."""
-        return Reduced(self._ground, self._structure, self._voltage, self._configuration, max(1, self._steps // 2))
+        return QuarterCarModel(
+            self._ground,
+            self._structure,
+            self._voltage,
+            self._configuration,
+            max(1, self._steps // 2),
+        )
 
-    def finer(self) -> Reduced:
+    def finer(self) -> QuarterCarModel:
         """The same with twice as many steps."""
-        return Reduced(self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps)
+        return QuarterCarModel(
+            self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
+        )
 
-    def _plate(self, cylinder: Cylinder, computer: Computer, commands: Array, start: float, at: float | None) -> Plate:
+    def _plate(
+        self,
+        cylinder: Cylinder,
+        computer: Computer,
+        commands: Array,
+        start: float,
+        at: float | None,
+    ) -> Plate:
         unloaded = cylinder._replace(compliance=0.0)
         key = (unloaded, computer.delay, id(commands), at)
         found = self._plates.get(key)
         if found is None:
             if len(self._plates) > KEPT:
                 self._plates.clear()
-            found = plate(unloaded, computer, commands, start, at, self._period / self._steps, self._steps)
+            found = plate(
+                unloaded, computer, commands, start, at, self._period / self._steps, self._steps
+            )
             self._plates[key] = found
         return found
 
-    def true(self, plant: Plant, besides: Disturbances | None = None) -> Array:
+    def true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
         """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
         does not know."""
         timestep = self._period / self._steps
-        ground = self._plate(plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None)
+        ground = self._plate(
+            plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
+        )
         # The spring is uncompressed at the start, the tyre carries the preload.
         start = float(ground.position[0]) - deflected(plant, self._preload)
-        structure = self._plate(plant.structure_cylinder, plant.computer, self._structure, self._start, start)
+        structure = self._plate(
+            plant.structure_cylinder, plant.computer, self._structure, self._start, start
+        )
         nothing = np.zeros_like(self._voltage)
         besides = besides or Disturbances(nothing, nothing, nothing, nothing)
-        ground, structure = self._displaced(ground, besides.ground), self._displaced(structure, besides.structure)
+        ground, structure = (
+            self._displaced(ground, besides.ground),
+            self._displaced(structure, besides.structure),
+        )
         motor: Motor = plant.motor
         carriage = Carriage(
             timestep,
@@ -291,7 +412,7 @@ class Reduced:
         ahead = motion[np.arange(len(by)) * self._steps + 1]
         return Plate(of.position + motion, of.onward + ahead)
 
-    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+    def disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
         """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
         Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
         if entry in Measurements._fields:
@@ -301,19 +422,46 @@ class Reduced:
         amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
         amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
         true = self.true(plant, Disturbances(**amounts))
-        return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
+        return np.stack(
+            [
+                seen(sensor, row, self._period)
+                for sensor, row in zip(sensors(plant), true, strict=True)
+            ]
+        )
 
     def places(self) -> tuple[str, ...]:
         return PLACES
 
-    def forms(self, component: str, plant: Plant) -> list[Form]:
-        through = signals(self.true(plant), self.sensed(plant), self._period)
-        return [Form(*each) for each in quarter_car_forms(component, through)]
+    def forms(self, component: str, plant: RigPlant) -> list[Form]:
+        true, sensed = self.true(plant), self.sensed(plant)
+        wheel = true[1] - true[2]
+        wheel_speed, sliding = np.gradient(wheel, self._period), np.gradient(true[2], self._period)
+
+        def made(
+            role: str,
+            entry: str,
+            signal: Array,
+            position: Array = wheel,
+            speed: Array = wheel_speed,
+        ) -> list[Form]:
+            return forms(role, entry, Passage(signal, position, speed, true[3], self._period))
+
+        if component in Measurements._fields:
+            signal = sensed[Measurements._fields.index(component)]
+            return made("load cell" if component == "load_cell" else "sensor", component, signal)
+        if component in ("ground_cylinder", "structure_cylinder"):
+            place = component.removesuffix("_cylinder")
+            return made("cylinder", place, sensed[("ground", "structure").index(place)])
+        if component == "motor":
+            return made("motor", "voltage", true[3], true[2], sliding)
+        if component == "tyre":
+            return made("tyre", "force", np.maximum(true[0] - wheel, 0.0))
+        return made("rail" if component == "rail" else "mass", "force", wheel)
 
     def strength(self, entry: str) -> float:
         return STRENGTH["N" if entry in ("voltage", "force", "load_cell") else "m"]
 
-    def motion(self, component: str, plant: Plant) -> Motion:
+    def motion(self, component: str, plant: RigPlant) -> Motion:
         true = self.true(plant)
         if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
             position = true[2]
@@ -325,10 +473,10 @@ class Reduced:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
-    def carried_noise(self, plant: Plant) -> None:
+    def carried_noise(self, plant: RigPlant) -> None:
         """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
 
-    def sensed(self, plant: Plant) -> Array:
+    def sensed(self, plant: RigPlant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
         mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
         true = self._last.get(mechanical)
@@ -336,4 +484,9 @@ class Reduced:
             true = self.true(plant)
             # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
-        return np.stack([seen(sensor, row, self._period) for sensor, row in zip(sensors(plant), true, strict=True)])
+        return np.stack(
+            [
+                seen(sensor, row, self._period)
+                for sensor, row in zip(sensors(plant), true, strict=True)
+            ]
+        )

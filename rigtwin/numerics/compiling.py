@@ -43,7 +43,9 @@ def _digest() -> str:
 
 
 def _cache_folder() -> Path | None:
-    folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rigtwin" / _digest()
+    folder = (
+        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rigtwin" / _digest()
+    )
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -55,7 +57,9 @@ llvmlite.binding.load_library_permanently(str(_mujoco_library()))
 _CACHE = _cache_folder()
 
 _STRUCTURES = (types.intp, types.intp)
-forward = types.ExternalFunction("mj_forwardSkip", types.void(*_STRUCTURES, types.int32, types.int32))
+forward = types.ExternalFunction(
+    "mj_forwardSkip", types.void(*_STRUCTURES, types.int32, types.int32)
+)
 """mj_forwardSkip(model, data, stage to skip up to, whether to skip sensors)."""
 step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
 """mj_step(model, data): a whole step."""

@@ -22,4 +22,6 @@ def delayed(history: Array, memory: Array, delay: float, sample: float) -> float
     memory[0] = (place + 1) % length
     whole = int(delay)
     part = delay - whole
-    return (1.0 - part) * history[(place - whole) % length] + part * history[(place - whole - 1) % length]
+    return (1.0 - part) * history[(place - whole) % length] + part * history[
+        (place - whole - 1) % length
+    ]

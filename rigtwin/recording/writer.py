@@ -40,7 +40,16 @@ from numpy.typing import NDArray
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
-from rigtwin.recording.schema import END_RECORD, FIELD, RECORD, TWIN_RECORD, WRITTEN_FORMAT, descriptor, tags, type_name
+from rigtwin.recording.schema import (
+    END_RECORD,
+    FIELD,
+    RECORD,
+    TWIN_RECORD,
+    WRITTEN_FORMAT,
+    descriptor,
+    tags,
+    type_name,
+)
 
 _MESSAGE = [
     ("opcode", "u1"),

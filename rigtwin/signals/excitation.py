@@ -33,7 +33,9 @@ def road_spectrum(road: Road) -> tuple[Array, Array]:
     Raises RigtwinError if the band is empty.
     """
     if road.highest < road.lowest:
-        raise RigtwinError(f"road.highest = {road.highest:g} Hz is below road.lowest = {road.lowest:g} Hz")
+        raise RigtwinError(
+            f"road.highest = {road.highest:g} Hz is below road.lowest = {road.lowest:g} Hz"
+        )
     count = int((road.highest - road.lowest) / road.spacing + 1e-9) + 1
     frequencies = road.lowest + road.spacing * np.arange(count)
     density = road.roughness / (frequencies / road.speed) ** road.exponent
@@ -52,7 +54,13 @@ def road_profile(road: Road, time: Array, random: np.random.Generator) -> Array:
 
 
 def multisine(
-    time: Array, lowest: float, highest: float, spacing: float, slope: float, rms: float, random: np.random.Generator
+    time: Array,
+    lowest: float,
+    highest: float,
+    spacing: float,
+    slope: float,
+    rms: float,
+    random: np.random.Generator,
 ) -> Array:
     """Random-phase multisine, amplitudes ∝ frequency^-slope, scaled to `rms`, faded in over the first second.
 

@@ -71,12 +71,21 @@ def without_mains(signal: Array, period: float, frequency: float) -> Array:
     def power(candidate: float) -> float:
         return -abs(np.sum(window * centred * np.exp(-2j * math.pi * candidate * time)))
 
-    found = minimize_scalar(power, bounds=(peak - width, peak + width), method="bounded", options={"xatol": width * 1e-3})
+    found = minimize_scalar(
+        power,
+        bounds=(peak - width, peak + width),
+        method="bounded",
+        options={"xatol": width * 1e-3},
+    )
     return _less_line(signal, centred, window, time, float(found.x))
 
 
-def _less_line(signal: Array, centred: Array, window: Array, time: Array, frequency: float) -> Array:
-    basis = np.column_stack([np.cos(2 * math.pi * frequency * time), np.sin(2 * math.pi * frequency * time)])
+def _less_line(
+    signal: Array, centred: Array, window: Array, time: Array, frequency: float
+) -> Array:
+    basis = np.column_stack(
+        [np.cos(2 * math.pi * frequency * time), np.sin(2 * math.pi * frequency * time)]
+    )
     weights, *_ = np.linalg.lstsq(window[:, None] * basis, window * centred, rcond=None)
     return signal - basis @ weights
 
@@ -116,13 +125,18 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
     difference = without_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
     padding = min(PADDING, len(difference) - 1)
-    start, end = 2 * difference[0] - difference[padding:0:-1], 2 * difference[-1] - difference[-2 : -2 - padding : -1]
+    start, end = (
+        2 * difference[0] - difference[padding:0:-1],
+        2 * difference[-1] - difference[-2 : -2 - padding : -1],
+    )
     extended = np.concatenate([start, difference, end]) - offset
     frequencies, density = spectrum(difference - offset, period)
     noise = 2 * white_noise(measured) ** 2 * period
     gain = wiener_gain(frequencies, density, noise)
     # The error of a Wiener filter has the density noise·gain; it is differentiated here.
-    error = math.sqrt(np.sum((2 * math.pi * frequencies) ** 2 * noise * gain) * float(frequencies[1]))
+    error = math.sqrt(
+        np.sum((2 * math.pi * frequencies) ** 2 * noise * gain) * float(frequencies[1])
+    )
     grid = np.fft.rfftfreq(len(extended), period)
     kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))
     correction = offset + kept[padding : padding + len(difference)]
@@ -141,7 +155,12 @@ def smoothed(signal: Array, period: float) -> tuple[Array, float]:
     frequencies, density = spectrum(extended, period)
     gain = wiener_gain(frequencies, density, 2 * noise**2 * period)
     grid = np.fft.rfftfreq(len(extended), period)
-    kept = line + np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[:count]
+    kept = (
+        line
+        + np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[
+            :count
+        ]
+    )
     error = noise * math.sqrt(float(np.mean(gain)))
     return _rested(kept, error, max(3, round(REST / period))), error
 

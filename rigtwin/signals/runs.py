@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import smallest_step, white_noise
 
 FLAT = 8
 """Equal samples in a row at a signal's very end of range: it is cut off there."""
@@ -19,3 +20,15 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
         return 0, 1
     longest = int(np.argmax(ends - starts))
     return int(starts[longest]), int(ends[longest] - starts[longest]) + 1
+
+
+def cut_off(signal: Array) -> np.ndarray:
+    """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
+    found = np.zeros(len(signal), bool)
+    if white_noise(signal) >= smallest_step(signal):
+        # Bits coarser than the noise stand still at rest too.
+        for extreme in (signal.min(), signal.max()):
+            at_end = signal == extreme
+            if longest_run(signal, at_end)[1] >= FLAT:
+                found |= at_end
+    return found

@@ -75,7 +75,11 @@ def _structure(settings: Settings) -> _Structure:
 def ideal(configuration: Configuration, ground: Array) -> Ideal:
     """The system that a test emulates, started as the rig starts: a body or a cross of beams on a spring and damper with
     skyhook, on the ground (single mass) or on a wheel and its tyre (quarter car). ground: m, held over each tick."""
-    settings, plant, period = configuration.controller, configuration.plant, configuration.timing.period
+    settings, plant, period = (
+        configuration.controller,
+        configuration.plant,
+        configuration.timing.period,
+    )
     body = _structure(settings)
     count = len(body.squares)
     on_wheel = settings.travel == Travel.WHEEL
@@ -88,7 +92,10 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     inputs = np.column_stack([ground, rate, np.ones_like(ground), np.zeros_like(ground)])
     position, velocity, wheel, wheel_rate = (np.zeros(size) for _ in range(4))
     position[:count], velocity[count : 2 * count] = body.centre, body.centre
-    force, force_in = -k * position - (b + sky) * velocity, np.array([0.0, 0.0, settings.preload, -1.0])
+    force, force_in = (
+        -k * position - (b + sky) * velocity,
+        np.array([0.0, 0.0, settings.preload, -1.0]),
+    )
     if on_wheel:
         wheel[-2], wheel_rate[-1] = 1.0, 1.0
         force += k * wheel + b * wheel_rate
@@ -97,7 +104,10 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     a, entry = np.zeros((size, size)), np.zeros((size, 4))
     for mode in range(count):
         a[mode, count + mode] = 1.0
-        a[count + mode, mode], a[count + mode, count + mode] = -body.squares[mode], -body.damping[mode]
+        a[count + mode, mode], a[count + mode, count + mode] = (
+            -body.squares[mode],
+            -body.damping[mode],
+        )
         a[count + mode] += body.centre[mode] * force
         entry[count + mode] = body.centre[mode] * force_in
         entry[count + mode, 2] += body.weight[mode]
@@ -111,7 +121,9 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     start[:count] = body.start
     if on_wheel:
         start[-2] = ground[0] - deflected(plant, settings.preload)
-    substeps = SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
+    substeps = (
+        SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
+    )
     transition, step = _sampled(a, entry, period / substeps)
     states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
     rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
@@ -132,7 +144,9 @@ def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
     both = np.zeros((count + entry.shape[1],) * 2)
     both[:count, :count], both[:count, count:] = a, entry
     sampled = expm(both * period)
-    return np.ascontiguousarray(sampled[:count, :count]), np.ascontiguousarray(sampled[:count, count:])
+    return np.ascontiguousarray(sampled[:count, :count]), np.ascontiguousarray(
+        sampled[:count, count:]
+    )
 
 
 @kernel
@@ -156,14 +170,20 @@ def _simulated(
         given[:] = inputs[tick]
         for part in range(substeps):
             if substeps > 1:
-                sprung, velocity, travel = np.dot(rows[0], state), np.dot(rows[1], state), np.dot(rows[2], state)
+                sprung, velocity, travel = (
+                    np.dot(rows[0], state),
+                    np.dot(rows[1], state),
+                    np.dot(rows[2], state),
+                )
                 if not on_wheel:
                     velocity, travel = velocity - given[1], travel - given[0]
                 given[3] = 0.0
                 if settings.skyhook == Skyhook.SEMI_ACTIVE:
                     given[3] += semi_active_damping(settings, sprung, velocity) * velocity
                 if settings.gas_force > 0.0:
-                    given[3] -= gas_force(settings.gas_force, settings.gas_length, settings.gas_exponent, -travel)
+                    given[3] -= gas_force(
+                        settings.gas_force, settings.gas_length, settings.gas_exponent, -travel
+                    )
             if part == 0:
                 states[tick] = state
                 besides[tick] = given[3]

@@ -13,7 +13,18 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from controllers import SIZE, Commands, Controller, Demand, Measurements, controller, initial_state, packed, unpacked, update
+from controllers import (
+    SIZE,
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
 from rigtwin.machine.configuration import Configuration, Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -60,7 +71,9 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
                 else:
                     state, commands = update(controlling, state, measured, Demand(*demand.tolist()))
                 rows.append((commands, measured))
-                number, column = judged(configuration.safety, configuration.timing.period, watch, measured, commands)
+                number, column = judged(
+                    configuration.safety, configuration.timing.period, watch, measured, commands
+                )
                 trip = Trip(number)
                 if trip != Trip.NONE:
                     break
@@ -122,7 +135,9 @@ def _ticks(
     return done, trip, column
 
 
-def run_compiled(twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK) -> Iterator[Block]:
+def run_compiled(
+    twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK
+) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
     controlling = controller(configuration.controller, configuration.timing.period)
     memory, watch = np.array(packed(initial_state(controlling))), watching_compiled()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import mujoco
 
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.numerics.arrays import Array
 
 SCENE = files("models") / "xml" / "scene.xml"
@@ -50,7 +50,7 @@ def _nominal() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(MECHANICS))
 
 
-def build(plant: Plant, timestep: float) -> mujoco.MjModel:
+def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:
     """The mechanics of that plant. timestep in s."""
     model = copy(_nominal())
     model.opt.timestep = timestep

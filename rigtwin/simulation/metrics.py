@@ -45,7 +45,13 @@ def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) 
 def tracking(recording: Recording, configuration: Configuration) -> Tracking:
     """e1 and e2 of a recorded test. What was sensed is without noise where a twin knows it."""
     known = "/truth" in recording.columns
-    structure = recording.column("/truth", "structure") if known else recording.column("/sensor", "structure_lvdt")
+    structure = (
+        recording.column("/truth", "structure")
+        if known
+        else recording.column("/sensor", "structure_lvdt")
+    )
     load_cell = recording.column("/truth" if known else "/sensor", "load_cell")
-    commands = np.column_stack([recording.column("/command", name) for name in ("ground", "structure", "force")])
+    commands = np.column_stack(
+        [recording.column("/command", name) for name in ("ground", "structure", "force")]
+    )
     return tracked(ideal(configuration, commands[:, 0]), commands, structure, load_cell)

@@ -10,17 +10,23 @@ import numpy as np
 
 from controllers import Measurements
 from controllers.compiled import compilable
+from rigtwin.components import GasSpring, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
-from rigtwin.components.cylinder import CylinderModel, CylinderState, advance_cylinder, next_position, sampled, settled
-from rigtwin.components.friction import Friction, breakaway, friction, gap_at
+from rigtwin.components.cylinder import (
+    CylinderModel,
+    CylinderState,
+    advance_cylinder,
+    next_position,
+    sampled,
+    settled,
+)
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.parameters import GasSpring, Plant
+from rigtwin.components.guide import Friction, breakaway, friction, gap_at
+from rigtwin.components.tyre import SCALE
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
 
-SCALE = 0.01
-"""m; at this deflection a tyre hardens as much whatever the power of its law."""
 YIELDING = 5e-3
 """s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
 
@@ -67,7 +73,7 @@ class Machine(NamedTuple):
     contacts: Contacts
 
 
-def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
+def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
     """The plant's contacts with the carriage and the travel at those positions, m."""
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
@@ -91,34 +97,42 @@ def contacts(plant: Plant, carriage: float, travel: float) -> Contacts:
     )
 
 
-def deflected(plant: Plant, preload: float) -> float:
+def deflected(plant: RigPlant, preload: float) -> float:
     """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
-
-
-def tyre_force(plant: Plant, deflection: Array, rate: Array) -> Array:
-    """What the tyre pushes with, N, at a deflection (m) that changes at a rate (m/s); it cannot pull."""
-    tyre, squeezed = plant.tyre, np.maximum(deflection, 0.0)
-    slope = np.maximum(1.0 + tyre.hardening * squeezed * (squeezed / SCALE) ** (tyre.hardening_power - 1.0), 0.0)
-    return np.maximum(tyre.stiffness * slope * squeezed + np.where(deflection > 0.0, tyre.damping * rate, 0.0), 0.0)
 
 
 class Simulation:
     """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
     at rest. Owns the MuJoCo structures that `machine` looks into."""
 
-    def __init__(self, plant: Plant, timestep: float, substeps: int, ground: float, structure: float, preload: float) -> None:
+    def __init__(
+        self,
+        plant: RigPlant,
+        timestep: float,
+        substeps: int,
+        ground: float,
+        structure: float,
+        preload: float,
+    ) -> None:
         """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
         drives = [
-            actuator(of, plant.computer, timestep) for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
+            actuator(of, plant.computer, timestep)
+            for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
         ]
-        held = [holding(drives[0], ground), holding(drives[1], structure), holding(drives[2], preload / plant.motor.constant)]
+        held = [
+            holding(drives[0], ground),
+            holding(drives[1], structure),
+            holding(drives[2], preload / plant.motor.constant),
+        ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(plant, preload)
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(
+            plant, preload
+        )
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
         self.machine = Machine(
@@ -163,7 +177,9 @@ def stiffening(now: Contacts, deflection: float) -> float:
     """How many times its nominal secant stiffness the tyre has at a deflection, m."""
     if now.hardening == 0.0 or deflection <= 0.0:
         return 1.0
-    return max(1.0 + now.hardening * deflection * (deflection / SCALE) ** (now.hardening_power - 1.0), 0.0)
+    return max(
+        1.0 + now.hardening * deflection * (deflection / SCALE) ** (now.hardening_power - 1.0), 0.0
+    )
 
 
 @compilable
@@ -174,13 +190,14 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
     travel = mechanics.qpos[mechanics.structure] - carriage
     sliding = mechanics.qvel[mechanics.structure] - velocity
+    load = mechanics.motor_constant * mechanics.activation[0]
     # MuJoCo's dry friction is the same both ways; what one way has more is a force besides.
-    forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity)
+    forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity, load)
     mechanics.rail_friction[0] = 0.5 * (forward + backward)
     mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
     if now.gas.force > 0.0:
         mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
-    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding)
+    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
     mechanics.motor_friction[0] = 0.5 * (forward + backward)
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
     mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
@@ -193,7 +210,11 @@ def give_way(mechanics: Handles, now: Contacts) -> None:
     """Lets compliant cylinders yield to the load of the last step."""
     share = mechanics.timestep / (YIELDING + mechanics.timestep)
     tyre = -mechanics.constraint[mechanics.ground]
-    cell = mechanics.constraint[mechanics.structure] + mechanics.passive[mechanics.structure] + motor_force(mechanics)
+    cell = (
+        mechanics.constraint[mechanics.structure]
+        + mechanics.passive[mechanics.structure]
+        + motor_force(mechanics)
+    )
     now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
     now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
 
@@ -214,10 +235,15 @@ def sense(machine: Machine) -> Measurements:
     that accelerates the carriage with the plate, which a velocity one timestep old would not show.
     """
     mechanics, yielded = machine.mechanics, machine.contacts.yielded
-    ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+    ground, structure = (
+        machine.ground_state.position[0] + yielded[0],
+        machine.structure_state.position[0] + yielded[1],
+    )
     onward = next_position(machine.ground, machine.ground_state, machine.ground_command.memory[3])
     drive(mechanics, mechanics.ground, ground, onward + yielded[0])
-    onward = next_position(machine.structure, machine.structure_state, machine.structure_command.memory[3])
+    onward = next_position(
+        machine.structure, machine.structure_state, machine.structure_command.memory[3]
+    )
     drive(mechanics, mechanics.structure, structure, onward + yielded[1])
     touch(mechanics, machine.contacts)
     brace(mechanics)
@@ -226,7 +252,9 @@ def sense(machine: Machine) -> Measurements:
 
 
 @compilable
-def advance(machine: Machine, ground_command: float, structure_command: float, voltage: float) -> None:
+def advance(
+    machine: Machine, ground_command: float, structure_command: float, voltage: float
+) -> None:
     """One control period with the commands held."""
     if machine.plain:
         advance_plain(
@@ -245,7 +273,10 @@ def advance(machine: Machine, ground_command: float, structure_command: float, v
         return
     mechanics, yielded = machine.mechanics, machine.contacts.yielded
     for _ in range(machine.substeps):
-        ground, structure = machine.ground_state.position[0] + yielded[0], machine.structure_state.position[0] + yielded[1]
+        ground, structure = (
+            machine.ground_state.position[0] + yielded[0],
+            machine.structure_state.position[0] + yielded[1],
+        )
         asked = conditioned(machine.ground_drive, machine.ground_command, ground_command)
         advance_cylinder(machine.ground, machine.ground_state, asked)
         asked = conditioned(machine.structure_drive, machine.structure_command, structure_command)
@@ -254,7 +285,12 @@ def advance(machine: Machine, ground_command: float, structure_command: float, v
         if machine.contacts.changing:
             give_way(mechanics, machine.contacts)
         drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])
-        drive(mechanics, mechanics.structure, structure, machine.structure_state.position[0] + yielded[1])
+        drive(
+            mechanics,
+            mechanics.structure,
+            structure,
+            machine.structure_state.position[0] + yielded[1],
+        )
         touch(mechanics, machine.contacts)
         brace(mechanics)
         forward(mechanics.model, mechanics.data, 0, 1)

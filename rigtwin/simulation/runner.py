@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin import __version__
-from rigtwin.machine.configuration import Configuration, Safety, flattened
-from rigtwin.machine.effects import applied
+from rigtwin.machine.configuration import Configuration, Safety, applied, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.simulation.loop import run_compiled
@@ -42,9 +41,14 @@ class Ran:
 
 def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
     """Runs `demands`, shape (ticks, 3), on the twin and keeps everything in memory."""
-    blocks = list(run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands))
+    blocks = list(
+        run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
+    )
     truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
-    commands, measured = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("commands", "measurements"))
+    commands, measured = (
+        np.concatenate([getattr(block, name) for block in blocks])
+        for name in ("commands", "measurements")
+    )
     return Ran(commands, measured, truth, blocks[-1].trip)
 
 

@@ -16,11 +16,11 @@ import numpy as np
 from controllers import Commands, Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.machine.configuration import Safety
 from rigtwin.numerics.arrays import Array
 
-MOTOR_LAG = Plant().motor.time_constant
+MOTOR_LAG = RigPlant().motor.time_constant
 """s, of the motor's force behind its voltage."""
 LEADING = 1.5
 """Times its cylinder's limit that a command may be."""
@@ -91,7 +91,9 @@ def watching_compiled() -> Watch:
 
 
 @compilable
-def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements) -> tuple[int, int]:
+def sensed_wrong(
+    limits: Safety, period: float, watch: Watch, measured: Measurements
+) -> tuple[int, int]:
     """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
     for column in range(4):
         if not math.isfinite(measured[column]):
@@ -123,7 +125,10 @@ def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurem
     if moved > limits.velocity * VELOCITY_SPAN * period:
         return _VELOCITY, 2
     # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
-    if abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt) > limits.wheel:
+    if (
+        abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt)
+        > limits.wheel
+    ):
         return _WHEEL, 2
     if abs(measured.load_cell - watch.motor[0]) > limits.motor:
         return _MOTOR, 3
@@ -131,7 +136,9 @@ def sensed_wrong(limits: Safety, period: float, watch: Watch, measured: Measurem
 
 
 @compilable
-def commanded_wrong(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
+def commanded_wrong(
+    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+) -> tuple[int, int]:
     """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
     are remembered as written."""
     for column in range(4):
@@ -161,7 +168,9 @@ def commanded_wrong(limits: Safety, period: float, watch: Watch, measured: Measu
 
 
 @compilable
-def judged(limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands) -> tuple[int, int]:
+def judged(
+    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+) -> tuple[int, int]:
     """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
     trip, column = sensed_wrong(limits, period, watch, measured)
     if trip == _NONE:
@@ -178,7 +187,10 @@ def held(limits: Safety, commands: Commands) -> Commands:
 
 def beyond(limits: Safety, measured: Measurements) -> bool:
     """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
-    ground, structure = abs(measured.ground_lvdt) <= limits.ground, abs(measured.structure_lvdt) <= limits.structure
+    ground, structure = (
+        abs(measured.ground_lvdt) <= limits.ground,
+        abs(measured.structure_lvdt) <= limits.structure,
+    )
     return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
@@ -186,7 +198,11 @@ def within(limits: Safety, measured: Measurements) -> str | None:
     """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
     hysteresis."""
     share = 1.0 - limits.hysteresis
-    for name, limit in zip(Measurements._fields, (limits.ground, limits.structure, limits.travel, limits.force), strict=True):
+    for name, limit in zip(
+        Measurements._fields,
+        (limits.ground, limits.structure, limits.travel, limits.force),
+        strict=True,
+    ):
         value = getattr(measured, name)
         if not abs(value) <= share * limit:
             return f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, {100 * share:.0f} % of its limit"

@@ -29,11 +29,17 @@ MODAL = slice(7, 7 + MODES)
 
 
 @kernel
-def _states(controlling: Controller, start: Array, measured: Array, demands: Array, out: Array) -> None:
+def _states(
+    controlling: Controller, start: Array, measured: Array, demands: Array, out: Array
+) -> None:
     state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
     for tick in range(len(measured)):
-        sample = Measurements(measured[tick, 0], measured[tick, 1], measured[tick, 2], measured[tick, 3])
-        state, _ = update(controlling, state, sample, Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]))
+        sample = Measurements(
+            measured[tick, 0], measured[tick, 1], measured[tick, 2], measured[tick, 3]
+        )
+        state, _ = update(
+            controlling, state, sample, Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
+        )
         numbers = packed(state)
         for number in range(SIZE):
             out[tick, number] = numbers[number]

@@ -44,7 +44,9 @@ class Twin:
         self.sensing = sensing(configuration.plant, configuration.timing.period)
         self._missed = np.random.default_rng([seed, 2])
         self._share_missed = configuration.plant.computer.missed_ticks
-        self.held = Commands(float(ground), controller.start, controller.preload, controller.preload / MOTOR_CONSTANT)
+        self.held = Commands(
+            float(ground), controller.start, controller.preload, controller.preload / MOTOR_CONSTANT
+        )
         self.truth = Measurements(0.0, 0.0, 0.0, 0.0)
 
     def start(self) -> None:

@@ -16,12 +16,22 @@ import dm_env
 import numpy as np
 from dm_env import specs
 
-from controllers import Commands, Controller, Demand, Measurements, Settings, State, controller, initial_state, update
+from controllers import (
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    Settings,
+    State,
+    controller,
+    initial_state,
+    update,
+)
 from controllers.quantity import Quantity, fields
+from rigtwin.components.tyre import tyre_force
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.plant import tyre_force
 from rigtwin.simulation.safety import Trip, judged, watching
 from rigtwin.simulation.twin import Twin
 
@@ -224,7 +234,7 @@ class Environment(dm_env.Environment):
         self._plate = [*self._plate[-2:], true.structure_lvdt]
         ride = (self._plate[0] - 2.0 * self._plate[1] + self._plate[2]) / period**2 if len(self._plate) == 3 else 0.0
         deflection = np.array([true.ground_lvdt - true.structure_lvdt + true.suspension_lvdt])
-        tyre = float(tyre_force(self.configuration.plant, deflection, np.zeros(1))[0]) - self._static
+        tyre = float(tyre_force(self.configuration.plant.tyre, deflection, np.zeros(1))[0]) - self._static
         travel = true.suspension_lvdt - self._sag
         return (ride / self.reward.ride) ** 2 + (tyre / self.reward.road_holding) ** 2 + (travel / self.reward.travel) ** 2
 

@@ -13,14 +13,30 @@ def add(command: Command) -> None:
 
     plot = command("plot", "draw a recording: motions, force, wheel and voltage over time")
     plot.add_argument("recording", type=Path)
-    plot.add_argument("--out", "-o", type=Path, metavar="F.png", help="png, svg or pdf (default: beside the recording)")
+    plot.add_argument(
+        "--out",
+        "-o",
+        type=Path,
+        metavar="F.png",
+        help="png, svg or pdf (default: beside the recording)",
+    )
     stretch(plot)
 
     video = command("video", "film a recording: the rig moving, its force and travel drawn beneath")
     video.add_argument("recording", type=Path)
-    video.add_argument("--out", "-o", type=Path, metavar="F.mp4", help="default: beside the recording")
-    video.add_argument("--camera", default="overview", help="overview, side or wheel (default overview)")
-    video.add_argument("--magnify", type=float, default=1.0, metavar="X", help="draw motions X times as large (default 1)")
+    video.add_argument(
+        "--out", "-o", type=Path, metavar="F.mp4", help="default: beside the recording"
+    )
+    video.add_argument(
+        "--camera", default="overview", help="overview, side or wheel (default overview)"
+    )
+    video.add_argument(
+        "--magnify",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="draw motions X times as large (default 1)",
+    )
     stretch(video)
 
     export = command("export", "write a recording as CSV or MAT for other programs")
@@ -45,4 +61,6 @@ def add(command: Command) -> None:
         "  rigtwin run friction-road --config compensator.toml",
     )
     calibrate.add_argument("recording", type=Path)
-    calibrate.add_argument("--out", "-o", type=Path, metavar="F.toml", help="where to write them (default: print)")
+    calibrate.add_argument(
+        "--out", "-o", type=Path, metavar="F.toml", help="where to write them (default: print)"
+    )

@@ -6,8 +6,16 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from controllers.compiled import compilable
-from rigtwin.components.parameters import Plant
-from rigtwin.hardware.daq.conversion import Conversion, conversion, digitised, to_values, to_volts, values_of, volts_of
+from rigtwin.components import RigPlant
+from rigtwin.hardware.daq.conversion import (
+    Conversion,
+    conversion,
+    digitised,
+    to_values,
+    to_volts,
+    values_of,
+    volts_of,
+)
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.machine.configuration import Configuration
@@ -21,7 +29,7 @@ AHEAD = 256
 """Ticks for which noise is drawn at a time."""
 
 
-def analogue(plant: Plant) -> Plant:
+def analogue(plant: RigPlant) -> RigPlant:
     """The plant with sensors that have no bits: those are the card's."""
     names = Measurements._fields
     return plant._replace(**{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)})

@@ -87,7 +87,9 @@ class _Calls(grpc.GenericRpcHandler):
     """Every call of the service, found when it is made."""
 
     def __init__(self, card: VirtualCard) -> None:
-        from nidaqmx._grpc_interpreter import grpc_types  # only nidaqmx knows the messages of its service
+        from nidaqmx._grpc_interpreter import (
+            grpc_types,  # only nidaqmx knows the messages of its service
+        )
 
         self._card, self._messages = card, grpc_types
 

@@ -19,7 +19,15 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import LOCAL, serve
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
-from rigtwin.hardware.faults.campaign import BEFORE, Fault, Outcome, judged, last_words, test_of, whole
+from rigtwin.hardware.faults.campaign import (
+    BEFORE,
+    Fault,
+    Outcome,
+    judged,
+    last_words,
+    test_of,
+    whole,
+)
 from rigtwin.hardware.realtime import in_real_time, monotonic
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.record import Test, watched

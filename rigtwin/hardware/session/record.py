@@ -19,8 +19,7 @@ from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.recorder import Keeper
 from rigtwin.hardware.session.watched import Watched
 from rigtwin.hardware.supervised import Ended, Update, supervise
-from rigtwin.machine.configuration import Configuration, flattened
-from rigtwin.machine.effects import applied
+from rigtwin.machine.configuration import Configuration, applied, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer, twin_values
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD

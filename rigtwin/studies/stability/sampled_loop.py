@@ -29,13 +29,14 @@ from controllers import (
     unpacked,
     update,
 )
+from rigtwin.components import RigPlant
 from rigtwin.components.cylinder import continuous
 from rigtwin.components.gas_spring import stiffness
-from rigtwin.components.parameters import Plant
+from rigtwin.components.tyre import tyre_force
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import deflected, tyre_force
+from rigtwin.simulation.plant import deflected
 
 PERTURBATION = 1e-6
 """In each variable's unit; far within every threshold of the controllers."""
@@ -123,7 +124,7 @@ def _entered(a: Array, b: Array, time: float) -> Array:
     return expm(both * time)[:-1, -1]
 
 
-def mechanics(plant: Plant, preload: float) -> tuple[Array, Array, Array]:
+def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     """A, B, C of the plant between the commands that act, of plate (m) and voltage (V), and plate, travel (m), load cell (N).
 
     States: cylinder, what is left of the lags of both commands, motor force, wheel position and velocity.
@@ -149,7 +150,7 @@ def mechanics(plant: Plant, preload: float) -> tuple[Array, Array, Array]:
     cell = -motor.viscous * rate
     cell[FORCE], cell[SPEED] = 1.0, motor.viscous
     squeezed, step = deflected(plant, preload), 1e-6
-    around = tyre_force(plant, np.array([squeezed - step, squeezed + step]), np.zeros(2))
+    around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0
     a[SPEED] = -cell + gas * plate

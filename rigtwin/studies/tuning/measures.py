@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from rigtwin.components.tyre import tyre_force
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, ideal
 from rigtwin.simulation.metrics import Tracking, tracked
-from rigtwin.simulation.plant import tyre_force
 from rigtwin.studies.stability.sampled_loop import decay
 
 HEAVE = 3.0
@@ -48,7 +48,7 @@ class Trial:
     def tyre(self) -> Array:
         """The tyre's force, N."""
         deflection = self.sensed[:, 0] - self.sensed[:, 1] + self.sensed[:, 2]
-        return tyre_force(self.configuration.plant, deflection, np.gradient(deflection, self.period))[self.first :]
+        return tyre_force(self.configuration.plant.tyre, deflection, np.gradient(deflection, self.period))[self.first :]
 
     @cached_property
     def tracking(self) -> Tracking:

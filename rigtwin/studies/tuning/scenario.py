@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components.parameters import Plant
+from rigtwin.components import RigPlant
 from rigtwin.machine.configuration import Configuration, overridden
 from rigtwin.machine.library import find
 from rigtwin.machine.posterior import Changes, Posterior, shifted_within
@@ -24,7 +24,7 @@ class Scenario:
     """seed: of road and noise; plant: of the rig."""
 
     seed: int
-    plant: Plant
+    plant: RigPlant
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,19 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.diagnosis.checks import check
-from rigtwin.diagnosis.component import Output, replay_carriage, replay_cylinder, replay_mechanics, replay_motor
+from rigtwin.components.sensors import seen, unseen
+from rigtwin.diagnosis.component import (
+    Output,
+    replay_carriage,
+    replay_cylinder,
+    replay_mechanics,
+    replay_motor,
+)
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
-from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import Motion, band, motion, rms, white_noise, without_mains
-from rigtwin.simulation.converters import seen, unseen
 from rigtwin.simulation.loop import run
 from rigtwin.simulation.plant import deflected
 from rigtwin.simulation.replay import Replay
@@ -36,16 +40,13 @@ class Undetermined(Exception):
     """The recorded signals do not determine what a replay would compare. The message says why."""
 
 
-class Replays:
+class ComponentReplays:
     """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
 
-    Raises RigtwinError naming every fault of the data that makes a comparison meaningless, see `checks`.
+    The data have to be fit for a comparison, see `data_checks`.
     """
 
     def __init__(self, recording: Recording, configuration: Configuration) -> None:
-        self.faults = check(recording, configuration)
-        if any(fault.fatal for fault in self.faults):
-            raise RigtwinError(f"{recording.path}: " + "; ".join(fault.message for fault in self.faults if fault.fatal))
         self.recording = recording
         self.configuration = configuration
         self.period = recording.period
@@ -76,7 +77,9 @@ class Replays:
         mains = self.configuration.plant.mains.frequency
         found = motion(self._sensor(name), self._seen(name, expected), self.period, mains)
         return Motion(
-            expected + unseen(sensor, found.correction, self.period), found.correction, found.velocity_error / sensor.gain
+            expected + unseen(sensor, found.correction, self.period),
+            found.correction,
+            found.velocity_error / sensor.gain,
         )
 
     @property
@@ -89,7 +92,9 @@ class Replays:
         unloaded = replay_cylinder(cylinder, self.configuration, command, float(command[0]))
         if cylinder.compliance == 0.0:
             return unloaded
-        tyre = self.configuration.plant.tyre.stiffness * (self._clean(self._sensor("ground_lvdt") - self.wheel))
+        tyre = self.configuration.plant.tyre.stiffness * (
+            self._clean(self._sensor("ground_lvdt") - self.wheel)
+        )
         return unloaded - cylinder.compliance * np.maximum(tyre, 0.0)
 
     @cached_property
@@ -98,7 +103,9 @@ class Replays:
         cylinder = self.configuration.plant.structure_cylinder
         # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
         uncompressed = self._ground_start - deflected(self.configuration.plant, self.preload)
-        unloaded = replay_cylinder(cylinder, self.configuration, self._command("structure"), start, uncompressed)
+        unloaded = replay_cylinder(
+            cylinder, self.configuration, self._command("structure"), start, uncompressed
+        )
         return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
 
     @cached_property
@@ -113,7 +120,9 @@ class Replays:
     def carriage_output(self) -> Array:
         sensor = self.configuration.plant.load_cell
         force = unseen(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
-        return replay_carriage(self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload)
+        return replay_carriage(
+            self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload
+        )
 
     def _gas_force(self) -> Array:
         """Of the gas spring beside the motor, N, at the travel measured."""
@@ -121,7 +130,9 @@ class Replays:
         if spring.force == 0.0:
             return np.zeros(self.recording.ticks)
         sensor = self.configuration.plant.suspension_lvdt
-        travel = unseen(sensor, self._clean(self._sensor("suspension_lvdt")) - sensor.offset, self.period)
+        travel = unseen(
+            sensor, self._clean(self._sensor("suspension_lvdt")) - sensor.offset, self.period
+        )
         return np.array([spring_force(spring, -stroke) for stroke in travel.tolist()])
 
     @cached_property
@@ -151,15 +162,26 @@ class Replays:
     def motor(self) -> Residual:
         """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
         measured, travel = self._sensor("load_cell"), self.travel_motion
-        output = replay_motor(self.configuration, travel.position, self._command("voltage"), self.preload)
-        resolved = white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER + CERTAIN * travel.velocity_error
+        output = replay_motor(
+            self.configuration, travel.position, self._command("voltage"), self.preload
+        )
+        resolved = (
+            white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER
+            + CERTAIN * travel.velocity_error
+        )
         slides = np.abs(np.gradient(travel.position, self.period)) > resolved
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
         difference = self._clean(measured - self._seen("load_cell", output))
         left = rms(difference[slides])
         floor = white_noise(measured)
-        return Residual(left, floor, left / floor if floor > 0 else math.inf, "N", band(difference * slides, self.period))
+        return Residual(
+            left,
+            floor,
+            left / floor if floor > 0 else math.inf,
+            "N",
+            band(difference * slides, self.period),
+        )
 
     def carriage(self) -> Residual:
         return self._residual(self.wheel, self._wheel_seen(self.carriage_output), "m")[0]
@@ -170,7 +192,9 @@ class Replays:
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
             "wheel": self._residual(self.wheel, self._wheel_seen(self.mechanics_output.wheel), "m"),
         }
-        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+        return together(
+            {n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period
+        )
 
     def structure_cylinder(self) -> Residual:
         output = self._seen("structure_lvdt", self.structure_cylinder_output)
@@ -189,9 +213,13 @@ class Replays:
             pass
         outputs: dict[str, Residual] = {}
         differences: dict[str, Array] = {}
-        for number, (name, unit) in enumerate(zip(Commands._fields, ("m", "m", "N", "V"), strict=True)):
+        for number, (name, unit) in enumerate(
+            zip(Commands._fields, ("m", "m", "N", "V"), strict=True)
+        ):
             recorded = self._command(name)
-            differences[name] = np.array([commands[number] for commands in replay.written]) - recorded
+            differences[name] = (
+                np.array([commands[number] for commands in replay.written]) - recorded
+            )
             outputs[name] = single(differences[name], rounding(recorded), unit, self.period)
         return together(outputs, differences, self.period)
 
@@ -203,16 +231,18 @@ class Replays:
             name: self._residual(self._sensor(name), self._seen(name, truth[:, number]), unit)
             for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
         }
-        return together({n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period)
+        return together(
+            {n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period
+        )
 
 
-REPLAYS: dict[str, Callable[[Replays], Residual]] = {
-    "motor": Replays.motor,
-    "carriage": Replays.carriage,
-    "mechanics": Replays.mechanics,
-    "structure_cylinder": Replays.structure_cylinder,
-    "ground_cylinder": Replays.ground_cylinder,
-    "controller": Replays.controller,
-    "closed_loop": Replays.closed_loop,
+REPLAYS: dict[str, Callable[[ComponentReplays], Residual]] = {
+    "motor": ComponentReplays.motor,
+    "carriage": ComponentReplays.carriage,
+    "mechanics": ComponentReplays.mechanics,
+    "structure_cylinder": ComponentReplays.structure_cylinder,
+    "ground_cylinder": ComponentReplays.ground_cylinder,
+    "controller": ComponentReplays.controller,
+    "closed_loop": ComponentReplays.closed_loop,
 }
 """Every replay by name, in the order in which they are reported."""

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
+from rigtwin.components.effect import Motion
+from rigtwin.components.plant import Plant
 from rigtwin.numerics.arrays import Array
 
-
-@dataclass(frozen=True)
-class Motion:
-    """What a component goes through, shape (ticks,) each: position m, its rate m/s, force N."""
-
-    position: Array
-    speed: Array
-    force: Array
+P = TypeVar("P", bound=Plant, contravariant=True)
 
 
 @dataclass(frozen=True)
@@ -27,18 +22,18 @@ class Form:
     signal: Array
 
 
-class Predictor(Protocol):
+class Model(Protocol[P]):
     """A machine's model under one recording's inputs. Rows are the machine's observed signals, in their order."""
 
-    def sensed(self, plant: Any) -> Array:
+    def sensed(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
         ...
 
-    def true(self, plant: Any) -> Array:
+    def true(self, plant: P) -> Array:
         """What ideal sensors would read, shape (rows, ticks)."""
         ...
 
-    def disturbed(self, plant: Any, entry: str, amount: Array) -> Array:
+    def disturbed(self, plant: P, entry: str, amount: Array) -> Array:
         """The same as `sensed` with a disturbance, shape (ticks,), entering somewhere."""
         ...
 
@@ -46,7 +41,7 @@ class Predictor(Protocol):
         """Components that can be disturbed freely."""
         ...
 
-    def forms(self, component: str, plant: Any) -> list[Form]:
+    def forms(self, component: str, plant: P) -> list[Form]:
         """Ways to disturb one of them."""
         ...
 
@@ -54,19 +49,19 @@ class Predictor(Protocol):
         """rms of a disturbance that is small there."""
         ...
 
-    def motion(self, component: str, plant: Any) -> Motion:
+    def motion(self, component: str, plant: P) -> Motion:
         """What a component goes through."""
         ...
 
-    def carried_noise(self, plant: Any) -> Array | None:
+    def carried_noise(self, plant: P) -> Array | None:
         """What the noise of the signals that drive the model makes of the observed ones, shape (rows, ticks); None if they
         are known exactly."""
         ...
 
-    def coarser(self) -> Predictor:
+    def coarser(self) -> Model[P]:
         """With half the integration steps, if it can be."""
         ...
 
-    def finer(self) -> Predictor:
+    def finer(self) -> Model[P]:
         """With twice the integration steps."""
         ...

@@ -1,0 +1,34 @@
+"""The computer that runs the controller, and the mains that all sensors pick up."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from rigtwin.components.effect import Kind
+from rigtwin.components.quantity import Quantity
+
+
+class Computer(NamedTuple):
+    """The computer that runs the controller."""
+
+    missed_ticks: Annotated[
+        float, Quantity("1", 0.0, 0.5, "0: real-time computer; a share of all ticks")
+    ] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 0.02, "0: no computation delay, assumed")] = 0.0
+
+
+class Mains(NamedTuple):
+    """The hum that all sensors pick up, each with a phase of its own."""
+
+    frequency: Annotated[float, Quantity("Hz", 1.0, 400.0, "mains, thesis §3.4")] = 50.0
+
+
+KINDS = (
+    Kind(
+        "missed_ticks",
+        "share of missed ticks",
+        ("missed_ticks",),
+        "share of ticks at which the outputs stay as they are",
+        {Computer: None},
+    ),
+)

@@ -1,0 +1,154 @@
+"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and quantisation apart."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from controllers.compiled import compilable
+from rigtwin.components.quantity import NONE, Quantity
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.numerics.delay import delayed, ring
+
+INVERTIBLE = 80.0
+"""Hz, up to which a sensor's lag is undone."""
+PADDED = 50
+"""Samples that a zero-phase filter needs."""
+
+
+class Lvdt(NamedTuple):
+    """Position sensor as the DAQ reads it."""
+
+    white: Annotated[float, Quantity("m", 0.0, 0.01, "rms, thesis §3.4 (±5e-4 m in all)")] = 6e-5
+    hum: Annotated[float, Quantity("m", 0.0, 0.01, "amplitude of the mains line, thesis §3.4")] = (
+        2e-4
+    )
+    resolution: Annotated[float, Quantity("m", 0.0, 0.01, "16 bit")] = 4.6e-6
+    gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: calibrated")] = 1.0
+    offset: Annotated[float, Quantity("m", -0.05, 0.05, "0: calibrated")] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 0.1, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
+
+
+class LoadCell(NamedTuple):
+    """Force sensor Interface 1010AF between motor rod and plate, as the DAQ reads it."""
+
+    white: Annotated[float, Quantity("N", 0.0, 500.0, "rms, thesis §3.4 (±12 N in all)")] = 1.5
+    hum: Annotated[float, Quantity("N", 0.0, 500.0, "amplitude of the mains line, thesis §3.4")] = (
+        5.0
+    )
+    resolution: Annotated[float, Quantity("N", 0.0, 100.0, "16 bit of ±2.5 kN")] = 0.076
+    gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: calibrated")] = 1.0
+    offset: Annotated[float, Quantity("N", -500.0, 500.0, "0: calibrated")] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 0.1, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
+
+
+class PositionSensor(NamedTuple):
+    """Position as the recording has it."""
+
+    gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
+    offset: Annotated[float, Quantity("m", -100.0, 100.0, "0: calibrated")] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+
+
+class VelocitySensor(NamedTuple):
+    """Velocity as the recording has it."""
+
+    gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
+    offset: Annotated[float, Quantity("m/s", -100.0, 100.0, "0: calibrated")] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+
+
+class ForceSensor(NamedTuple):
+    """Force that moves the joint, positive where it moves it on, as the recording has it."""
+
+    gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
+    offset: Annotated[float, Quantity("N", -1e7, 1e7, "0: calibrated")] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+
+
+DECLARED = (Lvdt, LoadCell)
+"""Sensors whose noise, hum and bits are declared."""
+Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
+
+
+class Transducer(NamedTuple):
+    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the lag goes in a tick."""
+
+    neutral: bool
+    gain: float
+    offset: float
+    delay: float
+    share: float
+
+
+class TransducerState(NamedTuple):
+    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the lag's output."""
+
+    history: Array
+    memory: Array
+
+
+def transducer(sensor: Sensor, period: float) -> Transducer:
+    neutral = (sensor.gain, sensor.offset, sensor.delay, sensor.lag) == (1.0, 0.0, 0.0, 0.0)
+    share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
+    return Transducer(neutral, sensor.gain, sensor.offset, sensor.delay / period, share)
+
+
+def fresh(sensor: Transducer) -> TransducerState:
+    """Before the first sample."""
+    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0]))
+
+
+@compilable
+def transduced(sensor: Transducer, state: TransducerState, value: float) -> float:
+    """The sensor's output at this tick. Before the first tick the quantity was what it is then."""
+    if sensor.neutral:
+        return value
+    if state.memory[0] < 0.0:
+        state.history[:] = value
+        state.memory[0], state.memory[1] = 0.0, value
+    late = delayed(state.history, state.memory, sensor.delay, value)
+    state.memory[1] += sensor.share * (late - state.memory[1])
+    return sensor.gain * state.memory[1] + sensor.offset
+
+
+@kernel
+def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
+    for tick in range(len(true)):
+        out[tick] = transduced(sensor, state, true[tick])
+
+
+def seen(sensor: Sensor, true: Array, period: float) -> Array:
+    """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
+    model, out = transducer(sensor, period), np.empty(len(true))
+    if model.neutral:
+        return true.copy()
+    _seen(model, fresh(model), np.ascontiguousarray(true), out)
+    return out
+
+
+def unseen(sensor: Sensor, signal: Array, period: float) -> Array:
+    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
+
+    The lag's inverse is limited to 80 Hz, or it would make much of the noise.
+    """
+    lagged = signal
+    if sensor.lag > 0.0 and len(signal) > PADDED:
+        smooth = sosfiltfilt(
+            butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos"), signal
+        )
+        lagged = signal + sensor.lag * np.gradient(smooth, period)
+    ticks = np.arange(len(signal))
+    early = (
+        np.interp(ticks + sensor.delay / period, ticks, lagged) if sensor.delay > 0.0 else lagged
+    )
+    return early / sensor.gain

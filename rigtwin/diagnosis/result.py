@@ -1,0 +1,89 @@
+"""A diagnosis: the answer, what pictures of it are drawn from, and the corrected twin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from rigtwin.components import with_parameters
+from rigtwin.components.effect import GROUPS
+from rigtwin.diagnosis import calibrated, report, text
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.machine import Machine
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Why recordings of a machine and its twin disagree.
+
+    answer: all that is said; described: the machine as described; evidence: None where the data cannot be diagnosed;
+    corrected: the twin of the first recording with what was found; otherwise: other explanations that are not out of the
+    question, with their probability. In a notebook it shows its report.
+    """
+
+    answer: Answer
+    described: Machine
+    evidence: Evidence | None = field(repr=False)
+    corrected: Configuration = field(repr=False)
+    otherwise: tuple[tuple[Fit, float], ...] = field(default=(), repr=False)
+
+    @property
+    def verdict(self) -> Verdict:
+        """no gap, explained, partly explained, unknown or unusable."""
+        return self.answer.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a sentence."""
+        return self.answer.sentence
+
+    @property
+    def effects(self) -> tuple[Finding, ...]:
+        """The effects that are named, with magnitude, interval, confidence and class."""
+        return self.answer.effects
+
+    @property
+    def where(self) -> tuple[Place, ...]:
+        """Where the gap lies."""
+        return self.answer.where
+
+    @property
+    def gap(self) -> Gap | None:
+        """The gap before and after the correction; None where the data cannot be diagnosed."""
+        return self.answer.gap
+
+    @property
+    def machine(self) -> Machine:
+        """The corrected machine: the described one with what was found of plant, sensors and computer."""
+        plant = self.corrected.plant
+        for effect in self.effects:
+            group = GROUPS.get(effect.name.component, "")
+            if group and all(name in getattr(plant, group)._fields for name in effect.parameters):
+                # What the computer does late or not at all belongs to the twin as the plant's defects do.
+                plant = with_parameters(
+                    plant, group, {name: each.value for name, each in effect.parameters.items()}
+                )
+        return replace(self.described, plant=plant)
+
+    def document(self) -> dict[str, Any]:
+        """The answer as JSON has it."""
+        return self.answer.document()
+
+    def report(self, path: str | Path) -> Path:
+        """Writes the report, one HTML file. Raises RigtwinError if it cannot be written."""
+        return report.write(Path(path), self)
+
+    def save_twin(self, path: str | Path) -> Path:
+        """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be written, or if the data were
+        not fit for a diagnosis."""
+        return calibrated.save(Path(path), self)
+
+    def __str__(self) -> str:
+        return text.described(self.answer)
+
+    def _repr_html_(self) -> str:
+        return report.html(self)

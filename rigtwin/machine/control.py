@@ -1,0 +1,152 @@
+"""The controller of a machine: a formula of its description, or the Python controller of the suspension rig.
+
+A diagnosis replays it: recorded inputs in, commands out, to be compared with those recorded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from controllers import (
+    SIZE,
+    Commands,
+    Controller,
+    Demand,
+    Measurements,
+    Settings,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
+from controllers.formula import Formula
+from rigtwin.machine.configuration import Nothing, settings_of
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+
+Channel = tuple[str, str]
+"""Topic and field of a recording."""
+
+
+class Control(Protocol):
+    """A controller whose commands can be worked out again from what was recorded."""
+
+    @property
+    def settings(self) -> Any:
+        """Its settings as described: a NamedTuple."""
+        ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What it reads, in order."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The commands that it computes."""
+        ...
+
+    @property
+    def exact(self) -> float | None:
+        """rms in the command's unit within which its replay counts as exact; None for the recording's rounding."""
+        ...
+
+    def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
+        """Its commands for recorded inputs.
+
+        Parameters
+        ----------
+        settings
+            As in `settings`, maybe with other values.
+        inputs
+            One signal a channel, shape (ticks,) each.
+        period
+            s, of a tick.
+
+        Returns
+        -------
+        Commands at every tick, shape (outputs, ticks).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class FormulaControl:
+    """A formula that computes one command. inputs: name in the formula → channel."""
+
+    output: str
+    formula: Formula
+    inputs: Mapping[str, Channel]
+    exact: float | None = None
+
+    @property
+    def settings(self) -> Any:
+        values = self.formula.settings
+        return settings_of(values, "the description") if values else Nothing()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        return tuple(self.inputs[name] for name in self.formula.inputs)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return (self.output,)
+
+    def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
+        return self.formula.replayed(settings._asdict(), inputs, period)[None]
+
+
+@kernel
+def _replay(
+    controlling: Controller, start: Array, sensors: Array, demands: Array, out: Array
+) -> None:
+    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
+    for tick in range(len(sensors)):
+        measured = Measurements(
+            sensors[tick, 0], sensors[tick, 1], sensors[tick, 2], sensors[tick, 3]
+        )
+        demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
+        state, commands = update(controlling, state, measured, demand)
+        for column in range(4):
+            out[tick, column] = commands[column]
+
+
+@dataclass(frozen=True)
+class RigControl:
+    """The controller of the suspension rig, `controllers.update`. What was demanded of it stands among its commands."""
+
+    exact: float | None = None
+
+    @property
+    def settings(self) -> Settings:
+        return Settings()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        sensors = (("/sensor", name) for name in Measurements._fields)
+        return (*sensors, *(("/command", name) for name in Demand._fields))
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return Commands._fields
+
+    def replay(self, settings: Settings, inputs: Sequence[Array], period: float) -> Array:
+        controlling = controller(settings, period)
+        table = np.ascontiguousarray(np.column_stack(inputs), np.float64)
+        sensors, demands = np.hsplit(table, [len(Measurements._fields)])
+        out = np.empty((len(table), len(Commands._fields)))
+        start = np.array(packed(initial_state(controlling)))
+        _replay(
+            controlling, start, np.ascontiguousarray(sensors), np.ascontiguousarray(demands), out
+        )
+        return out.T
+
+
+PYTHON: dict[str, Control] = {"controllers.mil": RigControl()}
+"""Controllers written in Python, by the name that a description gives them."""

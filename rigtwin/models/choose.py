@@ -1,0 +1,108 @@
+"""The model of a machine under one recording's inputs: which one is chosen by the machine's structure alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rigtwin.components.effect import Motion
+from rigtwin.components.plant import Plant
+from rigtwin.machine.configuration import Configuration
+from rigtwin.machine.machine import Machine, Structure
+from rigtwin.models.joint import JointModel
+from rigtwin.models.model import Form, Model
+from rigtwin.models.quarter_car import QuarterCarModel
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+
+
+def model_of(
+    machine: Machine, recording: Recording, configuration: Configuration, steps: int
+) -> Model[Any]:
+    """The fastest model of a machine.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    recording
+        Whose inputs drive it.
+    configuration
+        Its settings on that recording.
+    steps
+        Of integration a tick.
+
+    Raises
+    ------
+    RigtwinError
+        If a channel is missing.
+    """
+    if machine.structure is Structure.QUARTER_CAR:
+        return QuarterCarModel.of(recording, configuration, steps)
+    joints = [
+        JointModel(machine, replay, recording, configuration, steps) for replay in machine.replays
+    ]
+    return joints[0] if len(joints) == 1 else Joints(joints)
+
+
+class Joints:
+    """Joints joints of one recording, their rows one after another."""
+
+    def __init__(self, joints: Sequence[JointModel]) -> None:
+        self._joints = tuple(joints)
+
+    def sensed(self, plant: Plant) -> Array:
+        return np.concatenate([each.sensed(plant) for each in self._joints])
+
+    def true(self, plant: Plant) -> Array:
+        return np.concatenate([each.true(plant) for each in self._joints])
+
+    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+        number, _, own = entry.partition(":")
+        return np.concatenate(
+            [
+                each.disturbed(plant, own, amount) if place == int(number) else each.sensed(plant)
+                for place, each in enumerate(self._joints)
+            ]
+        )
+
+    def _of(self, component: str) -> int:
+        return next((n for n, each in enumerate(self._joints) if component in each.places()), 0)
+
+    def places(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for each in self._joints for name in each.places()))
+
+    def forms(self, component: str, plant: Plant) -> list[Form]:
+        number = self._of(component)
+        return [
+            Form(each.name, f"{number}:{each.entry}", each.signal)
+            for each in self._joints[number].forms(component, plant)
+        ]
+
+    def strength(self, entry: str) -> float:
+        number, _, own = entry.partition(":")
+        return self._joints[int(number)].strength(own)
+
+    def motion(self, component: str, plant: Plant) -> Motion:
+        return self._joints[self._of(component)].motion(component, plant)
+
+    def carried_noise(self, plant: Plant) -> Array | None:
+        parts = [each.carried_noise(plant) for each in self._joints]
+        if all(part is None for part in parts):
+            return None
+        ticks = next(part.shape[1] for part in parts if part is not None)
+        rows = [len(each.rows) for each in self._joints]
+        return np.concatenate(
+            [
+                np.zeros((n, ticks)) if part is None else part
+                for n, part in zip(rows, parts, strict=True)
+            ]
+        )
+
+    def coarser(self) -> Joints:
+        return Joints([each.coarser() for each in self._joints])
+
+    def finer(self) -> Joints:
+        return Joints([each.finer() for each in self._joints])
