@@ -175,9 +175,11 @@ class Environment(dm_env.Environment):
         return self.interval * self.configuration.timing.period
 
     def action_spec(self) -> specs.BoundedArray:  # type: ignore[override]
+        """Shape and bounds of an action, in units."""
         return self.actions.spec(self.configuration)
 
     def observation_spec(self) -> dict[str, specs.Array]:  # type: ignore[override]
+        """Shapes of the parts of an observation, each named by its columns."""
         return {
             "sensors": specs.Array((4,), np.float64, name=", ".join(Measurements._fields)),
             "controller": specs.Array((len(OBSERVED),), np.float64, name=", ".join(OBSERVED)),
