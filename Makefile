@@ -70,7 +70,7 @@ $(VENV)/.docs: $(VENV)/.done
 	@touch $@
 
 contract: setup
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-cache
 
 clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info
