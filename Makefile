@@ -1,4 +1,4 @@
-.PHONY: setup demo test check benchmark gallery system browser clean
+.PHONY: setup demo test check benchmark gallery docs contract system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -12,6 +12,8 @@ help:
 	@echo "make setup      make $(VENV) with everything in it"
 	@echo "make check      ruff and pyright"
 	@echo "make benchmark  speeds, side by side"
+	@echo "make docs       the pages of docs and a reference of the API: $(OUT)/docs/index.html"
+	@echo "make contract   which package may import which"
 	@echo "make gallery    the thesis reproduced: docs/gallery.md, its pictures and videos"
 
 setup: $(VENV)/.done
@@ -58,6 +60,17 @@ gallery: setup system
 	$(BIN)/rigtwin video $(OUT)/drop.mcap -o docs/gallery/drop.mp4 --until 6
 	$(BIN)/rigtwin video $(OUT)/road10.mcap -o docs/gallery/road10.mp4 --until 8
 	$(BIN)/rigtwin video $(OUT)/beams.mcap -o docs/gallery/beams.mp4 --until 6
+
+docs: setup $(VENV)/.docs
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d $(OUT)/docs-cache docs $(OUT)/docs
+	@echo "look at $(OUT)/docs/index.html"
+
+$(VENV)/.docs: $(VENV)/.done
+	$(BIN)/pip install --quiet --editable '.[docs]'
+	@touch $@
+
+contract: setup
+	$(BIN)/lint-imports --no-cache
 
 clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info

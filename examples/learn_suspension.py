@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from rigtwin.studies.environment import Environment, Reward, environment
+from experiments.environment import environment
+from rigtwin.studies.environment import Environment, Reward
 
 BOUNDS = [(10.0, 300.0), (0.0, 1500.0), (-300.0, 300.0), (-200.0, 200.0)]
 """Damping, Ns/m; preload per structure velocity, N/(m/s), per travel velocity, N/(m/s), per travel, N/m."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import unittest
 
 import numpy as np
@@ -9,15 +10,34 @@ import pytest
 from dm_env import StepType, test_utils
 
 from experiments import find
+from experiments.environment import environment
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration, overridden
 from rigtwin.simulation.runner import simulated
 from rigtwin.simulation.safety import Trip
-from rigtwin.studies.environment import Actuators, Environment, Reward, Schedule, environment
+from rigtwin.studies.actions import Actuators, Schedule
+from rigtwin.studies.environment import Environment, Reward
 
 
 def short(name: str, seconds: float = 0.5, **changes: dict[str, object]) -> Configuration:
     return overridden(find(name).configuration, {"timing": {"duration": seconds}, **changes})
+
+
+@pytest.fixture(scope="module")
+def control():
+    """dm_control's package, loaded for drawing without a display."""
+    with pytest.MonkeyPatch.context() as patch:
+        if sys.platform == "linux":
+            patch.setenv("MUJOCO_GL", "egl")
+        return pytest.importorskip("dm_control.mujoco", exc_type=ImportError)
+
+
+@pytest.fixture(scope="module")
+def rendering(control) -> None:
+    try:
+        control.Physics.from_xml_string("<mujoco/>").render(8, 8)
+    except Exception as error:  # each kind of OpenGL raises its own
+        pytest.skip(f"no rendering here: {error}")
 
 
 def made(name: str, **options) -> Environment:
@@ -117,6 +137,109 @@ def test_an_agent_can_do_something_about_it():
         return found
 
     assert total(300.0) > total(0.0)
+
+
+@pytest.mark.usefixtures("control")
+def test_its_physics_is_the_rig_that_runs():
+    env = Environment(short("drop", carriage={"mass": 40.0}), find("drop").demands, seed=3)
+    assert env.physics.named.data.qpos["ground"] == 0.0
+    first = env.reset()
+    assert env.seed == 3, "to look at the rig takes no episode away"
+    assert env.physics.model.body("carriage").mass == 40.0
+    assert env.physics.named.data.qpos["carriage"] < 0.0, "the tyre carries the preload"
+    before = env.physics
+    step = env.step(env.rest())
+    assert before is env.physics
+    assert env.physics.time() == pytest.approx(env.control_timestep())
+    assert env.physics.named.data.qpos["structure"] == pytest.approx(step.observation["sensors"][1], abs=1e-3)
+    env.reset()
+    assert env.physics is not before
+    assert env.physics.time() == 0.0
+    assert not np.array_equal(first.observation["sensors"], step.observation["sensors"])
+
+
+@pytest.mark.usefixtures("control")
+def test_a_push_moves_the_rig():
+    def travel(push: float) -> float:
+        env = made("drop", interval=100)
+        env.reset()
+        env.physics.named.data.xfrc_applied["carriage", 0] = push
+        return float(env.step(env.rest()).observation["sensors"][2])
+
+    assert travel(500.0) < travel(0.0) - 0.001
+
+
+@pytest.mark.filterwarnings("ignore:.*DISPLAY")
+@pytest.mark.usefixtures("control")
+@pytest.mark.parametrize("name", ["drop", "active"])
+def test_the_viewer_runs_it_and_pauses_change_nothing(name):
+    from dm_control.viewer.runtime import Runtime, State
+
+    configuration = short(name, 0.5, ground_cylinder={"compliance": 1e-6})
+    seen, changes, paused = [], [], False
+    env = Environment(configuration, find(name).demands, seed=5)
+
+    def policy(step):
+        seen.append((step.observation, env.physics.data.qpos.copy()))
+        return env.rest()
+
+    runtime = Runtime(env, policy)
+    runtime.on_physics_changed += lambda: changes.append(env.seed)
+    runtime.on_error += lambda message: pytest.fail(message)
+    runtime.tick(0.02, paused=False)
+    while runtime.state == State.RUNNING:
+        paused = not paused
+        runtime.tick(0.02, paused)
+    assert runtime.state == State.STOPPED
+    assert runtime.get_time() == pytest.approx(0.5)
+    other = Environment(configuration, find(name).demands, seed=5)
+    step = other.reset()
+    for observation, position in seen:
+        assert all(np.array_equal(observation[kind], step.observation[kind]) for kind in observation)
+        assert np.array_equal(position, other.physics.data.qpos)
+        step = other.step(other.rest())
+    assert step.last()
+    runtime.restart()
+    runtime.tick(0.02, paused=False)
+    assert changes == [6], "the viewer learns of each new rig"
+
+
+@pytest.mark.usefixtures("rendering")
+def test_pictures_are_of_the_rig_now():
+    from dm_control.suite.wrappers import pixels
+
+    view = {"height": 120, "width": 240, "camera_id": "side"}
+    env = pixels.Wrapper(made("drop", interval=125), pixels_only=False, render_kwargs=view)
+    plain = made("drop", interval=125)
+    expected = plain.reset()
+    step = env.reset()
+    pictures = []
+    while not step.last():
+        for kind, value in expected.observation.items():
+            assert np.array_equal(step.observation[kind], value)
+        pictures.append(step.observation["pixels"].astype(float))
+        env.observation_spec()["pixels"].validate(step.observation["pixels"])
+        step, expected = env.step(plain.rest()), plain.step(plain.rest())
+    assert np.std(pictures[0]) > 20, "the picture is not blank"
+    assert np.mean(np.abs(pictures[-1] - pictures[0])) > 0.1, "nothing moves"
+
+
+@pytest.mark.usefixtures("control")
+def test_noise_on_actions_comes_of_the_seed():
+    from dm_control.suite.wrappers import action_noise
+
+    def run(scale: float, seed: int = 2) -> np.ndarray:
+        env = action_noise.Wrapper(made("drop", seed=seed, actions=Actuators()), scale=scale)
+        env.reset()
+        return np.array([env.step(env.rest()).observation["commands"][[1, 3]] for _ in range(5)])
+
+    quiet, noisy = run(0.0), run(0.001)
+    assert np.array_equal(quiet, np.tile(made("drop", actions=Actuators()).rest(), (5, 1)))
+    assert np.array_equal(noisy, run(0.001))
+    assert not np.array_equal(noisy, run(0.001, seed=3))
+    voltage = noisy[:, 1] - quiet[:, 1]
+    assert 0.0 < np.std(voltage) < 0.1
+    assert len(set(voltage)) == 5
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,19 @@ def test_every_element_is_named(path):
     assert model.pair_dim[model.pair("tyre").id] == 1
 
 
+def test_lights_and_cameras_change_no_digit_of_the_motion():
+    ends = []
+    for path in (MECHANICS, SCENE):
+        model = mujoco.MjModel.from_xml_path(str(path))
+        data = mujoco.MjData(model)
+        data.joint("carriage").qpos = -0.01
+        data.ctrl[:] = 1.0
+        mujoco.mj_step(model, data, 400)
+        ends.append(np.concatenate([data.qpos, data.qvel, data.sensordata]))
+    assert abs(ends[0][1] + 0.01) > 1e-4
+    assert np.array_equal(*ends)
+
+
 @pytest.mark.parametrize("plant", [NOMINAL, NOMINAL._replace(carriage=Carriage(1140.0), tyre=Tyre(8.461e6))])
 def test_tyre_is_a_spring_that_only_pushes(plant):
     model, data = simulation(plant._replace(rail=Rail(0.0), motor=Motor(coulomb=0.0)))

@@ -46,8 +46,9 @@ class Handles(NamedTuple):
 
 @cache
 def _nominal() -> mujoco.MjModel:
-    """The model as the XML has it, compiled once; never changed."""
-    return mujoco.MjModel.from_xml_path(str(MECHANICS))
+    """The model as the XML has it, compiled once; never changed. With its lights and cameras, so that a running twin can be
+    looked at; they change no digit of its motion."""
+    return mujoco.MjModel.from_xml_path(str(SCENE))
 
 
 def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:

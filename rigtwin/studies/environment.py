@@ -1,39 +1,45 @@
 """The rig as a dm_env environment, for whatever learns: observations, actions and rewards in physical units.
 
-    environment("active")                           the agent sets the suspension's damping and preload every 10 ms
-    environment("active", actions=Actuators(), interval=1)   it is the controller: plate position and motor voltage
+An episode is one test of an experiment; each takes the next seed, so another road and other noise.
+A trip of a safety limit ends it with discount 0 and a penalty, the test's end with discount 1. A
+schedule at `rest` is the experiment to the bit. `experiments.environment` makes one by name::
 
-An episode is one test of an experiment; each takes the next seed, so another road and other noise. A trip of a safety limit
-ends it with discount 0 and a penalty, the test's end with discount 1. A schedule at `rest` is the experiment to the bit.
+    env = environment("active")    # the agent sets the suspension's damping and preload every 10 ms
+    env = environment("active", actions=Actuators(), interval=1)    # it is the controller
+
+dm_control's viewer and its suite's wrappers take it too. To watch it, and to push the rig with the
+mouse::
+
+    from dm_control import viewer
+    viewer.launch(env, policy=lambda step: env.rest())
+
+Pictures as observations, of the cameras `overview`, `side` and `wheel`; without a display set
+MUJOCO_GL=egl::
+
+    from dm_control.suite.wrappers import pixels
+    env = pixels.Wrapper(env, render_kwargs={"camera_id": "overview"})
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
 
 import dm_env
 import numpy as np
 from dm_env import specs
 
-from controllers import (
-    Commands,
-    Controller,
-    Demand,
-    Measurements,
-    Settings,
-    State,
-    controller,
-    initial_state,
-    update,
-)
-from controllers.quantity import Quantity, fields
+from controllers import Commands, Demand, Measurements, controller, initial_state
 from rigtwin.components.tyre import tyre_force
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip, judged, watching
 from rigtwin.simulation.twin import Twin
+from rigtwin.studies.actions import Actions, suspension
+
+if TYPE_CHECKING:
+    from dm_control.mujoco import Physics
 
 INTERVAL = 10
 """Ticks that an action is held for: 10 ms."""
@@ -42,106 +48,82 @@ OBSERVED = ("travel", "velocity", "force", "structure_position", "structure_velo
 velocity (m/s)."""
 TRIP_PENALTY = 1000.0
 """Of a trip, in costs of a step."""
+ACTION_NOISE = 3
+"""Number of the random stream of noise on actions, beside the twin's own."""
 
 
 class Reward(NamedTuple):
-    """A step's reward is minus the mean over its ticks of (a/ride)² + (ΔF/road_holding)² + (Δs/travel)²: body acceleration a,
-    m/s²; tyre force off its static value ΔF, N; suspension travel off its static value Δs, m. Each figure is what costs 1; by
-    default about what the passive car shows on the road of chapter 7. Infinite: does not count."""
+    """Minus the mean over a step's ticks of (a/ride)² + (ΔF/road_holding)² + (Δs/travel)².
+
+    Each figure is what costs 1, by default about what the passive car shows on the road of chapter 7;
+    an infinite one does not count.
+
+    Attributes
+    ----------
+    ride
+        Of the body's acceleration a, m/s².
+    road_holding
+        Of the tyre's force off its static value ΔF, N.
+    travel
+        Of the suspension's travel off its static value Δs, m.
+    """
 
     ride: float = 0.25
     road_holding: float = 45.0
     travel: float = 0.01
 
 
-class Actions(Protocol):
-    """What an agent does to the rig."""
+class Task(NamedTuple):
+    """What dm_control's wrappers ask of a task.
 
-    def spec(self, configuration: Configuration) -> specs.BoundedArray:
-        """Shape and bounds, in units."""
-        ...
+    Attributes
+    ----------
+    random
+        Where `dm_control.suite.wrappers.action_noise` draws from; begins anew with each episode, from
+        its seed.
+    """
 
-    def rest(self, configuration: Configuration) -> Array:
-        """The action that changes nothing."""
-        ...
-
-    def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
-    ) -> tuple[State, Commands]:
-        """One tick under an action."""
-        ...
+    random: np.random.Generator
 
 
-class Schedule:
-    """The agent changes settings of the controller that runs: name → (low, high), in the setting's unit."""
-
-    def __init__(self, bounds: Mapping[str, tuple[float, float]]) -> None:
-        """Raises RigtwinError for a setting that is none or no number, or bounds beyond its own."""
-        self.bounds = dict(bounds)
-        known = fields(Settings)
-        if not self.bounds:
-            raise RigtwinError("actions: expected at least one setting with its bounds")
-        for name, ends in self.bounds.items():
-            meaning = known.get(name)
-            if not isinstance(meaning, Quantity):
-                raise RigtwinError(f"action {name!r}: expected a setting of the controller that is a number")
-            if not isinstance(ends, tuple | list) or len(ends) != 2:
-                raise RigtwinError(f"action {name}: {ends!r}; expected its bounds, (low, high)")
-            low, high = ends
-            if not meaning.low <= low < high <= meaning.high:
-                allowed = f"{meaning.low:g} to {meaning.high:g} {meaning.unit}"
-                raise RigtwinError(f"action {name} from {low:g} to {high:g}: expected low below high within {allowed}")
-
-    def spec(self, configuration: Configuration) -> specs.BoundedArray:  # noqa: ARG002
-        low, high = (np.array(ends) for ends in zip(*self.bounds.values(), strict=True))
-        return specs.BoundedArray((len(self.bounds),), np.float64, low, high, name=", ".join(self.bounds))
-
-    def rest(self, configuration: Configuration) -> Array:
-        return np.array([getattr(configuration.controller, name) for name in self.bounds])
-
-    def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
-    ) -> tuple[State, Commands]:
-        changed = dict(zip(self.bounds, action.tolist(), strict=True))
-        return update(controlling._replace(settings=controlling.settings._replace(**changed)), state, measured, demand)
-
-
-def suspension(settings: Settings) -> Schedule:
-    """The suspension's damping, Ns/m, from a fifth to ten times what it is, and its preload, N, half as much more or less: a
-    semi-active and an active suspension."""
-    factors = {"suspension_damping": (0.2, 10.0), "preload": (0.5, 1.5)}
-    bounds = {}
-    for name, (low, high) in factors.items():
-        there, meaning = getattr(settings, name), fields(Settings)[name]
-        assert isinstance(meaning, Quantity)
-        bounds[name] = (low * there, min(high * there, meaning.high))
-    return Schedule(bounds)
-
-
-class Actuators:
-    """The agent is the controller: plate position, m, and motor voltage, V. The road stays the experiment's."""
-
-    def spec(self, configuration: Configuration) -> specs.BoundedArray:
-        high = np.array([configuration.safety.structure, configuration.controller.voltage_limit])
-        return specs.BoundedArray((2,), np.float64, -high, high, name="structure, voltage")
-
-    def rest(self, configuration: Configuration) -> Array:
-        settings = configuration.controller
-        return np.array([settings.start, settings.preload / configuration.plant.motor.constant])
-
-    def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
-    ) -> tuple[State, Commands]:
-        # The controller runs beside, so that its filters show what they would; what it wants is not done.
-        state, _ = update(controlling, state, measured, demand)
-        structure, voltage = action.tolist()
-        return state, Commands(demand.ground, structure, measured.load_cell, voltage)
+def _task(seed: int) -> Task:
+    return Task(np.random.default_rng([seed, ACTION_NOISE]))
 
 
 class Environment(dm_env.Environment):
-    """One experiment as episodes. Observations, a dictionary: `sensors`, the last raw samples, columns of
-    controllers.Measurements, m and N; `controller`, see OBSERVED; `commands`, the last, of controllers.Commands, m, N, V.
-    `trip` says why the last episode ended early."""
+    """One experiment as episodes.
+
+    An observation is a dictionary: `sensors`, the last raw samples, columns of
+    `controllers.Measurements`, m and N; `controller`, see `OBSERVED`; `commands`, the last, columns of
+    `controllers.Commands`, m, N and V.
+
+    Parameters
+    ----------
+    configuration
+        The rig, its controller and the test.
+    demands
+        Of (configuration, seed): what a test asks for, shape (ticks, 3), as an experiment has them.
+    seed
+        Of the first episode.
+    actions
+        What the agent does; by default the damping and preload of `suspension`.
+    reward
+        What a step costs.
+    interval
+        Ticks that an action is held for.
+
+    Attributes
+    ----------
+    trip : Trip
+        Why the last episode ended early.
+    task : Task
+        What dm_control's wrappers draw from.
+
+    Raises
+    ------
+    RigtwinError
+        For a seed, an interval or a reward that makes no sense.
+    """
 
     def __init__(
         self,
@@ -152,8 +134,6 @@ class Environment(dm_env.Environment):
         reward: Reward = Reward(),  # noqa: B008
         interval: int = INTERVAL,
     ) -> None:
-        """demands: of (configuration, seed), shape (ticks, 3), as an experiment has them; seed: of the first episode; interval:
-        ticks a step. Raises RigtwinError for figures that make no sense."""
         whole = all(isinstance(number, int) and not isinstance(number, bool) for number in (seed, interval))
         if not (whole and seed >= 0 and interval >= 1 and isinstance(reward, Reward) and all(one > 0.0 for one in reward)):
             given = f"seed {seed}, interval {interval}, {reward}"
@@ -161,16 +141,45 @@ class Environment(dm_env.Environment):
         self.configuration, self.interval, self.reward = configuration, interval, reward
         self.actions: Actions = suspension(configuration.controller) if actions is None else actions
         self.trip = Trip.NONE
+        self.task = _task(seed)
         self._demands, self._next_seed = demands, seed
         self._controlling = controller(configuration.controller, configuration.timing.period)
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
         self._sag = (configuration.controller.preload - self._static) / max(configuration.controller.suspension_stiffness, 1e-9)
         self._over = True
+        self._twin: Twin | None = None
+        self._physics: Physics | None = None
+
+    @property
+    def physics(self) -> Physics:
+        """dm_control's view of the twin that runs, for its time, its joints and pictures of it.
+
+        It looks at the twin's own model and data, so a force written to `data.xfrc_applied` acts on the
+        rig. Only the environment steps it. Each episode has its own, and frees the one before.
+        """
+        from dm_control.mujoco import Physics, wrapper  # loads OpenGL, which only pictures need
+
+        twin = self._begin(self._next_seed) if self._twin is None else self._twin
+        if self._physics is None:
+            self._physics = Physics(wrapper.MjData(twin.simulation.data))
+        return self._physics
+
+    def control_timestep(self) -> float:
+        """How long an action is held for.
+
+        Returns
+        -------
+        float
+            In s.
+        """
+        return self.interval * self.configuration.timing.period
 
     def action_spec(self) -> specs.BoundedArray:  # type: ignore[override]
+        """Shape and bounds of an action, in units."""
         return self.actions.spec(self.configuration)
 
     def observation_spec(self) -> dict[str, specs.Array]:  # type: ignore[override]
+        """Shapes of the parts of an observation, each named by its columns."""
         return {
             "sensors": specs.Array((4,), np.float64, name=", ".join(Measurements._fields)),
             "controller": specs.Array((len(OBSERVED),), np.float64, name=", ".join(OBSERVED)),
@@ -178,44 +187,81 @@ class Environment(dm_env.Environment):
         }
 
     def rest(self) -> Array:
-        """The action that leaves the experiment as it is; of Actuators, the one that it starts with."""
+        """The action that leaves the experiment as it is; of `Actuators`, the one that it starts with.
+
+        Returns
+        -------
+        Array
+            As `action_spec` has it.
+        """
         return self.actions.rest(self.configuration)
 
     def reset(self) -> dm_env.TimeStep:
-        """Begins the next episode; its first observation is of the rig before the first tick."""
-        self.seed = self._next_seed
+        """Begins the next episode; its first observation is of the rig before the first tick.
+
+        Returns
+        -------
+        dm_env.TimeStep
+            Of type FIRST.
+        """
+        twin = self._begin(self._next_seed) if self._twin is None or self.seed != self._next_seed else self._twin
         self._next_seed += 1
-        self._asked = self._demands(self.configuration, self.seed)
-        self._twin = Twin(self.configuration, float(self._asked[0, 0]), self.seed)
-        self._twin.start()
         self._state, self._watch = initial_state(self._controlling), watching()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
         self._measured = Measurements(float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload)
         self._plate: list[float] = []
-        return dm_env.restart(self._observation())
+        return dm_env.restart(self._observation(twin))
 
     def step(self, action: Array) -> dm_env.TimeStep:
-        """Holds an action for the interval. Raises ValueError for one out of its bounds."""
-        if self._over:
+        """Holds an action for the interval; after an episode's end, begins the next.
+
+        Parameters
+        ----------
+        action
+            As `action_spec` has it.
+
+        Returns
+        -------
+        dm_env.TimeStep
+            What the rig shows after the interval, and the reward of it.
+
+        Raises
+        ------
+        ValueError
+            For an action out of its bounds.
+        """
+        twin = self._twin
+        if self._over or twin is None:
             return self.reset()
         action = np.asarray(self.action_spec().validate(np.asarray(action, dtype=np.float64)))
         if not np.all(np.isfinite(action)):
             raise ValueError(f"action {action} for {self.action_spec().name}: expected finite numbers")
         cost, first = 0.0, self._tick
         while self._tick < min(first + self.interval, len(self._asked)) and self.trip == Trip.NONE:
-            cost += self._ticked(action)
+            cost += self._ticked(twin, action)
         cost /= self._tick - first
         self._over = self.trip != Trip.NONE or self._tick == len(self._asked)
         if self.trip != Trip.NONE:
-            return dm_env.termination(-cost - TRIP_PENALTY, self._observation())
+            return dm_env.termination(-cost - TRIP_PENALTY, self._observation(twin))
         if self._over:
-            return dm_env.truncation(-cost, self._observation())
-        return dm_env.transition(-cost, self._observation())
+            return dm_env.truncation(-cost, self._observation(twin))
+        return dm_env.transition(-cost, self._observation(twin))
 
-    def _ticked(self, action: Array) -> float:
+    def _begin(self, seed: int) -> Twin:
+        """Builds the rig of the episode of a seed, at its start."""
+        self.seed, self.task = seed, _task(seed)
+        self._asked = self._demands(self.configuration, seed)
+        if self._physics is not None:
+            self._physics.free()
+            self._physics = None
+        self._twin = Twin(self.configuration, float(self._asked[0, 0]), seed)
+        self._twin.start()
+        return self._twin
+
+    def _ticked(self, twin: Twin, action: Array) -> float:
         """One tick, and its cost."""
-        twin, period = self._twin, self.configuration.timing.period
+        period = self.configuration.timing.period
         measured, demand = twin.read(), Demand(*self._asked[self._tick].tolist())
         if twin.misses(1)[0]:
             commands = twin.held
@@ -238,24 +284,10 @@ class Environment(dm_env.Environment):
         travel = true.suspension_lvdt - self._sag
         return (ride / self.reward.ride) ** 2 + (tyre / self.reward.road_holding) ** 2 + (travel / self.reward.travel) ** 2
 
-    def _observation(self) -> dict[str, Array]:
+    def _observation(self, twin: Twin) -> dict[str, Array]:
         state = self._state
         return {
             "sensors": np.array(self._measured, dtype=np.float64),
             "controller": np.array([float(getattr(state, name)) for name in OBSERVED]),
-            "commands": np.array(self._twin.held, dtype=np.float64),
+            "commands": np.array(twin.held, dtype=np.float64),
         }
-
-
-def environment(
-    experiment: str,
-    seed: int = 0,
-    actions: Actions | None = None,
-    reward: Reward = Reward(),  # noqa: B008
-    interval: int = INTERVAL,
-) -> Environment:
-    """An experiment of `rigtwin list` as an environment. Raises RigtwinError for one that there is not."""
-    import experiments
-
-    found = experiments.find(experiment)
-    return Environment(found.configuration, found.demands, seed, actions, reward, interval)
