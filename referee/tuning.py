@@ -19,7 +19,7 @@ from referee.reference_rig import Law, run
 from referee.test_signals import asked
 from rigtwin.console import table
 from rigtwin.machine.posterior import load_posterior
-from rigtwin.studies.sweep import swept
+from rigtwin.studies.sweep import run_jobs
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.judged import Comparison, comparison
 from rigtwin.studies.tuning.outcome import BEFORE, TUNED_NOMINAL, searched
@@ -108,7 +108,7 @@ def checked(
     plain = searched(bench, nominal, seed)
     stage("diagnosing")
     jobs = [(f"diagnosis {seed} {number}", (seed, number)) for number in range(cases)]
-    swept(bench.store, bench.workers, calibrated, jobs, bench.progress)
+    run_jobs(bench.store, bench.workers, calibrated, jobs, bench.progress)
     found = []
     for number, (key, _) in enumerate(jobs):
         sentence, toml = bench.store[key]
@@ -120,7 +120,7 @@ def checked(
         corrected = searched(bench, diagnosed(posterior), seed)
         truth, defect, _ = rig(seed, number)
         runs = [[OnRig(truth, run) for run in _runs(study, settings)] for settings in (study.reference, plain, corrected)]
-        swept(bench.store, bench.workers, on_rig, ((job.key, job) for row in runs for job in row), bench.progress)
+        run_jobs(bench.store, bench.workers, on_rig, ((job.key, job) for row in runs for job in row), bench.progress)
         before, one, other = ([bench.store[job.key] for job in row] for row in runs)
         name = f"rig {number + 1}"
         case = Case(

@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, Workers, hired
+from rigtwin.studies.sweep import Store, Workers, open_workers
 
 RIGS = 8
 """Of a check of tuning, unless said."""
@@ -22,7 +22,7 @@ def blindcheck(parsed: Namespace) -> int:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
     if parsed.json is not None:
         writable(parsed.json)
-    with hired(parsed.workers, parsed.cluster) as workers:
+    with open_workers(parsed.workers, parsed.cluster) as workers:
         return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
 
 

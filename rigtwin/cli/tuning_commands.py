@@ -11,7 +11,7 @@ from tqdm import tqdm
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.posterior import Posterior, load_posterior
-from rigtwin.studies.sweep import Store, hired
+from rigtwin.studies.sweep import Store, open_workers
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.folder import PAGE, RUNS, SETTINGS, write
 from rigtwin.studies.tuning.outcome import tuned
@@ -35,7 +35,7 @@ def tune(parsed: Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise RigtwinError(f"cannot write into {folder}: it is a file")
     with (
-        hired(parsed.workers, parsed.cluster) as workers,
+        open_workers(parsed.workers, parsed.cluster) as workers,
         Store(folder / RUNS) as store,
         tqdm(total=_runs(study, posterior), disable=None, unit="run", leave=False, file=sys.stderr) as bar,
     ):

@@ -11,7 +11,7 @@ from controllers import Settings
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip
-from rigtwin.studies.sweep import Store, Workers, swept
+from rigtwin.studies.sweep import Store, Workers, run_jobs
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.studies.tuning.scenario import Scenario
@@ -50,7 +50,7 @@ class Bench:
         jobs = [[asked(candidate, scenario) for scenario in scenarios] for candidate in candidates]
         keys = [[job.key for job in row] for row in jobs]
         together = (pair for row, own in zip(keys, jobs, strict=True) for pair in zip(row, own, strict=True))
-        swept(self.store, self.workers, run, together, self.progress)
+        run_jobs(self.store, self.workers, run, together, self.progress)
         return [[self.store[key] for key in row] for row in keys]
 
     def searched(self, candidates: Sequence[Settings], scenarios: Sequence[Scenario]) -> list[Worth]:
