@@ -34,7 +34,7 @@ def asked(seconds: float, count: int, first: int = 0) -> Iterator[tuple[str, Run
     """Runs that have not been made."""
     configuration = overridden(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
     for seed in range(first, first + count):
-        one = Run(EXPERIMENT.name, configuration, seed, 0.0, ("ride", "road_holding"))
+        one = Run(EXPERIMENT, configuration, seed, 0.0, ("ride", "road_holding"))
         yield one.key, one
 
 

@@ -1,4 +1,4 @@
-"""Results on disk, key → result, each there as a whole or not at all, whatever kills the program."""
+"""Results on disk, key → result, each there as a whole or not at all, whatever ends the program."""
 
 from __future__ import annotations
 
