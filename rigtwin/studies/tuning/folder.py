@@ -25,7 +25,7 @@ from rigtwin.studies.tuning.scenario import APART
 RUNS, SETTINGS, BEST, PAGE = "runs.sqlite", "tuned.toml", "best.mcap", "index.html"
 CAPTIONS = {
     "front": "Each point is a candidate; none of the front is beaten in both.",
-    "held-out": "Change against the settings named, in the same scenario; points are medians, bars their 95 % intervals.",
+    "held-out": "Change in the same scenario; points are medians, bars their 95 % intervals.",
     "search": "What the search tried, in order.",
     "parameters": "The first objective of every candidate over each parameter.",
 }
