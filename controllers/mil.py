@@ -136,7 +136,13 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
         compensation = observed(settings, compensation, measured.load_cell, period)
     elif settings.compensator != Compensator.NONE:
         compensation, velocities, errors = stepped(
-            settings, compensation, velocities, errors, measured.suspension_lvdt, demanded - force, period
+            settings,
+            compensation,
+            velocities,
+            errors,
+            travel=measured.suspension_lvdt,
+            error=demanded - force,
+            period=period,
         )
     integral, voltage = force_loop(settings, state.integral, demanded, force, compensation.added, period)
     compensation = pushed(compensation, MOTOR_CONSTANT * voltage, period)
