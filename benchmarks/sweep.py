@@ -19,7 +19,7 @@ import numpy as np
 from experiments import EXPERIMENTS
 from rigtwin.console import table
 from rigtwin.machine.configuration import overridden
-from rigtwin.studies.sweep import Store, Workers, hired, swept
+from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
 from rigtwin.studies.tuning.run import Run, run
 
 ROUNDS = 5
@@ -34,7 +34,7 @@ def asked(seconds: float, count: int, first: int = 0) -> Iterator[tuple[str, Run
     """Runs that have not been made."""
     configuration = overridden(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
     for seed in range(first, first + count):
-        one = Run(EXPERIMENT.name, configuration, seed, 0.0, ("ride", "road_holding"))
+        one = Run(EXPERIMENT, configuration, seed, 0.0, ("ride", "road_holding"))
         yield one.key, one
 
 
@@ -46,7 +46,7 @@ def timed(workers: Workers, folder: Path, number: int) -> float:
     """s of a round's runs, workers warm."""
     with Store(folder / f"{number}-{workers.capacity}.sqlite") as store:
         begin = time.perf_counter()
-        swept(store, workers, run, asked(6.0, RUNS, 1000 * number))
+        run_jobs(store, workers, run, asked(6.0, RUNS, 1000 * number))
         return time.perf_counter() - begin
 
 
@@ -61,7 +61,7 @@ def alone(job: Run) -> float:
 def scaling(folder: Path) -> None:
     """1 against 2 workers, side by side; and two processes that know nothing of each other, which is what the machine gives."""
     ratios, machine = [], []
-    with hired(1) as one, hired(2) as two, multiprocessing.get_context("spawn").Pool(2) as pool:
+    with open_workers(1) as one, open_workers(2) as two, multiprocessing.get_context("spawn").Pool(2) as pool:
         jobs = [job for _, job in asked(6.0, 2)]
         timed(one, folder, 900)
         timed(two, folder, 900)
@@ -78,19 +78,19 @@ def overhead(folder: Path) -> None:
     """ms a run besides the run: its key, on its way there and back, and into the store."""
     rows = [("workers", "ms a run")]
     for count in (1, 2):
-        with hired(count) as workers, Store(folder / f"overhead-{count}.sqlite") as store:
-            swept(store, workers, nothing, asked(6.0, 50, 10**6))
+        with open_workers(count) as workers, Store(folder / f"overhead-{count}.sqlite") as store:
+            run_jobs(store, workers, nothing, asked(6.0, 50, 10**6))
             begin = time.perf_counter()
-            swept(store, workers, nothing, asked(6.0, TRIVIAL))
+            run_jobs(store, workers, nothing, asked(6.0, TRIVIAL))
             rows.append((str(count), f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
     with (
         cluster(folder) as address,
-        hired(None, address) as workers,
+        open_workers(None, address) as workers,
         Store(folder / "overhead-cluster.sqlite") as store,
     ):
-        swept(store, workers, nothing, asked(6.0, 50, 10**6))
+        run_jobs(store, workers, nothing, asked(6.0, 50, 10**6))
         begin = time.perf_counter()
-        swept(store, workers, nothing, asked(6.0, TRIVIAL))
+        run_jobs(store, workers, nothing, asked(6.0, TRIVIAL))
         rows.append((f"cluster of {workers.capacity}", f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
     print(table(rows))
 
@@ -124,9 +124,9 @@ def resident(process: int) -> float:
 def memory(folder: Path) -> None:
     """Of the program and its workers over many short runs."""
     rows = [("runs", "program, MB", "a worker, MB")]
-    with hired(2) as workers, Store(folder / "memory.sqlite") as store:
+    with open_workers(2) as workers, Store(folder / "memory.sqlite") as store:
         for done in range(0, MANY, GENERATION):
-            swept(store, workers, run, asked(0.05, GENERATION, done))
+            run_jobs(store, workers, run, asked(0.05, GENERATION, done))
             if done + GENERATION in (1000, 2500, 5000, 7500, MANY):
                 own = [child.pid for child in multiprocessing.active_children() if child.pid is not None]
                 largest = max(map(resident, own))

@@ -9,7 +9,7 @@ the friction force, see `observed`.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from controllers.compiled import compilable
 from controllers.filters import low_pass
@@ -34,31 +34,42 @@ Errors = tuple[float, ...]
 
 
 class Compensation(NamedTuple):
-    """What the compensator remembers. Times in s, forces in N, velocity m/s; directions are +1, −1, or 0 for none."""
+    """What the compensator remembers. Times in s, forces in N, velocity m/s; directions are +1, −1,
+    or 0 for none.
 
-    travel: float
+    The thesis' compensator alone uses what stands before `added`, the observer alone what stands
+    behind it.
+    """
+
+    travel: float = math.nan
     """The last sample of the suspension travel; not a number before the first."""
-    velocity: float
-    acceleration: float
-    window: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    window: float = 0.0
     """Direction of the motion expected after the crossing."""
-    open_for: float
-    wait: float
+    open_for: float = 0.0
+    wait: float = 0.0
     """Until the next step may come."""
-    pending: float
+    pending: float = 0.0
     """Force that the second step takes back."""
-    added: float
+    added: float = 0.0
     """Force added to what the motor is told."""
-    motor: float
+    motor: float = 0.0
     """Force of the motor by its model."""
-    friction: float
-    notch_in: float
-    notch_before: float
-    notch_out: float
-    notch_last: float
+    friction: float = 0.0
+    notch_in: float = 0.0
+    notch_before: float = 0.0
+    notch_out: float = 0.0
+    notch_last: float = 0.0
 
 
-REST = Compensation(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+REST = Compensation()
+# Compiled code takes neither defaults nor `_replace`, but slices whose ends are constants.
+ADDED = Compensation._fields.index("added")
+MOTOR = Compensation._fields.index("motor")
+BEHIND_MOTOR = MOTOR + 1
+NO_STEPS = (0.0,) * ADDED
+"""The memory of the thesis' compensator while the observer is at work."""
 NO_VELOCITIES: Velocities = (0.0,) * HISTORY
 NO_ERRORS: Errors = (0.0,) * ERRORS
 
@@ -152,7 +163,7 @@ def stepped(
         level += jump
         pending = (FIRST_STEP - 1.0) * jump if settings.compensator == Compensator.TWO_STEP else 0.0
     added = level + pending
-    after = Compensation(travel, velocity, acceleration, window, open_for, wait, pending, added, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    after = Compensation(travel, velocity, acceleration, window, open_for, wait, pending, added, *REST[MOTOR:])
     return after, velocities, errors
 
 
@@ -167,7 +178,7 @@ def observed(settings: Settings, state: Compensation, sample: float, period: flo
     """
     residual = state.motor - sample
     if math.isnan(state.travel):
-        return Compensation(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, sample, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return Compensation(*(NO_STEPS + (0.0, sample) + REST[BEHIND_MOTOR:]))  # noqa: RUF005
     clean = residual
     if settings.observer_notch > 0.0:
         turn = 2.0 * math.cos(2.0 * math.pi * MAINS * period)
@@ -180,41 +191,14 @@ def observed(settings: Settings, state: Compensation, sample: float, period: flo
         friction = low_pass(state.friction, clean, settings.observer_lag, period)
     stays = math.exp(-period / MOTOR_LAG)
     added = friction + (friction - state.friction) * stays / (1.0 - stays)
-    return Compensation(
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        added,
-        state.motor,
-        friction,
-        residual,
-        state.notch_in,
-        clean,
-        state.notch_out,
-    )
+    notch = (residual, state.notch_in, clean, state.notch_out)
+    observer: Any = (added, state.motor, friction) + notch  # noqa: RUF005
+    return Compensation(*(NO_STEPS + observer))
 
 
 @compilable
 def pushed(state: Compensation, force: float, period: float) -> Compensation:
     """The memory with the motor's model one tick on. force: what the motor is told to push, N."""
     stays = math.exp(-period / MOTOR_LAG)
-    return Compensation(
-        state.travel,
-        state.velocity,
-        state.acceleration,
-        state.window,
-        state.open_for,
-        state.wait,
-        state.pending,
-        state.added,
-        stays * state.motor + (1.0 - stays) * force,
-        state.friction,
-        state.notch_in,
-        state.notch_before,
-        state.notch_out,
-        state.notch_last,
-    )
+    motor = stays * state.motor + (1.0 - stays) * force
+    return Compensation(*(state[:MOTOR] + (motor,) + state[BEHIND_MOTOR:]))  # noqa: RUF005

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from controllers.beam import AT_REST, Modes, Six, at_start, beam, centre, modes
 from controllers.compiled import compilable
@@ -27,22 +27,44 @@ class Controller(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the controller remembers from tick to tick, all floats. Positions m, velocities m/s, forces N."""
+    """What the controller remembers from tick to tick, all floats. Positions m, velocities m/s,
+    forces N.
 
-    sample: float
+    Numbers stand first, then tuples of numbers; the defaults give their lengths.
+    """
+
+    sample: float = math.nan
     """The last raw travel; not a number before the first tick."""
-    travel: float
-    velocity: float
-    force: float
-    integral: float
-    structure_position: float
-    structure_velocity: float
-    modal: Six
+    travel: float = 0.0
+    velocity: float = 0.0
+    force: float = 0.0
+    integral: float = 0.0
+    structure_position: float = 0.0
+    structure_velocity: float = 0.0
+    modal: Six = AT_REST
     """Displacements of the structure's modes, and their rates."""
-    modal_rates: Six
-    compensation: Compensation
-    velocities: Velocities
-    errors: Errors
+    modal_rates: Six = AT_REST
+    compensation: Compensation = REST
+    velocities: Velocities = NO_VELOCITIES
+    errors: Errors = NO_ERRORS
+
+
+def _lay_out(state: State) -> dict[str, slice]:
+    """Field → where its numbers stand in a packed state."""
+    places, first = {}, 0
+    for name, value in state._asdict().items():
+        last = first + (len(value) if isinstance(value, tuple) else 1)
+        places[name], first = slice(first, last), last
+    return places
+
+
+PLACES = _lay_out(State())
+SIZE = PLACES[State._fields[-1]].stop
+"""Numbers in a packed state."""
+# Compiled code knows slices that are constants of the module, and no tables of them.
+_MODAL, _RATES, _COMPENSATION = PLACES["modal"], PLACES["modal_rates"], PLACES["compensation"]
+_VELOCITIES, _ERRORS = PLACES["velocities"], PLACES["errors"]
+_NUMBERS = slice(0, _MODAL.start)
 
 
 def controller(settings: Settings, period: float) -> Controller:
@@ -53,37 +75,24 @@ def controller(settings: Settings, period: float) -> Controller:
 def initial_state(controller: Controller) -> State:
     """The state before the first tick: the structure model at rest at `start`."""
     settings = controller.settings
-    modal = at_start(settings, controller.modes)
-    return State(math.nan, 0.0, 0.0, 0.0, 0.0, settings.start, 0.0, modal, AT_REST, REST, NO_VELOCITIES, NO_ERRORS)
+    return State(structure_position=settings.start, modal=at_start(settings, controller.modes))
 
 
 @compilable
 def packed(state: State) -> tuple[float, ...]:
     """The state as plain numbers."""
-    return state[:7] + state[7] + state[8] + state[9][:] + state[10] + state[11]
-
-
-SIZE = 7 + 6 + 6 + len(REST) + len(NO_VELOCITIES) + len(NO_ERRORS)
-"""Numbers in a packed state."""
+    numbers: Any = state[_NUMBERS]
+    memory = state.compensation[:] + state.velocities + state.errors
+    return numbers + state.modal + state.modal_rates + memory
 
 
 @compilable
 def unpacked(values: tuple[float, ...]) -> State:
     """The state of its plain numbers, SIZE of them."""
-    return State(
-        values[0],
-        values[1],
-        values[2],
-        values[3],
-        values[4],
-        values[5],
-        values[6],
-        values[7:13],
-        values[13:19],
-        Compensation(*values[19:33]),
-        values[33:50],
-        values[50:56],
-    )
+    numbers: Any = values[_NUMBERS]
+    compensation = Compensation(*values[_COMPENSATION])
+    tuples = (values[_MODAL], values[_RATES], compensation, values[_VELOCITIES], values[_ERRORS])
+    return State(*(numbers + tuples))
 
 
 @compilable
@@ -127,22 +136,28 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
         compensation = observed(settings, compensation, measured.load_cell, period)
     elif settings.compensator != Compensator.NONE:
         compensation, velocities, errors = stepped(
-            settings, compensation, velocities, errors, measured.suspension_lvdt, demanded - force, period
+            settings,
+            compensation,
+            velocities,
+            errors,
+            travel=measured.suspension_lvdt,
+            error=demanded - force,
+            period=period,
         )
     integral, voltage = force_loop(settings, state.integral, demanded, force, compensation.added, period)
     compensation = pushed(compensation, MOTOR_CONSTANT * voltage, period)
     after = State(
-        sample,
-        travel,
-        velocity,
-        force,
-        integral,
-        position,
-        structure_velocity,
-        modal,
-        modal_rates,
-        compensation,
-        velocities,
-        errors,
+        sample=sample,
+        travel=travel,
+        velocity=velocity,
+        force=force,
+        integral=integral,
+        structure_position=position,
+        structure_velocity=structure_velocity,
+        modal=modal,
+        modal_rates=modal_rates,
+        compensation=compensation,
+        velocities=velocities,
+        errors=errors,
     )
     return after, Commands(demand.ground, position, demanded, voltage)

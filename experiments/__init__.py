@@ -1,8 +1,8 @@
 """The experiments of the rig, by name. One module a study."""
 
 from experiments import imposed, quarter_car, single_mass, vehicles
-from experiments.experiment import Experiment
 from rigtwin.errors import RigtwinError
+from rigtwin.simulation.experiment import Experiment
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment for module in (quarter_car, single_mass, imposed, vehicles) for experiment in module.EXPERIMENTS
@@ -17,4 +17,4 @@ def find(name: str) -> Experiment:
         raise RigtwinError(f"unknown experiment {name!r}; there are {', '.join(EXPERIMENTS)}") from None
 
 
-__all__ = ["EXPERIMENTS", "Experiment", "find"]
+__all__ = ["EXPERIMENTS", "find"]

@@ -1,33 +1,12 @@
-"""What an experiment is: a configuration, and what it demands of the rig."""
+"""What experiments are made of: time, random numbers, and the grounds that several share."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.excitation import road_profile
-
-Progress = Callable[[int], object]
-"""Called with the steps done since its last call."""
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """A test that can be run by name.
-
-    demands: of (configuration, seed), the columns of controllers.Demand at every tick, shape (ticks, 3): ground m,
-    structure m, force N; the last two count in imposed tests only.
-    """
-
-    name: str
-    summary: str
-    source: str
-    configuration: Configuration
-    demands: Callable[[Configuration, int], Array]
 
 
 def time_of(configuration: Configuration) -> Array:

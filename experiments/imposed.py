@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from controllers import Mode, Settings
-from experiments.experiment import Experiment, random_of, time_of
+from experiments.experiment import random_of, time_of
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.excitation import multisine
+from rigtwin.simulation.experiment import Experiment
 
 FORCE_MEAN = 230.0
 """N; keeps the tyre pressed while the force swings."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from controllers import Settings, Skyhook, Structure
-from experiments.experiment import Experiment, flat_ground, road_ground
+from experiments.experiment import flat_ground, road_ground
 from rigtwin.components import GasSpring, RigPlant
 from rigtwin.machine.configuration import Configuration, Road, Timing
+from rigtwin.simulation.experiment import Experiment
 
 PASSIVE = Settings()
 SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from controllers import Settings, Travel
-from experiments.experiment import Experiment, flat_ground, road_ground
+from experiments.experiment import flat_ground, road_ground
 from rigtwin.machine.configuration import Configuration, Road, Safety, Timing
+from rigtwin.simulation.experiment import Experiment
 
 CHAPTER_3 = Settings(
     travel=Travel.GROUND,

@@ -6,9 +6,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers import Settings
-from experiments.experiment import Experiment, flat_ground
+from experiments.experiment import flat_ground
 from rigtwin.components import Carriage, RigPlant, Tyre
 from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.simulation.experiment import Experiment
 
 
 class Vehicle(NamedTuple):

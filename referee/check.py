@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, Workers, each, swept
+from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
 """Contents of a case's recordings: the one that is diagnosed, and the one held out. A worker needs no disk in common."""
@@ -86,7 +86,7 @@ def _diagnosed(recordings: Path, cases: int, workers: Workers, progress: Callabl
 
     keys = [_key(recordings, number) for number in range(cases)]
     with Store(recordings / "answers.sqlite") as store:
-        swept(store, workers, answer, jobs(), progress)
+        run_jobs(store, workers, answer, jobs(), progress)
         return [store[key] for key in keys]
 
 
@@ -129,4 +129,4 @@ def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
     from referee.crude import TRIED
 
     jobs = ((str(number), _paths(recordings, number)[0].read_bytes()) for number in range(min(cases, TRIED)))
-    return {int(number): name for number, name in sorted(each(workers, named, jobs), key=lambda pair: int(pair[0]))}
+    return {int(number): name for number, name in sorted(iterate_results(workers, named, jobs), key=lambda pair: int(pair[0]))}

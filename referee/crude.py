@@ -22,6 +22,8 @@ SECONDS = 6.0
 """s of each test."""
 BETTER = 0.98
 """Share of the nominal misfit below which an effect counts as found."""
+NO_SIZES = Scales(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+"""The rig's starts need no sizes of its motion."""
 
 
 def black_box(path: Path) -> str:
@@ -43,8 +45,7 @@ def black_box(path: Path) -> str:
     swing = swings(machine, (recording,))
     for effect in candidates(configuration.plant):
         if effect.searched:
-            # The rig's starts need no sizes of its motion.
-            starts = effect.starts(configuration.plant, swing.get(effect.component, Swing()), Scales)
+            starts = effect.starts(configuration.plant, swing.get(effect.component, Swing()), lambda: NO_SIZES)
             for start in starts.values[:8]:
                 if (value := misfit(with_values(configuration.plant, (effect,), (start,)))) < best:
                     best, name = value, effect.name

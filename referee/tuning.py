@@ -1,5 +1,8 @@
-"""Whether a diagnosis is worth tuning on: rigs with a friction that is withheld, diagnosed from one recording; the controller
-tuned on the twin so corrected, and on the nominal one; both judged on the rig itself."""
+"""Whether a diagnosis is worth tuning on.
+
+Rigs with a friction that is withheld are diagnosed from one recording; the controller is tuned on
+the twin so corrected, and on the nominal one; both are evaluated on the rig itself.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,21 @@ import numpy as np
 from controllers import Settings
 from referee.draw import Defect, friction, tolerated
 from referee.referee import write
+from referee.reference_drive import driven
 from referee.reference_plant import Truth
 from referee.reference_rig import Law, run
 from referee.test_signals import asked
 from rigtwin.console import table
-from rigtwin.machine.posterior import load_posterior
-from rigtwin.studies.sweep import swept
+from rigtwin.machine.posterior import Posterior, load_posterior
+from rigtwin.studies.sweep import run_jobs
 from rigtwin.studies.tuning.bench import Bench
-from rigtwin.studies.tuning.judged import Comparison, comparison
-from rigtwin.studies.tuning.outcome import BEFORE, TUNED_NOMINAL, searched
+from rigtwin.studies.tuning.evaluation import Comparison, compare
+from rigtwin.studies.tuning.result import BEFORE, TUNED_NOMINAL, find_settings
 from rigtwin.studies.tuning.run import Run, figures
-from rigtwin.studies.tuning.scenario import APART, diagnosed, nominal
+from rigtwin.studies.tuning.scenario import APART, NOMINAL, Scenario, calibrated_rig
 from rigtwin.studies.tuning.study import Study
-from rigtwin.studies.tuning.text import change
+from rigtwin.studies.tuning.text import change, percent
+from rigtwin.studies.tuning.text import number as number_text
 
 KINDS = ("coulomb", "viscous", "stribeck", "asymmetry")
 """Of friction at the motor, which a force loop feels most."""
@@ -35,8 +40,18 @@ TUNED_CALIBRATED = "tuned on the calibrated twin"
 
 @dataclass(frozen=True)
 class Case:
-    """One rig. defect: what was withheld; found: the diagnosis' sentence; against: the settings tuned on the calibrated twin
-    compared on the rig with those tuned on the nominal one, and with those begun with."""
+    """One rig, and what its diagnosis was worth.
+
+    Parameters
+    ----------
+    number : int
+        Which rig.
+    defect, found : str
+        What was withheld, and the diagnosis' sentence.
+    against_nominal, against_before : Comparison
+        The settings tuned on the calibrated twin compared on the rig with those tuned on the
+        nominal one, and with the baseline.
+    """
 
     number: int
     defect: str
@@ -45,8 +60,35 @@ class Case:
     against_before: Comparison
 
 
-def rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator]:
-    """A rig within its tolerances with a friction of its own; the random numbers go on to its recording."""
+@dataclass(frozen=True)
+class RigRun:
+    """A run to be made on a rig of the referee.
+
+    Parameters
+    ----------
+    truth : Truth
+        The rig.
+    run : Run
+        As it would be made on the twin.
+    """
+
+    truth: Truth
+    run: Run
+
+    @property
+    def key(self) -> str:
+        """The same for the same run, whoever asks."""
+        return hashlib.sha256(f"{self.truth!r} {self.run.key}".encode()).hexdigest()[:32]
+
+
+def draw_rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator]:
+    """Draw a rig within its tolerances with a friction of its own.
+
+    Returns
+    -------
+    Truth, Defect, Generator
+        The random numbers go on to the rig's recording.
+    """
     random = np.random.default_rng([seed, 6, number])
     plain = tolerated(random)
     options = [one for one in (make() for make in friction("motor", random)) if one.kind in KINDS]
@@ -55,8 +97,19 @@ def rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator]:
     return truth, defect, random
 
 
-def calibrated(case: tuple[int, int]) -> tuple[str, str]:
-    """Of (seed, number): what a diagnosis says that sees one recording alone, and the corrected twin's file."""
+def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
+    """Diagnose a rig from one recording alone.
+
+    Parameters
+    ----------
+    case : (int, int)
+        Seed and number, as `draw_rig` takes them.
+
+    Returns
+    -------
+    str, str
+        What the diagnosis says, and the corrected twin's file.
+    """
     from rigtwin.diagnosis.calibrated import toml
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.machine.configuration import Configuration
@@ -64,7 +117,7 @@ def calibrated(case: tuple[int, int]) -> tuple[str, str]:
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
 
-    truth, _, random = rig(*case)
+    truth, _, random = draw_rig(*case)
     law, demands = asked("imposed", random)
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "recording.mcap"
@@ -73,107 +126,130 @@ def calibrated(case: tuple[int, int]) -> tuple[str, str]:
     return outcome.diagnosis.sentence, toml(outcome)
 
 
-@dataclass(frozen=True)
-class OnRig:
-    """A run to be made on a rig of the referee."""
-
-    truth: Truth
-    asked: Run
-
-    @property
-    def key(self) -> str:
-        return hashlib.sha256(f"{self.truth!r} {self.asked.key}".encode()).hexdigest()[:32]
+def run_on_rig(job: RigRun) -> dict[str, float]:
+    """Make a run on a rig: name → figure, as the twin's runs give it."""
+    asked, configuration = job.run, job.run.configuration
+    demands = asked.experiment.demands(configuration, asked.seed)
+    return figures(asked, driven(job.truth, configuration, demands, asked.seed))
 
 
-def on_rig(job: OnRig) -> dict[str, float]:
-    """Name → figure, as the twin's runs give it."""
-    import experiments
-    from referee.reference_drive import driven
-
-    configuration = job.asked.configuration
-    demands = experiments.find(job.asked.experiment).demands(configuration, job.asked.seed)
-    return figures(job.asked, driven(job.truth, configuration, demands, job.asked.seed))
-
-
-def checked(
+def check(
     bench: Bench,
     cases: int,
     seed: int,
     stage: Callable[[str], object] = lambda _: None,
-    said: Callable[[Case], object] = lambda _: None,
+    show: Callable[[Case], object] = lambda _: None,
 ) -> list[Case]:
-    """The whole check; said: called with each case as it is known. Raises RigtwinError where a tuning fails."""
-    study = bench.study
+    """Make the whole check.
+
+    Parameters
+    ----------
+    bench : Bench
+        Where the study's runs are made.
+    cases : int
+        Rigs.
+    seed : int
+        That they are drawn from.
+    stage : callable, optional
+        Called with what begins.
+    show : callable, optional
+        Called with each case as it is known.
+
+    Raises
+    ------
+    RigtwinError
+        Where a tuning fails.
+    """
     stage("tuning on the nominal twin")
-    plain = searched(bench, nominal, seed)
+    plain = find_settings(bench, NOMINAL, seed)
     stage("diagnosing")
     jobs = [(f"diagnosis {seed} {number}", (seed, number)) for number in range(cases)]
-    swept(bench.store, bench.workers, calibrated, jobs, bench.progress)
+    run_jobs(bench.store, bench.workers, diagnose_rig, jobs, bench.progress)
     found = []
     for number, (key, _) in enumerate(jobs):
         sentence, toml = bench.store[key]
         stage(f"rig {number + 1}: tuning on its calibrated twin")
-        with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
-            path = Path(folder) / "calibrated.toml"
-            path.write_text(toml)
-            posterior = load_posterior(path)
-        corrected = searched(bench, diagnosed(posterior), seed)
-        truth, defect, _ = rig(seed, number)
-        runs = [[OnRig(truth, run) for run in _runs(study, settings)] for settings in (study.reference, plain, corrected)]
-        swept(bench.store, bench.workers, on_rig, ((job.key, job) for row in runs for job in row), bench.progress)
-        before, one, other = ([bench.store[job.key] for job in row] for row in runs)
-        name = f"rig {number + 1}"
+        corrected = find_settings(bench, calibrated_rig(_posterior(toml)), seed)
+        truth, defect, _ = draw_rig(seed, number)
+        settings = [bench.study.baseline_settings, plain, corrected]
+        before, one, other = _run_all(bench, truth, settings)
+        rig, measures = f"rig {number + 1}", bench.study.goals.measures
+        after = (TUNED_CALIBRATED, other)
+        values = f"{number_text(defect.value)}, nominal {number_text(defect.nominal)}"
         case = Case(
-            number,
-            f"{defect.kind}@{defect.component} {defect.value:.4g}, nominal {defect.nominal:.4g}",
-            sentence,
-            comparison(study.measures, name, (TUNED_NOMINAL, one), (TUNED_CALIBRATED, other)),
-            comparison(study.measures, name, (BEFORE, before), (TUNED_CALIBRATED, other)),
+            number=number,
+            defect=f"{defect.kind}@{defect.component} {values}",
+            found=sentence,
+            against_nominal=compare(measures, rig, (TUNED_NOMINAL, one), after),
+            against_before=compare(measures, rig, (BEFORE, before), after),
         )
         found.append(case)
-        said(case)
+        show(case)
     return found
 
 
-def _runs(study: Study, settings: Settings) -> list[Run]:
-    names = tuple(measure.name for measure in study.measures)
-    configuration = study.configuration._replace(controller=settings)
-    return [Run(study.experiment, configuration, APART + road, study.first, names) for road in range(study.held_out)]
+def _posterior(toml: str) -> Posterior:
+    with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
+        path = Path(folder) / "calibrated.toml"
+        path.write_text(toml)
+        return load_posterior(path)
+
+
+def _run_all(
+    bench: Bench,
+    truth: Truth,
+    candidates: list[Settings],
+) -> list[list[dict[str, float]]]:
+    """Run every candidate on a rig over the study's held-out roads, a row a candidate."""
+    base, count = bench.study.configuration, bench.study.budget.held_out
+    roads = [Scenario(APART + road, base.plant) for road in range(count)]
+    jobs = [[RigRun(truth, bench.plan(base, one, road)) for road in roads] for one in candidates]
+    flat = ((job.key, job) for row in jobs for job in row)
+    run_jobs(bench.store, bench.workers, run_on_rig, flat, bench.progress)
+    return [[bench.store[job.key] for job in row] for row in jobs]
 
 
 def text(study: Study, cases: list[Case]) -> str:
     """All cases as a table, and how many are better for the diagnosis."""
-    objective = study.minimise[0]
-    rows = [("rig", "withheld", "tuned on nominal", "on calibrated", "change", "95 % of the median", "against before")]
+    objective = study.goals.minimise[0]
+    header = ("rig", "withheld", "tuned on nominal", "on calibrated", "change")
+    rows: list[tuple[str, ...]] = [(*header, "95 % of the median", "against before")]
     better = worse = tripped = 0
     for case in cases:
+        name = str(case.number + 1)
         trips = [*case.against_nominal.trips, case.against_before.trips[0]]
         if max(trips) > 0.0:
             tripped += 1
-            shares = " / ".join(f"{100.0 * share:.0f} %" for share in trips)
-            said = f"trips on nominal / calibrated / before: {shares}"
-            rows.append((str(case.number + 1), case.defect, said, "", "", "", ""))
+            said = f"trips on nominal / calibrated / before: {' / '.join(map(percent, trips))}"
+            rows.append((name, case.defect, said, "", "", "", ""))
             continue
-        one, begun = case.against_nominal.of(objective.name), case.against_before.of(objective.name)
+        one = case.against_nominal.of(objective.name)
+        begun = case.against_before.of(objective.name)
         better, worse = better + one.improved, worse + (one.low > 0.0)
-        figures = f"{one.before.median:.4g} {objective.unit}", f"{one.after.median:.4g} {objective.unit}"
-        rows.append((str(case.number + 1), case.defect, *figures, *change(one), change(begun)[0]))
-    said = f"{objective.title} on the rigs themselves: better for the diagnosis on {better} of {len(cases)}, worse on {worse}"
+        spreads, unit = (one.before, one.after), objective.unit
+        medians = [f"{number_text(each.median)} {unit}" for each in spreads]
+        rows.append((name, case.defect, *medians, *change(one), change(begun)[0]))
+    said = f"{objective.title} on the rigs themselves: better for the diagnosis on {better}"
     left = len(cases) - better - worse - tripped
-    return f"{table(rows)}\n{said}, no difference to be told on {left}, tripped on {tripped}"
+    rest = f"no difference to be told on {left}, tripped on {tripped}"
+    return f"{table(rows)}\n{said} of {len(cases)}, worse on {worse}, {rest}"
 
 
 def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
     """All cases for other programs."""
-    name = study.minimise[0].name
+    name = study.goals.minimise[0].name
+
+    def told(comparison: Comparison) -> dict[str, object] | None:
+        if not comparison.changes:
+            return None
+        return asdict(replace(comparison.of(name), measure=None))  # type: ignore[arg-type]
+
     return [
         {
             "defect": case.defect,
             "diagnosed": case.found,
-            **{
-                label: asdict(replace(each.of(name), measure=None)) if each.changes else None  # type: ignore[arg-type]
-                for label, each in (("against_nominal", case.against_nominal), ("against_before", case.against_before))
-            },
+            "against_nominal": told(case.against_nominal),
+            "against_before": told(case.against_before),
         }
         for case in cases
     ]

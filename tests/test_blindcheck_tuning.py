@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments import find
+from experiments import EXPERIMENTS, find
 from referee.reference_drive import driven
 from referee.reference_plant import Truth
 from referee.reference_rig import run
 from referee.test_signals import asked
-from referee.tuning import Case, checked, rig, text
+from referee.tuning import Case, check, draw_rig, text
 from rigtwin.cli import main
 from rigtwin.machine.configuration import Configuration, overridden
 from rigtwin.simulation.runner import simulated
@@ -18,10 +18,10 @@ from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here
 from rigtwin.studies.tuning.bench import Bench
-from rigtwin.studies.tuning.judged import comparison
+from rigtwin.studies.tuning.evaluation import compare
 from rigtwin.studies.tuning.measures import Trial
-from rigtwin.studies.tuning.reading import parsed
 from rigtwin.studies.tuning.run import LIMITS, TRIP
+from rigtwin.studies.tuning.study_file import parse_study
 
 
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
@@ -60,11 +60,11 @@ def test_a_limit_ends_a_test_on_it():
 
 
 def test_rigs_are_drawn_from_their_seed_with_a_friction_each():
-    kinds = [rig(1, number)[1].kind for number in range(8)]
+    kinds = [draw_rig(1, number)[1].kind for number in range(8)]
     assert set(kinds) == {"coulomb", "viscous", "stribeck", "asymmetry"}
-    assert rig(1, 3)[0] == rig(1, 3)[0]
-    assert rig(1, 3)[0] != rig(2, 3)[0]
-    assert all(rig(5, number)[1].component == "motor" for number in range(8))
+    assert draw_rig(1, 3)[0] == draw_rig(1, 3)[0]
+    assert draw_rig(1, 3)[0] != draw_rig(2, 3)[0]
+    assert all(draw_rig(5, number)[1].component == "motor" for number in range(8))
 
 
 STUDY = {
@@ -84,13 +84,13 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     """With what a diagnosis would say taken as given: the rig has more friction than the nominal one."""
     import referee.tuning as module
 
-    monkeypatch.setattr(module, "calibrated", lambda _: ("more friction", "[motor]\ncoulomb = 28.0\n"))
+    monkeypatch.setattr(module, "diagnose_rig", lambda _: ("more friction", "[motor]\ncoulomb = 28.0\n"))
     said: list[Case] = []
     with Store(tmp_path / "s.sqlite") as store:
-        study = parsed("s", STUDY)
-        found = checked(Bench(study, store, Here()), 1, 4, said=said.append)
+        study = parse_study("s", STUDY, EXPERIMENTS)
+        found = check(Bench(study, store, Here()), 1, 4, show=said.append)
         made = len(store)
-        again = checked(Bench(study, store, Here()), 1, 4)
+        again = check(Bench(study, store, Here()), 1, 4)
         assert len(store) == made
     assert found == said == again
     (case,) = found
@@ -101,13 +101,13 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
 
 
 def test_what_is_better_is_counted_by_its_interval():
-    study = parsed("s", STUDY)
+    study = parse_study("s", STUDY, EXPERIMENTS)
 
     def case(number: int, after: list[float], trips: float = 0.0) -> Case:
         rows = [
             [{"force_error": value, TRIP: trips, LIMITS: 0.5} for value in values] for values in ([10.0] * len(after), after)
         ]
-        against = comparison(study.measures, "rig", ("before", rows[0]), ("tuned", rows[1]))
+        against = compare(study.goals.measures, "rig", ("before", rows[0]), ("tuned", rows[1]))
         return Case(number, "coulomb@motor", "found", against, against)
 
     better, worse = [9.0 + 0.1 * n for n in range(8)], [11.0 + 0.1 * n for n in range(8)]

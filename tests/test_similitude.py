@@ -11,7 +11,7 @@ from controllers import Settings
 from controllers.quantity import Quantity, fields
 from experiments.thesis import similitude as study
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.similitude import Dimension, dimension, largest_change, pi_groups, scaled, scaling, slowed
+from rigtwin.studies.similitude import Dimension, dimension, largest_change, pi_groups, scale_values, scaling, slow_down
 
 BASES = ("kg", "m", "s")
 QUARTER_CAR = {"mass": "kg", "stiffness": "N/m", "damping": "Ns/m", "stroke": "m", "gravity": "m/s^2", "time": "s"}
@@ -99,7 +99,7 @@ def test_groups_are_dimensionless_independent_and_complete(seed: int):
 def test_a_scaled_system_keeps_its_groups(seed: int):
     units, values = drawn(seed)
     chosen = dict(zip(units, (10.0 ** np.random.default_rng(seed).uniform(-1, 1, 3)).tolist(), strict=False))
-    rig = scaled(values, units, scaling(units, chosen))
+    rig = scale_values(values, units, scaling(units, chosen))
     for name, factor in chosen.items():
         assert rig[name] == pytest.approx(factor * values[name], rel=1e-12)
     for group in pi_groups(units):
@@ -110,13 +110,13 @@ def test_a_scaled_system_keeps_its_groups(seed: int):
 @pytest.mark.parametrize("seed", range(10))
 def test_a_system_that_is_not_similar_is_found_out(seed: int):
     units, values = drawn(seed)
-    rig = scaled(values, units, scaling(units, {"q0": 0.5, "q1": 2.0, "q2": 3.0}))
+    rig = scale_values(values, units, scaling(units, {"q0": 0.5, "q1": 2.0, "q2": 3.0}))
     assert largest_change(units, values, rig | {"q5": 1.01 * rig["q5"]}) > 5e-3
 
 
 def test_a_zero_stays_zero():
     values = dict.fromkeys(QUARTER_CAR, 2.0) | {"damping": 0.0}
-    rig = scaled(values, QUARTER_CAR, scaling(QUARTER_CAR, {"mass": 0.1, "stroke": 0.3, "time": 2.0}))
+    rig = scale_values(values, QUARTER_CAR, scaling(QUARTER_CAR, {"mass": 0.1, "stroke": 0.3, "time": 2.0}))
     assert largest_change(QUARTER_CAR, values, rig) < 1e-12
     assert largest_change(QUARTER_CAR, values, rig | {"damping": 1.0}) == math.inf
     assert largest_change(QUARTER_CAR, values, rig | {"mass": -rig["mass"]}) == math.inf
@@ -133,7 +133,7 @@ def test_parameters_of_the_rig_can_be_scaled():
     units = {name: meaning.unit for name, meaning in fields(Settings).items() if isinstance(meaning, Quantity)}
     units = {name: unit for name, unit in units.items() if "V" not in unit}
     values = {name: getattr(Settings(), name) for name in units}
-    other = scaled(values, units, scaling(units, {"sprung_mass": 4.0, "start": 2.0, "filter_force": 3.0}))
+    other = scale_values(values, units, scaling(units, {"sprung_mass": 4.0, "start": 2.0, "filter_force": 3.0}))
     assert other["suspension_stiffness"] == pytest.approx(4.0 / 9.0 * values["suspension_stiffness"])
     ratio = [
         each["suspension_damping"] / math.sqrt(each["suspension_stiffness"] * each["sprung_mass"]) for each in (values, other)
@@ -163,20 +163,20 @@ def test_bad_scales_are_one_line():
 
 def test_time_is_stretched_until_the_velocity_fits():
     real = scaling(QUARTER_CAR, {"mass": 0.01, "stroke": 0.5, "time": 1.0})
-    slow = slowed(real, -3.0, 0.3)
+    slow = slow_down(real, -3.0, 0.3)
     assert slow.time == pytest.approx(5.0)
     assert 3.0 * slow.factor("m/s") == pytest.approx(0.3)
     assert (slow.mass, slow.length) == (real.mass, real.length)
-    assert slowed(real, 0.1, 0.3) == real
+    assert slow_down(real, 0.1, 0.3) == real
     with pytest.raises(RigtwinError, match="limit of the velocity is 0 m/s"):
-        slowed(real, 1.0, 0.0)
+        slow_down(real, 1.0, 0.0)
 
 
 def test_the_landing_is_the_same_at_any_size_and_pace():
     instants = np.linspace(0.0, 1.5, 301)
     full = study.touch_down(study.BOEING, instants)
     real = study.similar(500.0, 0.559)
-    for scale in (real, slowed(real, 3.0, 0.3), study.similar(1e6, 0.05, 0.2)):
+    for scale in (real, slow_down(real, 3.0, 0.3), study.similar(1e6, 0.05, 0.2)):
         rig = study.at_scale(study.BOEING, scale)
         assert study.difference(full, study.mapped_back(rig, scale, instants)) < 1e-6
         one_off = rig._replace(damping=1.02 * rig.damping)

@@ -15,7 +15,7 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.runner import record
-from rigtwin.studies.friction_spikes import BOUNDS, calibrated, lagged, reversals
+from rigtwin.studies.friction_spikes import BOUNDS, calibrated, filter_lag, reversals
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +82,7 @@ def test_refuses_what_it_cannot_use(recording, example):
     columns["/sensor"]["load_cell"][7] = np.nan
     with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are no numbers"):
         calibrated(dataclasses.replace(example, columns=columns), settings)
-    columns["/sensor"]["load_cell"] = lagged(186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period)
+    columns["/sensor"]["load_cell"] = filter_lag(186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period)
     with pytest.raises(RigtwinError, match="no dry friction"):
         calibrated(dataclasses.replace(example, columns=columns), settings)
 

@@ -18,7 +18,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.studies.stability.critical import critical_delay, critical_lag
 from rigtwin.studies.stability.delayed import rightmost_delay_root
 from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, Setting, mode
-from rigtwin.studies.stability.loop import LOOPS, bound, delayed, lag_roots, lagged, single_mass
+from rigtwin.studies.stability.loop import LOOPS, bound, delay_function, lag_polynomial, lag_roots, single_mass
 from rigtwin.studies.stability.mapping import Axis, around, draw, stability_map
 from rigtwin.studies.stability.models import (
     MODELS,
@@ -210,7 +210,7 @@ class TestCriticalDelay:
             for part in (0.3, 1.0, 5.0):
                 delay = part * critical.time
                 root = rightmost_delay_root(loop, delay)
-                assert abs(delayed(loop, delay, root)) < 1e-8 * abs(loop[0](root))
+                assert abs(delay_function(loop, delay, root)) < 1e-8 * abs(loop[0](root))
                 margin = 1e-2 * abs(root)
                 assert roots_right_of(loop, delay, root.real + margin) == 0
                 assert roots_right_of(loop, delay, root.real - margin) >= 1
@@ -475,5 +475,5 @@ def critical_frequency(model, car):
 
 def test_the_polynomial_in_fractions_is_that_of_the_loop():
     for model, loop in LOOPS.items():
-        ours = lagged(loop(TABLE_6_2), 0.01).coef
+        ours = lag_polynomial(loop(TABLE_6_2), 0.01).coef
         assert ours == pytest.approx([float(each) for each in exact(model, TABLE_6_2, 0.01)], rel=1e-12)

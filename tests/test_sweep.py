@@ -17,8 +17,8 @@ import pytest
 
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, each, hired, swept
-from rigtwin.studies.sweep.cluster import _same
+from rigtwin.studies.sweep import Store, iterate_results, open_workers, run_jobs
+from rigtwin.studies.sweep.cluster import _run_if_same
 from rigtwin.studies.sweep.workers import Here
 
 
@@ -125,8 +125,8 @@ def test_what_was_done_is_not_done_again(tmp_path):
 
     steps: list[int] = []
     with Store(tmp_path / "s.sqlite") as store:
-        swept(store, Here(), counted, ((str(n), n) for n in range(5)))
-        swept(store, Here(), counted, ((str(n), n) for n in range(8)), steps.append)
+        run_jobs(store, Here(), counted, ((str(n), n) for n in range(5)))
+        run_jobs(store, Here(), counted, ((str(n), n) for n in range(8)), steps.append)
         assert [store[str(n)] for n in range(8)] == [-n for n in range(8)]
     assert ran == list(range(8))
     assert sum(steps) == 8
@@ -134,36 +134,36 @@ def test_what_was_done_is_not_done_again(tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_the_answers_do_not_depend_on_the_number_of_workers(count, tmp_path):
-    with hired(count) as workers, Store(tmp_path / "s.sqlite") as store:
-        swept(store, workers, square, ((f"{n:02d}", n) for n in range(20)))
+    with open_workers(count) as workers, Store(tmp_path / "s.sqlite") as store:
+        run_jobs(store, workers, square, ((f"{n:02d}", n) for n in range(20)))
         assert [store[key]["square"] for key in store.keys()] == [float(n * n) for n in range(20)]  # noqa: SIM118
 
 
 def test_several_processes_work():
-    with hired(2) as workers:
-        found = {result for _, result in each(workers, process, ((str(n), n) for n in range(30)))}
+    with open_workers(2) as workers:
+        found = {result for _, result in iterate_results(workers, process, ((str(n), n) for n in range(30)))}
     assert len(found) == 2
     assert os.getpid() not in found
 
 
 def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     mark = tmp_path / "mark"
-    with hired(2) as workers:
-        found = dict(each(workers, deadly, ((str(n), (str(mark), n)) for n in range(12))))
+    with open_workers(2) as workers:
+        found = dict(iterate_results(workers, deadly, ((str(n), (str(mark), n)) for n in range(12))))
     assert mark.exists()
     assert found == {str(n): 10 * n for n in range(12)}
 
 
 def test_a_job_that_always_kills_its_worker_is_named_in_the_end():
-    with pytest.raises(RigtwinError, match="a worker died 3 times over"), hired(2) as workers:
-        list(each(workers, always_deadly, ((str(n), n) for n in range(4))))
+    with pytest.raises(RigtwinError, match="a worker died 3 times over"), open_workers(2) as workers:
+        list(iterate_results(workers, always_deadly, ((str(n), n) for n in range(4))))
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_job_that_fails_ends_the_sweep_and_keeps_what_is_done(count, tmp_path):
     with Store(tmp_path / "s.sqlite") as store:
-        with pytest.raises(RigtwinError, match="3 cannot be done"), hired(count) as workers:
-            swept(store, workers, faulty, ((str(n), n) for n in range(100)))
+        with pytest.raises(RigtwinError, match="3 cannot be done"), open_workers(count) as workers:
+            run_jobs(store, workers, faulty, ((str(n), n) for n in range(100)))
         kept = {int(key) for key in store.keys()}  # noqa: SIM118
     # What was under way beside it may be lost, nothing else.
     assert len({0, 1, 2} - kept) < count
@@ -181,8 +181,8 @@ def test_jobs_are_taken_as_workers_become_free():
             taken += 1
             yield str(taken), taken
 
-    with hired(2) as workers:
-        for number, _ in enumerate(each(workers, square, endless())):
+    with open_workers(2) as workers:
+        for number, _ in enumerate(iterate_results(workers, square, endless())):
             assert taken - number < 12
             if number == 200:
                 break
@@ -191,20 +191,20 @@ def test_jobs_are_taken_as_workers_become_free():
 def test_wrong_workers_are_one_line():
     for count in (0, -1, 100_000):
         with pytest.raises(RigtwinError, match="expected 1 to 1024"):
-            hired(count)
+            open_workers(count)
     with pytest.raises(RigtwinError, match="expected one of them"):
-        hired(2, "tcp://127.0.0.1:1")
+        open_workers(2, "tcp://127.0.0.1:1")
 
 
 SWEEP = """
 import sys
 from pathlib import Path
-from rigtwin.studies.sweep import Store, hired, swept
+from rigtwin.studies.sweep import Store, open_workers, run_jobs
 from tests.test_sweep import slow
 
 if __name__ == "__main__":
-    with hired(2) as workers, Store(Path(sys.argv[1])) as store:
-        swept(store, workers, slow, ((str(n), n) for n in range(40)), lambda _: print("done", flush=True))
+    with open_workers(2) as workers, Store(Path(sys.argv[1])) as store:
+        run_jobs(store, workers, slow, ((str(n), n) for n in range(40)), lambda _: print("done", flush=True))
 """
 
 
@@ -235,7 +235,7 @@ def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
     with Store(path) as store:
         kept = set(store.keys())
         ran: list[int] = []
-        swept(store, Here(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40)))
+        run_jobs(store, Here(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40)))
         assert len(kept) + len(ran) == 40
         assert [store[str(n)] for n in range(40)] == list(range(40))
 
@@ -281,7 +281,7 @@ def joined(address: str):
     deadline = time.monotonic() + 60.0
     while True:
         try:
-            workers = hired(None, address)
+            workers = open_workers(None, address)
         except RigtwinError:
             workers = None
         if workers is not None and workers.capacity == 2:
@@ -301,7 +301,7 @@ def test_a_cluster_gives_the_same_answers_and_may_lose_a_worker(cluster, tmp_pat
             if done == 10:
                 processes[0].kill()
 
-        swept(store, workers, slow, ((f"{n:02d}", n) for n in range(60)), progress)
+        run_jobs(store, workers, slow, ((f"{n:02d}", n) for n in range(60)), progress)
         assert [store[key] for key in store.keys()] == list(range(60))  # noqa: SIM118
     assert processes[0].wait() == -signal.SIGKILL
     assert done == 60
@@ -333,16 +333,16 @@ def test_tune_says_the_same_on_a_cluster(cluster, tmp_path, capsys):
 
 def test_a_failing_job_on_a_cluster_is_one_line(cluster):
     address, _ = cluster
-    with pytest.raises(RigtwinError, match="3 cannot be done"), hired(None, address) as workers:
-        list(each(workers, faulty, ((str(n), n) for n in range(10))))
+    with pytest.raises(RigtwinError, match="3 cannot be done"), open_workers(None, address) as workers:
+        list(iterate_results(workers, faulty, ((str(n), n) for n in range(10))))
 
 
 def test_a_worker_with_other_sources_is_refused():
     with pytest.raises(RigtwinError, match="another version of rigtwin"):
-        _same("0" * 12, square, 2)
+        _run_if_same("0" * 12, square, 2)
 
 
 def test_a_cluster_that_is_not_there_is_one_line():
     pytest.importorskip("distributed")
     with pytest.raises(RigtwinError, match="no cluster at"):
-        hired(None, "tcp://127.0.0.1:9")
+        open_workers(None, "tcp://127.0.0.1:9")

@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 from controllers import Settings
+from experiments import EXPERIMENTS
 from experiments import find as experiment
+from experiments.tuning import STUDIES, find_study
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.configuration import Configuration, from_toml, overridden
@@ -22,15 +24,22 @@ from rigtwin.machine.posterior import Otherwise, Posterior, load_posterior, writ
 from rigtwin.recording import load
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here
-from rigtwin.studies.tuning.bench import Bench, Worth, quantile
-from rigtwin.studies.tuning.judged import comparison, median_interval
+from rigtwin.studies.tuning.bench import Bench, Score, quantile
+from rigtwin.studies.tuning.evaluation import compare, median_interval
 from rigtwin.studies.tuning.measures import MEASURES, Trial
-from rigtwin.studies.tuning.parameter import Parameter, values
-from rigtwin.studies.tuning.reading import find, parsed
+from rigtwin.studies.tuning.parameter import Parameter, values_at
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
-from rigtwin.studies.tuning.scenario import APART, diagnosed, drawn, nominal
-from rigtwin.studies.tuning.search import Search, Tried, best, bound_of, front
-from rigtwin.studies.tuning.study import Constraint, Study, shipped
+from rigtwin.studies.tuning.scenario import (
+    APART,
+    NOMINAL,
+    Rig,
+    Scenario,
+    calibrated_rig,
+    draw_scenarios,
+)
+from rigtwin.studies.tuning.search import Candidate, Search, bound_of, find_best, find_front
+from rigtwin.studies.tuning.study import Constraint, Study
+from rigtwin.studies.tuning.study_file import parse_study
 from tests.browser import BROWSER, looked_at
 
 SMALL = """
@@ -60,6 +69,15 @@ TABLES = {
     "minimise": "ride",
     "parameters": {"controller.skyhook_damping": [50.0, 1500.0]},
 }
+
+
+def read(tables: dict[str, object]) -> Study:
+    return parse_study("s", tables, EXPERIMENTS)
+
+
+def draw_frictions(study: Study, rig: Rig, count: int) -> np.ndarray:
+    """The motor's dry friction in scenarios, N."""
+    return np.array([each.plant.motor.coulomb for each in draw_scenarios(study, rig, count, 0)])
 
 
 def sine_test(amplitude: float, frequency: float, column: int) -> Trial:
@@ -104,7 +122,7 @@ def test_only_what_comes_after_the_start_counts():
 @pytest.mark.parametrize("name", ["drop", "active", "semi-active", "friction-road", "single-mass", "imposed"])
 def test_every_measure_is_a_number_for_every_kind_of_test(name):
     configuration = overridden(experiment(name).configuration, {"timing": {"duration": 2.0, "timestep": 1e-3}})
-    found = run(Run(name, configuration, 0, 0.5, tuple(MEASURES)))
+    found = run(Run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
     assert set(found) == {*MEASURES, LIMITS, TRIP}
     assert all(map(math.isfinite, found.values()))
     assert 0.0 < found[LIMITS] < 1.0
@@ -112,7 +130,7 @@ def test_every_measure_is_a_number_for_every_kind_of_test(name):
 
 def test_a_run_that_trips_has_no_measures():
     configuration = overridden(Configuration(), {"timing": {"duration": 1.0}, "safety": {"force": 150.0}})
-    found = run(Run("drop", configuration, 0, 0.0, ("ride",)))
+    found = run(Run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
     assert found[TRIP] != 0.0
     assert math.isnan(found["ride"])
     assert found[LIMITS] > 1.0
@@ -123,7 +141,7 @@ def test_errors_are_those_of_the_thesis_tables():
     from rigtwin.simulation.runner import record
 
     configuration = overridden(Configuration(), {"timing": {"duration": 3.0}})
-    found = run(Run("drop", configuration, 4, 0.0, tuple(MEASURES)))
+    found = run(Run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
@@ -151,24 +169,19 @@ def test_a_parameter_goes_there_and_back(logarithmic):
     assert parameter.value(0.5) == pytest.approx(middle, rel=1e-3)
 
 
-def test_every_study_that_comes_along_can_be_read():
-    assert {"skyhook", "friction", "two-step", "compensator"} <= set(shipped())
-    for name in shipped():
-        study = find(name)
+def test_every_study_that_comes_along_can_be_read(tmp_path):
+    assert {"skyhook", "friction", "two-step", "compensator"} <= set(STUDIES)
+    for name in STUDIES:
+        study = find_study(name)
         assert study.parameters
         assert study.title != name
         for parameter in study.parameters:
-            there = getattr(study.reference, parameter.key.partition(".")[2])
+            there = getattr(study.baseline_settings, parameter.name)
             assert parameter.low <= there <= parameter.high, parameter.key
-        assert run(
-            Run(
-                study.experiment,
-                overridden(study.searched, {"timing": {"duration": 1.0}})._replace(controller=study.reference),
-                0,
-                0.0,
-                tuple(measure.name for measure in study.measures),
-            )
-        )
+        bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), Here())
+        short = overridden(study.search_configuration, {"timing": {"duration": 1.0}})
+        scenario = Scenario(0, short.plant)
+        assert run(replace(bench.plan(short, study.baseline_settings, scenario), first=0.0))
 
 
 @pytest.mark.parametrize(
@@ -216,29 +229,29 @@ def test_every_study_that_comes_along_can_be_read():
 )
 def test_mistakes_in_a_study_are_one_line(changes, says):
     with pytest.raises(RigtwinError, match=says):
-        parsed("s", {**TABLES, **changes})
+        read({**TABLES, **changes})
 
 
 @pytest.mark.parametrize("key", ["experiment", "minimise", "parameters"])
 def test_what_is_missing_in_a_study_is_said(key):
     with pytest.raises(RigtwinError, match=f"{key} is missing"):
-        parsed("s", {name: value for name, value in TABLES.items() if name != key})
+        read({name: value for name, value in TABLES.items() if name != key})
 
 
 def test_scenarios_are_the_same_for_everybody():
-    study = parsed("s", {**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
-    few, more = drawn(study, nominal, 3, 0), drawn(study, nominal, 6, 0)
+    study = read({**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
+    few, more = draw_scenarios(study, NOMINAL, 3, 0), draw_scenarios(study, NOMINAL, 6, 0)
     assert few == more[:3]
-    assert [each.seed for each in drawn(study, nominal, 2, APART)] == [APART, APART + 1]
-    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, nominal, 200, 0)])
+    assert [each.seed for each in draw_scenarios(study, NOMINAL, 2, APART)] == [APART, APART + 1]
+    frictions = draw_frictions(study, NOMINAL, 200)
     assert frictions.min() > 14.0 * 0.7 * 0.97
     assert frictions.max() < 14.0 * 1.3 * 1.03
     assert np.std(frictions) == pytest.approx(14.0 * 0.6 / math.sqrt(12), rel=0.15)
-    masses = np.array([each.plant.carriage.mass for each in drawn(study, nominal, 200, 0)])
+    masses = np.array([each.plant.carriage.mass for each in draw_scenarios(study, NOMINAL, 200, 0)])
     assert np.all(np.abs(masses / 34.0 - 1.0) <= 0.005)
     assert min(each.plant.motor.delay for each in more) >= 0.0
-    plain = parsed("s", TABLES)
-    assert {each.plant for each in drawn(plain, nominal, 5, 0)} == {plain.configuration.plant}
+    plain = read(TABLES)
+    assert {each.plant for each in draw_scenarios(plain, NOMINAL, 5, 0)} == {plain.configuration.plant}
 
 
 POSTERIOR = Posterior(
@@ -265,27 +278,27 @@ def test_a_posterior_is_read_as_it_was_written(tmp_path):
 
 
 def test_a_rig_is_drawn_as_uncertain_as_it_is():
-    study = parsed("s", TABLES)
-    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, diagnosed(POSTERIOR), 400, 0)])
+    study = read(TABLES)
+    frictions = draw_frictions(study, calibrated_rig(POSTERIOR), 400)
     assert np.mean(frictions) == pytest.approx(24.0, abs=0.2)
     assert np.std(frictions) == pytest.approx(4.0 / 3.92, rel=0.12)
     wide = replace(POSTERIOR, intervals={"motor.coulomb": (-200.0, 200.0)})
-    assert min(each.plant.motor.coulomb for each in drawn(study, diagnosed(wide), 50, 0)) == 0.0
+    assert draw_frictions(study, calibrated_rig(wide), 50).min() == 0.0
 
 
 def test_an_interval_may_be_wider_on_one_side():
-    study = parsed("s", TABLES)
+    study = read(TABLES)
     lopsided = replace(POSTERIOR, intervals={"motor.coulomb": (23.0, 30.0)})
-    frictions = np.array([each.plant.motor.coulomb for each in drawn(study, diagnosed(lopsided), 600, 0)])
+    frictions = draw_frictions(study, calibrated_rig(lopsided), 600)
     assert np.median(frictions) == pytest.approx(24.0, abs=0.25)
     assert np.mean(frictions < 23.0) == pytest.approx(0.025, abs=0.015)
     assert np.mean(frictions > 30.0) == pytest.approx(0.025, abs=0.015)
 
 
 def test_what_was_diagnosed_is_not_varied_again():
-    study = parsed("s", {**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
+    study = read({**TABLES, "vary": {"tolerances": 1.0, "motor.coulomb": 0.3}})
     certain = replace(POSTERIOR, intervals={"motor.coulomb": (23.99, 24.01)})
-    rigs = drawn(study, diagnosed(certain), 20, 0)
+    rigs = draw_scenarios(study, calibrated_rig(certain), 20, 0)
     assert max(abs(each.plant.motor.coulomb - 24.0) for each in rigs) < 0.05
     assert len({each.plant.rail.coulomb for each in rigs}) == 20
 
@@ -323,112 +336,112 @@ def test_mistakes_in_a_calibrated_twin_are_one_line(text, says, tmp_path):
 class Known(Bench):
     """A bench that knows: ride is least at 700 Ns/m and kp 1.3; road holding at 300 Ns/m."""
 
-    def searched(self, candidates, scenarios) -> list[Worth]:
+    def score(self, candidates, scenarios) -> list[Score]:
         found = []
         for one in candidates:
             ride = 1.0 + ((one.skyhook_damping - 700.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
             holding = 2.0 + ((one.skyhook_damping - 300.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
             trips = 0.0 if one.kp < 1.8 else 0.5
             figures = {"ride": ride, "road_holding": holding} if not trips else {"ride": math.nan, "road_holding": math.nan}
-            found.append(Worth(figures, 0.5, trips))
+            found.append(Score(figures, 0.5, trips))
             self.progress(1)
         return found
 
 
 def searching(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> Search:
     parameters = {"controller.skyhook_damping": [50.0, 1500.0], "controller.kp": [0.1, 2.0]}
-    study = parsed("s", {**TABLES, "parameters": parameters, "evaluations": 400, **tables})
+    study = read({**TABLES, "parameters": parameters, "evaluations": 400, **tables})
     return Search(Known(study, Store(tmp_path / "s.sqlite"), Here(), progress), [], 1)
 
 
 def test_the_best_is_found(tmp_path):
-    found = best(searching(tmp_path, {}))
+    found = find_best(searching(tmp_path, {}))
     assert found.values == pytest.approx((700.0, 1.3), rel=0.05)
-    assert found.worth.figures["ride"] == pytest.approx(1.0, abs=0.01)
+    assert found.score.figures["ride"] == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_best_within_a_constraint_is_found(tmp_path):
     """On the circle about (300, 1.3) of radius 0.4 in shares of 500: 500 Ns/m."""
-    found = best(searching(tmp_path, {"constraints": {"road_holding": 2.16}}))
+    found = find_best(searching(tmp_path, {"constraints": {"road_holding": 2.16}}))
     assert found.allowed
     assert found.values == pytest.approx((500.0, 1.3), rel=0.05)
-    assert found.worth.figures["ride"] == pytest.approx(1.16, abs=0.01)
+    assert found.score.figures["ride"] == pytest.approx(1.16, abs=0.01)
 
 
 def test_what_trips_is_never_chosen(tmp_path):
     search = searching(tmp_path, {"parameters": {"controller.skyhook_damping": [600, 800], "controller.kp": [1.5, 2.0]}})
-    found = best(search)
+    found = find_best(search)
     assert found.values[1] < 1.8
-    assert any(each.worth.trips for each in search.tried.values())
+    assert any(each.score.trips for each in search.candidates.values())
 
 
 def test_a_bound_may_be_the_baselines(tmp_path):
     search = searching(tmp_path, {"constraints": {"road_holding": "0.9 baseline"}})
     there = search.baseline.figures["road_holding"]
     assert search.bounds == [pytest.approx(0.9 * there)]
-    assert best(search).worth.figures["road_holding"] <= 0.9 * there
+    assert find_best(search).score.figures["road_holding"] <= 0.9 * there
 
 
 def test_there_is_no_share_of_a_baseline_below_zero():
-    worth = Worth({"stability_margin": -0.23}, 0.5, 0.0)
+    score = Score({"stability_margin": -0.23}, 0.5, 0.0)
     margin = MEASURES["stability_margin"]
     with pytest.raises(RigtwinError, match="of which there is no share"):
-        bound_of(Constraint(margin, math.nan, 0.9), worth)
-    assert bound_of(Constraint(margin, math.nan, 1.0), worth) == -0.23
+        bound_of(Constraint(margin, math.nan, 0.9), score)
+    assert bound_of(Constraint(margin, math.nan, 1.0), score) == -0.23
 
 
 def test_what_cannot_be_met_together_is_said(tmp_path):
     with pytest.raises(RigtwinError, match=r"the nearest fails at (ride|road_holding)"):
-        best(searching(tmp_path, {"constraints": {"road_holding": 2.05, "ride": 1.05}}))
+        find_best(searching(tmp_path, {"constraints": {"road_holding": 2.05, "ride": 1.05}}))
 
 
 def test_parameters_that_do_nothing_are_said(tmp_path):
     @dataclass(frozen=True)
     class Deaf(Known):
-        def searched(self, candidates, scenarios) -> list[Worth]:
-            return [Worth({"ride": 1.0}, 0.5, 0.0) for _ in candidates]
+        def score(self, candidates, scenarios) -> list[Score]:
+            return [Score({"ride": 1.0}, 0.5, 0.0) for _ in candidates]
 
-    study = parsed("s", {**TABLES, "evaluations": 10})
+    study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match=r"controller.skyhook_damping make no difference in active"):
-        best(Search(Deaf(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(Search(Deaf(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
 
 
 def test_what_is_not_a_number_is_not_allowed(tmp_path):
     @dataclass(frozen=True)
     class Lost(Known):
-        def searched(self, candidates, scenarios) -> list[Worth]:
-            return [Worth({"ride": math.nan}, 0.5, 0.0) for _ in candidates]
+        def score(self, candidates, scenarios) -> list[Score]:
+            return [Score({"ride": math.nan}, 0.5, 0.0) for _ in candidates]
 
-    study = parsed("s", {**TABLES, "evaluations": 10})
+    study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match="the nearest fails at trips"):
-        best(Search(Lost(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(Search(Lost(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
 
 
 @pytest.mark.parametrize("evaluations", [5, 20, 100])
 def test_a_search_tries_about_as_many_as_it_may(evaluations, tmp_path):
     search = searching(tmp_path, {"evaluations": evaluations})
-    best(search)
-    assert len(search.tried) <= 1.5 * evaluations
+    find_best(search)
+    assert len(search.candidates) <= 1.5 * evaluations
     both = searching(tmp_path / "both", {"evaluations": 60, "minimise": ["ride", "road_holding"], "points": 4})
-    front(both)
-    assert len(both.tried) <= 90
+    find_front(both)
+    assert len(both.candidates) <= 90
 
 
 def test_nothing_allowed_is_said(tmp_path):
     with pytest.raises(RigtwinError, match=r"none of .* candidates meets every constraint; the nearest fails at road_holding"):
-        best(searching(tmp_path, {"constraints": {"road_holding": 1.5}}))
+        find_best(searching(tmp_path, {"constraints": {"road_holding": 1.5}}))
 
 
 def test_a_front_is_the_line_between_both_best(tmp_path):
     search = searching(tmp_path, {"minimise": ["ride", "road_holding"], "points": 6, "evaluations": 600})
-    found = front(search)
+    found = find_front(search)
     assert len(found) > 6
     for one, next_one in pairwise(found):
-        assert one.worth.figures["ride"] <= next_one.worth.figures["ride"]
-        assert one.worth.figures["road_holding"] > next_one.worth.figures["road_holding"]
+        assert one.score.figures["ride"] <= next_one.score.figures["ride"]
+        assert one.score.figures["road_holding"] > next_one.score.figures["road_holding"]
     # Between 300 and 700 Ns/m at kp 1.3, √(ride − 1) + √(holding − 2) = 0.8 on the true front.
     for each in found:
-        short = math.sqrt(each.worth.figures["ride"] - 1.0) + math.sqrt(each.worth.figures["road_holding"] - 2.0)
+        short = math.sqrt(each.score.figures["ride"] - 1.0) + math.sqrt(each.score.figures["road_holding"] - 2.0)
         assert 0.8 - 1e-9 <= short < 1.0
     damping = [each.values[0] for each in found]
     assert max(damping) > 650.0
@@ -440,9 +453,9 @@ def test_a_search_goes_the_same_way_again(tmp_path):
     assert one == again
 
 
-def _all(search: Search) -> dict[tuple[float, ...], Tried]:
-    best(search)
-    return search.tried
+def _all(search: Search) -> dict[tuple[float, ...], Candidate]:
+    find_best(search)
+    return search.candidates
 
 
 def test_a_quantile_is_on_the_worse_side():
@@ -475,7 +488,7 @@ def test_a_comparison_is_paired_and_leaves_trips_out():
 
     before = rows([1.0, 2.0, 4.0, math.nan], [1.0, 1.0, 1.0, 1.0], [0, 0, 0, 1])
     after = rows([0.5, 1.0, 3.0, 1.0], [1.5, 0.5, 2.0, 1.0], [0, 0, 0, 0])
-    found = comparison(measures, "rig", ("before", before), ("tuned", after))
+    found = compare(measures, "rig", ("before", before), ("tuned", after))
     assert found.runs == 3
     assert found.trips == (0.25, 0.0)
     ride, margin = found.of("ride"), found.of("stability_margin")
@@ -491,7 +504,7 @@ def test_a_change_of_nothing_is_in_its_unit():
         return [{"travel": value, TRIP: 0.0, LIMITS: 0.1} for value in values]
 
     one, other = rows([0.0] * 6), rows([0.1] * 6)
-    change = comparison((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).of("travel")
+    change = compare((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).of("travel")
     assert not change.relative
     assert change.median == pytest.approx(0.1)
 
@@ -616,7 +629,7 @@ def test_a_study_that_is_interrupted_keeps_its_runs(tmp_path, monkeypatch):
 def test_the_studies_are_listed(capsys):
     assert main(["tune"]) == 0
     printed = capsys.readouterr().out
-    assert all(name in printed for name in shipped())
+    assert all(name in printed for name in STUDIES)
 
 
 @pytest.mark.parametrize(
@@ -640,6 +653,6 @@ def test_mistakes_on_the_command_line_are_one_line(arguments, says, tmp_path, mo
 
 
 def test_settings_are_compared_with_those_of_the_study():
-    study: Study = parsed("s", {**TABLES, "baseline": {"controller.skyhook": "none"}})
-    assert study.reference == study.configuration.controller._replace(skyhook=Settings().skyhook)
-    assert values(study.parameters, np.array([0.5])) == (775.0,)
+    study: Study = read({**TABLES, "baseline": {"controller.skyhook": "none"}})
+    assert study.baseline_settings == study.configuration.controller._replace(skyhook=Settings().skyhook)
+    assert values_at(study.parameters, np.array([0.5])) == (775.0,)

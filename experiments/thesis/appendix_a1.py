@@ -5,7 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from experiments.thesis import judges, resemblance, shapes
-from experiments.thesis.appendix_a import LAGS, LIGHT, QUICK, RATIOS, SLOW, STIFF, TYRES, WHEELS, case, instead, misprint, says
+from experiments.thesis.appendix_a import (
+    LAGS,
+    LIGHT,
+    QUICK,
+    RATIOS,
+    SLOW,
+    STIFF,
+    TYRES,
+    WHEELS,
+    case,
+    instead,
+    misprint,
+    says,
+)
 from experiments.thesis.loci import Case, locus
 from rigtwin.studies.stability.locus import BODY, WHEEL
 

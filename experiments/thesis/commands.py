@@ -14,7 +14,7 @@ from experiments.thesis.work import done
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
 from rigtwin.render.plot import checked_ending, save
-from rigtwin.studies.sweep import hired
+from rigtwin.studies.sweep import open_workers
 
 MOST_SEEDS = 1000
 
@@ -31,7 +31,7 @@ def reproduce(parsed: Namespace) -> int:
     if pictures.exists() and not pictures.is_dir():
         raise RigtwinError(f"cannot draw into {pictures}: it is a file")
     with (
-        hired(parsed.workers, parsed.cluster) as workers,
+        open_workers(parsed.workers, parsed.cluster) as workers,
         tqdm(disable=None, desc="reproduce", unit="job", leave=False, file=sys.stderr) as bar,
     ):
 

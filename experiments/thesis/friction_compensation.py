@@ -10,7 +10,15 @@ import numpy as np
 from controllers import Compensator
 from experiments.thesis.entry import Entry, digits, factor, statement
 from experiments.thesis.friction_drawings import IN_TIME, LATE, drawings, errors_of, two_step
-from experiments.thesis.friction_tests import LOOPS, calibrated_rows, calibration, compensated, detected, rows, timed
+from experiments.thesis.friction_tests import (
+    LOOPS,
+    calibrated_rows,
+    calibration,
+    compensated,
+    detected,
+    rows,
+    timed,
+)
 from experiments.thesis.study import Conclusion, Job, Result, Study, span
 from rigtwin.numerics.arrays import Array
 

@@ -10,7 +10,16 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from controllers import Commands, Compensator, Demand, Mode, Settings, controller, initial_state, update
+from controllers import (
+    Commands,
+    Compensator,
+    Demand,
+    Mode,
+    Settings,
+    controller,
+    initial_state,
+    update,
+)
 from controllers.force import MOTOR_CONSTANT
 from experiments import find
 from experiments.experiment import time_of
@@ -24,7 +33,7 @@ from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.runner import record, simulated
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.friction_spikes import BOUNDS, Calibration, calibrated, detections, lagged
+from rigtwin.studies.friction_spikes import BOUNDS, Calibration, calibrated, detections, filter_lag
 
 LOOPS: dict[str, dict[str, float]] = {"fitted": {"kp": 1.0, "ki": 190.0}, "nominal": {"kp": 0.3, "ki": 10.0}}
 """Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows Table 3.5, `fitted` those with
@@ -60,7 +69,7 @@ def spikes(test: Trial) -> Array:
     wide = round(AFTER / period)
     turns = turns[(np.diff(turns, prepend=-wide) > wide) & (np.diff(turns, append=len(velocity) + wide) > wide)]
     turns = turns[(turns > 1000) & (turns < len(velocity) - wide)]
-    felt = lagged(np.ascontiguousarray(test.force), settings.filter_force, period)
+    felt = filter_lag(np.ascontiguousarray(test.force), settings.filter_force, period)
     error = test.ran.commands[:, 2] - felt
     directions = np.sign(velocity[turns + 3])
     before = np.array([np.mean(error[turn - 15 : turn - 3]) for turn in turns])

@@ -18,7 +18,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.runner import simulated
-from rigtwin.studies.friction_spikes import lagged
+from rigtwin.studies.friction_spikes import filter_lag
 
 Response = NDArray[np.complex128]
 
@@ -86,7 +86,7 @@ def force_response(seed: int) -> Response:
 
     commands, measured = _tested(demanded, seed)
     # The filter is linear: it is applied to the periodic average, run through twice so that its start is forgotten.
-    filtered = lagged(np.tile(measured[:, 3], 2), Settings().filter_force, 1e-3)
+    filtered = filter_lag(np.tile(measured[:, 3], 2), Settings().filter_force, 1e-3)
     return _ratio(filtered[-len(measured) :], commands[:, 2], FITTED)
 
 

@@ -15,7 +15,12 @@ from experiments.thesis.loci import (
     of_tyre_stiffness,
     of_wheel_mass,
 )
-from experiments.thesis.quarter_car_statements import SMALL_LAG, SUSPENSION_LAG, statements, structure_lag
+from experiments.thesis.quarter_car_statements import (
+    SMALL_LAG,
+    SUSPENSION_LAG,
+    statements,
+    structure_lag,
+)
 from experiments.thesis.study import Conclusion, Result, Study, span
 from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, mode
 from rigtwin.studies.stability.models import MODELS, poles

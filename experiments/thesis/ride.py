@@ -8,7 +8,15 @@ from controllers import Skyhook
 from controllers.skyhook import semi_active_damping
 from experiments.thesis.entry import Entry, band, factor
 from experiments.thesis.study import Drawing, Result, sheet
-from experiments.thesis.trial import BODY, SHOWN, Trial, body_acceleration, curves, errors, over_seeds
+from experiments.thesis.trial import (
+    BODY,
+    SHOWN,
+    Trial,
+    body_acceleration,
+    curves,
+    errors,
+    over_seeds,
+)
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, COLOURS, SENSED
 from rigtwin.signals.noise import rms

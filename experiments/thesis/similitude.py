@@ -13,10 +13,24 @@ from experiments.thesis.entry import Entry, digits, number, statement
 from experiments.thesis.landing import Landing, touch_down
 from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
 from experiments.vehicles import VEHICLES, configuration
-from rigtwin.components.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
 from rigtwin.components import Cylinder, Motor
+from rigtwin.components.gas_spring import (
+    GasSpring,
+    charged,
+    designed,
+    equilibrium,
+    spring_force,
+    stiffness,
+)
 from rigtwin.numerics.arrays import Array
-from rigtwin.studies.similitude import Scaling, largest_change, pi_groups, scaled, scaling, slowed
+from rigtwin.studies.similitude import (
+    Scaling,
+    largest_change,
+    pi_groups,
+    scale_values,
+    scaling,
+    slow_down,
+)
 
 BOEING = Landing()
 UNITS = {name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)}
@@ -40,7 +54,7 @@ def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
 
 def at_scale(landing: Landing, scale: Scaling) -> Landing:
     """The landing of the scaled system."""
-    return Landing(**scaled(landing._asdict(), UNITS, scale))
+    return Landing(**scale_values(landing._asdict(), UNITS, scale))
 
 
 def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
@@ -150,7 +164,7 @@ def _equation_6() -> list[Entry]:
     apart = max(abs(left / right - 1.0) for left, right in sides)
     # The groups are kept by any scale factors of these relations, and by no others.
     before = dict.fromkeys(units, 1.0)
-    change = max(apart, largest_change(units, before, scaled(before, units, scale)))
+    change = max(apart, largest_change(units, before, scale_values(before, units, scale)))
     return [
         statement("Equation 3.6", "groups of 12 variables", "n − m dimensionless groups, listed", same, ours, note),
         statement(
@@ -246,7 +260,7 @@ def _cylinder() -> list[Entry]:
 
 def _landings() -> tuple[list[Entry], Drawing, list[str]]:
     real = similar(*RECONSTRUCTED)
-    slow = slowed(real, BOEING.velocity, Cylinder().speed_limit)
+    slow = slow_down(real, BOEING.velocity, Cylinder().speed_limit)
     full = touch_down(BOEING, INSTANTS)
     pairs = [(scale, at_scale(BOEING, scale)) for scale in (real, slow)]
     backs = [mapped_back(landing, scale, INSTANTS) for scale, landing in pairs]

@@ -7,7 +7,15 @@ from dataclasses import replace
 
 from experiments.thesis import judges, resemblance, shapes
 from experiments.thesis.judges import Judge
-from experiments.thesis.loci import Case, Claim, Panel, locus, of_damping_ratio, of_lag, of_natural_frequency
+from experiments.thesis.loci import (
+    Case,
+    Claim,
+    Panel,
+    locus,
+    of_damping_ratio,
+    of_lag,
+    of_natural_frequency,
+)
 from rigtwin.studies.stability.locus import BODY
 
 MODEL = "single-mass"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from experiments.thesis.study import Result, Study
-from rigtwin.studies.sweep import Store, Workers, swept
+from rigtwin.studies.sweep import Store, Workers, run_jobs
 
 
 def job(which: tuple[str, int, str]) -> Result:
@@ -39,5 +39,5 @@ def done(
 
     with Store(folder / "results.sqlite") as store:
         jobs = [(f"{study}/{key}", (study, seeds, key)) for study, own in keys.items() for key in own]
-        swept(store, workers, job, jobs, step)
+        run_jobs(store, workers, job, jobs, step)
         return {study: {key: store[f"{study}/{key}"] for key in own} for study, own in keys.items()}

@@ -1,4 +1,4 @@
-"""`rigtwin blindcheck`: the withheld-effect check, and the check that tuning on a diagnosis pays."""
+"""`rigtwin blindcheck`: the check with withheld effects, and whether tuning on a diagnosis pays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, Workers, hired
+from rigtwin.studies.sweep import Store, Workers, open_workers
 
 RIGS = 8
 """Of a check of tuning, unless said."""
@@ -22,7 +22,7 @@ def blindcheck(parsed: Namespace) -> int:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
     if parsed.json is not None:
         writable(parsed.json)
-    with hired(parsed.workers, parsed.cluster) as workers:
+    with open_workers(parsed.workers, parsed.cluster) as workers:
         return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
 
 
@@ -31,9 +31,8 @@ def _diagnoses(parsed: Namespace, workers: Workers) -> int:
     from referee.score import document, table
 
     cases = CASES if parsed.cases is None else parsed.cases
-    with tqdm(
-        total=2 * cases, disable=None, unit="case", desc="withheld effects", leave=False
-    ) as bar:
+    shown = {"unit": "case", "desc": "withheld effects", "leave": False}
+    with tqdm(total=2 * cases, disable=None, **shown) as bar:
         result = check(parsed.folder, cases, parsed.seed, parsed.baselines, workers, bar.update)
     print(table(result))
     if parsed.json is not None:
@@ -42,31 +41,29 @@ def _diagnoses(parsed: Namespace, workers: Workers) -> int:
 
 
 def _tuning(parsed: Namespace, workers: Workers) -> int:
-    from referee.tuning import Case, checked, document, text
+    from experiments.tuning import find_study
+    from referee.tuning import Case, check, document, text
     from rigtwin.studies.tuning.bench import Bench
-    from rigtwin.studies.tuning.reading import find
 
-    study = find(parsed.tune)
-    if len(study.minimise) != 1 or study.minimise[0].more:
-        raise RigtwinError(
-            f"--tune {parsed.tune}: expected a study with one objective that is of the test itself"
-        )
+    study = find_study(parsed.tune)
+    minimise, budget = study.goals.minimise, study.budget
+    if len(minimise) != 1 or minimise[0].more:
+        expected = "expected a study with one objective that is of the test itself"
+        raise RigtwinError(f"--tune {parsed.tune}: {expected}")
     cases = RIGS if parsed.cases is None else parsed.cases
-    total = (cases + 1) * (study.evaluations + 1) * study.roads + cases * (1 + 3 * study.held_out)
+    searches = (cases + 1) * (budget.evaluations + 1) * budget.roads
+    total = searches + cases * (1 + 3 * budget.held_out)
     with (
         Store(parsed.folder / f"tuning-{study.name}.sqlite") as store,
         tqdm(total=total, disable=None, unit="run", leave=False, file=sys.stderr) as bar,
     ):
 
-        def said(case: Case) -> None:
-            bar.write(
-                f"rig {case.number + 1}: withheld {case.defect}; diagnosed: {case.found}",
-                file=sys.stdout,
-            )
+        def show(case: Case) -> None:
+            told = f"withheld {case.defect}; diagnosed: {case.found}"
+            bar.write(f"rig {case.number + 1}: {told}", file=sys.stdout)
 
-        found = checked(
-            Bench(study, store, workers, bar.update), cases, parsed.seed, bar.set_description, said
-        )
+        bench = Bench(study, store, workers, bar.update)
+        found = check(bench, cases, parsed.seed, stage=bar.set_description, show=show)
     print(text(study, found))
     if parsed.json is not None:
         write_json(parsed.json, document(study, found))

@@ -8,72 +8,72 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from experiments.tuning import STUDIES, find_study
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
 from rigtwin.machine.posterior import Posterior, load_posterior
-from rigtwin.studies.sweep import Store, hired
+from rigtwin.studies.sweep import Store, open_workers
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.folder import PAGE, RUNS, SETTINGS, write
-from rigtwin.studies.tuning.outcome import tuned
-from rigtwin.studies.tuning.reading import find
-from rigtwin.studies.tuning.study import Study, shipped
+from rigtwin.studies.tuning.result import tune as tune_study
+from rigtwin.studies.tuning.study import Study
 from rigtwin.studies.tuning.text import concerns, text
 
 
 def tune(parsed: Namespace) -> int:
-    """Tunes, judges, and writes the folder; a second run goes on where the first was stopped. Returns 4 if something speaks
-    against the settings that were found."""
+    """Tune, evaluate, and write the folder; a second run goes on where the first was stopped.
+
+    Returns
+    -------
+    int
+        4 if something speaks against the settings that were found, else 0.
+    """
     if parsed.study is None:
-        print(_listing())
+        print(_list_studies())
         return 0
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
-    numbers = {
-        "roads": parsed.roads,
-        "held_out": parsed.held_out,
-        "evaluations": parsed.evaluations,
-    }
-    study = find(parsed.study, parsed.set, **numbers)
+    study = find_study(
+        parsed.study,
+        parsed.set,
+        roads=parsed.roads,
+        held_out=parsed.held_out,
+        evaluations=parsed.evaluations,
+    )
     posterior = None if parsed.twin is None else load_posterior(parsed.twin)
     folder = parsed.out or Path("tuning") / study.name
     if folder.exists() and not folder.is_dir():
         raise RigtwinError(f"cannot write into {folder}: it is a file")
+    total = _count_runs(study, posterior)
     with (
-        hired(parsed.workers, parsed.cluster) as workers,
+        open_workers(parsed.workers, parsed.cluster) as workers,
         Store(folder / RUNS) as store,
-        tqdm(
-            total=_runs(study, posterior), disable=None, unit="run", leave=False, file=sys.stderr
-        ) as bar,
+        tqdm(total=total, disable=None, unit="run", leave=False, file=sys.stderr) as bar,
     ):
         bench = Bench(study, store, workers, bar.update)
-        outcome = tuned(bench, parsed.seed, posterior, bar.set_description)
+        result = tune_study(bench, parsed.seed, posterior, bar.set_description)
     twin = study.configuration if posterior is None else posterior.at_best(study.configuration)
-    write(folder, outcome, twin)
-    print(text(outcome))
-    print(f"\nlook at {folder / PAGE}\nrigtwin run {study.experiment} --config {folder / SETTINGS}")
-    return 4 if concerns(outcome) else 0
+    write(folder, result, twin)
+    print(text(result))
+    run = f"rigtwin run {study.experiment.name} --config {folder / SETTINGS}"
+    print(f"\nlook at {folder / PAGE}\n{run}")
+    return 4 if concerns(result) else 0
 
 
-def _runs(study: Study, posterior: Posterior | None) -> int:
+def _count_runs(study: Study, posterior: Posterior | None) -> int:
     """About how many there will be."""
+    budget = study.budget
     searches = 1 if posterior is None else 2
-    rigs = 1 + len(study.judge) + (0 if posterior is None else 1 + len(posterior.otherwise))
-    points = study.points if len(study.minimise) == 2 else 0
-    return searches * (study.evaluations + 1) * study.roads + study.held_out * (
-        rigs * (1 + searches) + points
-    )
+    rigs = 1 + len(study.other_rigs) + (0 if posterior is None else 1 + len(posterior.otherwise))
+    points = budget.points if len(study.goals.minimise) == 2 else 0
+    tried = searches * (budget.evaluations + 1) * budget.roads
+    return tried + budget.held_out * (rigs * (1 + searches) + points)
 
 
-def _listing() -> str:
+def _list_studies() -> str:
     rows = [("study", "what", "experiment", "parameters")]
-    for name in shipped():
-        study = find(name)
-        rows.append(
-            (
-                name,
-                study.title,
-                study.experiment,
-                ", ".join(each.key.partition(".")[2] for each in study.parameters),
-            )
-        )
+    for name in STUDIES:
+        study = find_study(name)
+        parameters = ", ".join(parameter.name for parameter in study.parameters)
+        rows.append((name, study.title, study.experiment.name, parameters))
     return table(rows)

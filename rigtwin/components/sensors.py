@@ -55,6 +55,9 @@ class PositionSensor(NamedTuple):
     offset: Annotated[float, Quantity("m", -100.0, 100.0, "0: calibrated")] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    white: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
+    hum: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
+    resolution: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
 
 
 class VelocitySensor(NamedTuple):
@@ -64,6 +67,9 @@ class VelocitySensor(NamedTuple):
     offset: Annotated[float, Quantity("m/s", -100.0, 100.0, "0: calibrated")] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    white: Annotated[float, Quantity("m/s", 0.0, 1e7, NONE)] = 0.0
+    hum: Annotated[float, Quantity("m/s", 0.0, 1e7, NONE)] = 0.0
+    resolution: Annotated[float, Quantity("m/s", 0.0, 1e7, NONE)] = 0.0
 
 
 class ForceSensor(NamedTuple):
@@ -73,6 +79,9 @@ class ForceSensor(NamedTuple):
     offset: Annotated[float, Quantity("N", -1e7, 1e7, "0: calibrated")] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    white: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
+    hum: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
+    resolution: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
 
 
 DECLARED = (Lvdt, LoadCell)

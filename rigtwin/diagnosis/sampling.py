@@ -52,7 +52,7 @@ def outstanding(
 ) -> tuple[Sampled, ...]:
     """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
     order of the rows of predicted: one list a recording, one array a sensor."""
-    declared = [name for name in sensors if hasattr(getattr(plant, name, None), "white")]
+    declared = [name for name in sensors if getattr(getattr(plant, name, None), "white", 0.0) > 0.0]
     if not declared:
         return ()
     names = {"white": "noise", "hum": "hum", "resolution": "quantisation"}

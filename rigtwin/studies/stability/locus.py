@@ -1,4 +1,5 @@
-"""A root locus: the poles of a model while one parameter is swept, and where they cross the imaginary axis."""
+"""A root locus: the poles of a model while one parameter is swept, and where they cross the
+imaginary axis."""
 
 from __future__ import annotations
 
@@ -28,8 +29,8 @@ class Setting(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """A pair of poles on the imaginary axis. value: of the swept parameter; frequency: rad/s; mode: which way the masses move;
-    unstable: whether it becomes so as the parameter grows."""
+    """A pair of poles on the imaginary axis. value: of the swept parameter; frequency: rad/s; mode:
+    which way the masses move; unstable: whether it becomes so as the parameter grows."""
 
     value: float
     frequency: float
@@ -38,9 +39,11 @@ class Crossing(NamedTuple):
 
 
 def mode(car: QuarterCar, pole: complex) -> str:
-    """Body hop if the masses move the same way at a pole, wheel hop if against each other (thesis §5.3.1).
+    """Body hop if the masses move the same way at a pole, wheel hop if against each other (thesis
+    §5.3.1).
 
-    The force of the suspension f moves both, W x_u = f and m_s s² x_s = −f, so x_u/x_s = −m_s s²/W whatever the lags.
+    The force of the suspension f moves both, W x_u = f and m_s s² x_s = −f, so x_u/x_s = −m_s s²/W
+    whatever the lags.
     """
     wheel = car.unsprung_mass * pole**2 + car.tyre_damping * pole + car.tyre_stiffness
     return BODY if (-car.sprung_mass * pole**2 / wheel).real > 0.0 else WHEEL
@@ -57,13 +60,17 @@ class Locus:
     @cached_property
     def poles(self) -> np.ndarray:
         """1/s, a row for every value."""
-        return np.linalg.eigvals(np.array([self._dynamics(value) for value in self.values])).astype(complex)
+        return np.linalg.eigvals(np.array([self._dynamics(value) for value in self.values])).astype(
+            complex,
+        )
 
     @cached_property
     def ideal(self) -> np.ndarray:
         """The poles without any lag, 1/s, a row for every value."""
         ideal = self._ideal
-        return np.linalg.eigvals(np.array([ideal(self.at(value).car) for value in self.values])).astype(complex)
+        return np.linalg.eigvals(
+            np.array([ideal(self.at(value).car) for value in self.values]),
+        ).astype(complex)
 
     def poles_at(self, value: float) -> np.ndarray:
         """1/s."""
@@ -76,38 +83,39 @@ class Locus:
     def unstable_modes(self, value: float) -> tuple[str, ...]:
         """The modes of all poles to the right of the imaginary axis, each once."""
         car = self.at(value).car
-        modes = [self.mode(car, pole) for pole in self.poles_at(value) if _right(pole) and pole.imag >= 0.0]
-        return tuple(sorted(set(modes)))
+        poles = (pole for pole in self.poles_at(value) if _is_unstable(pole) and pole.imag >= 0.0)
+        return tuple(sorted({self.mode(car, pole) for pole in poles}))
 
     @cached_property
     def crossings(self) -> list[Crossing]:
         """All crossings, in the order of the swept values."""
-        counts = np.sum(_right(self.poles), axis=1)
+        counts = np.sum(_is_unstable(self.poles), axis=1)
         found: list[Crossing] = []
         for i in np.flatnonzero(counts[:-1] != counts[1:]):
-            found += self._between(float(self.values[i]), float(self.values[i + 1]))
+            found += self._find_crossings(float(self.values[i]), float(self.values[i + 1]))
         return found
 
     def mode(self, car: QuarterCar, pole: complex) -> str:
         """Body hop or wheel hop; a single mass has nothing but a body."""
         return BODY if self.model == "single-mass" else mode(car, pole)
 
-    def _between(self, low: float, high: float) -> list[Crossing]:
+    def _find_crossings(self, low: float, high: float) -> list[Crossing]:
         below, above = self._count(low), self._count(high)
         if below == above:
             return []
         if high - low > CLOSE * high:
             middle = float(np.sqrt(low * high))
-            return self._between(low, middle) + self._between(middle, high)
+            return self._find_crossings(low, middle) + self._find_crossings(middle, high)
         before, after = self.poles_at(low), self.poles_at(high)
         after = after[after.imag > 0.0]
         nearest = before[np.argmin(np.abs(after[:, None] - before[None, :]), axis=1)]
         car = self.at(high).car
-        crossed = after[_right(after) != _right(nearest)]
-        return sorted(Crossing(high, float(pole.imag), self.mode(car, pole), above > below) for pole in crossed)
+        crossed = after[_is_unstable(after) != _is_unstable(nearest)]
+        found = [(float(pole.imag), self.mode(car, pole)) for pole in crossed]
+        return sorted(Crossing(high, frequency, mode, above > below) for frequency, mode in found)
 
     def _count(self, value: float) -> int:
-        return int(np.sum(_right(self.poles_at(value))))
+        return int(np.sum(_is_unstable(self.poles_at(value))))
 
     def _dynamics(self, value: float) -> Array:
         setting = self.at(value)
@@ -120,6 +128,6 @@ class Locus:
         return lambda car: np.asarray(ideal_quarter_car(car).A)
 
 
-def _right(poles: np.ndarray) -> np.ndarray:
+def _is_unstable(poles: np.ndarray) -> np.ndarray:
     """Which lie to the right of the imaginary axis."""
     return poles.real > ROUNDING * np.abs(poles)

@@ -16,7 +16,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 from rigtwin.studies.stability.models import MODELS
-from rigtwin.studies.stability.vehicle import QuarterCar, checked
+from rigtwin.studies.stability.vehicle import QuarterCar, validate
 
 LAG = "tau"
 UNITS = {
@@ -28,7 +28,8 @@ UNITS = {
     "sprung_mass": "kg",
     LAG: "s",
 }
-"""Every parameter that a map can be drawn over; tau is the lag that all of the model's paths share."""
+"""Every parameter that a map can be drawn over; tau is the lag that all of the model's paths
+share."""
 SPAN = 10.0
 """A map reaches from the vehicle's own value over this to that times this."""
 POINTS = 60
@@ -44,8 +45,9 @@ class Axis(NamedTuple):
 
 @dataclass(frozen=True)
 class StabilityMap:
-    """rightmost: real part of the rightmost pole, 1/s, shape (up, across), stable below 0; critical: where `tau` is an axis,
-    the critical lag for each value of the other, s, NaN where stable with every lag."""
+    """rightmost: real part of the rightmost pole, 1/s, shape (up, across), stable below 0;
+    critical: where `tau` is an axis, the critical lag for each value of the other, s, NaN where
+    stable with every lag."""
 
     model: str
     car: QuarterCar
@@ -57,7 +59,8 @@ class StabilityMap:
 
 
 def around(name: str, car: QuarterCar, lag: float, points: int = POINTS) -> Axis:
-    """Values about the vehicle's own, in equal ratios; from 0 to critical damping where its own damping is 0."""
+    """Values about the vehicle's own, in equal ratios; from 0 to critical damping where its own
+    damping is 0."""
     if name not in UNITS:
         raise RigtwinError(f"unknown parameter {name!r}; there are {', '.join(UNITS)}")
     own = lag if name == LAG else getattr(car, name)
@@ -71,18 +74,29 @@ def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axi
     """The map of a model of `MODELS`, every lag of it `lag` s unless `tau` is an axis."""
     checked_model(model)
     if across.name == up.name:
-        raise RigtwinError(f"a map over {across.name} and {up.name}: expected two different parameters")
-    rows = [_changed((checked(car), lag), up.name, float(value)) for value in up.values]
-    settings = [_changed(row, across.name, float(value)) for row in rows for value in across.values]
+        raise RigtwinError(
+            f"a map over {across.name} and {up.name}: expected two different parameters",
+        )
+    rows = [_change((validate(car), lag), up.name, float(value)) for value in up.values]
+    settings = [_change(row, across.name, float(value)) for row in rows for value in across.values]
     dynamics = np.array([MODELS[model](*setting).A for setting in settings])
-    rightmost = np.linalg.eigvals(dynamics).real.max(axis=1).reshape(len(up.values), len(across.values))
+    rightmost = np.linalg.eigvals(dynamics).real.max(axis=1)
+    rightmost = rightmost.reshape(len(up.values), len(across.values))
     critical = None
     if LAG in (across.name, up.name):
         other = up if across.name == LAG else across
-        cars = [_changed((car, lag), other.name, float(value))[0] for value in other.values]
+        cars = [_change((car, lag), other.name, float(value))[0] for value in other.values]
         times = [critical_lag(LOOPS[model](each)) for each in cars]
         critical = np.array([np.nan if each is None else each.time for each in times])
-    return StabilityMap(model, car, lag, across, up, rightmost, critical)
+    return StabilityMap(
+        model=model,
+        car=car,
+        lag=lag,
+        across=across,
+        up=up,
+        rightmost=rightmost,
+        critical=critical,
+    )
 
 
 def checked_model(model: str) -> None:
@@ -94,11 +108,14 @@ def checked_model(model: str) -> None:
 def checked_ending(out: Path) -> None:
     """Raises RigtwinError unless a map can be drawn to that name."""
     if out.suffix.lower() not in KINDS:
-        raise RigtwinError(f"cannot draw {out.name!r}: expected a name that ends in {', '.join(KINDS)}")
+        raise RigtwinError(
+            f"cannot draw {out.name!r}: expected a name that ends in {', '.join(KINDS)}",
+        )
 
 
 def draw(found: StabilityMap, out: Path) -> None:
-    """Draws a map into a png, svg or pdf file. Raises RigtwinError for another ending or if it cannot be written."""
+    """Draws a map into a png, svg or pdf file. Raises RigtwinError for another ending or if it
+    cannot be written."""
     checked_ending(out)
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
@@ -106,16 +123,47 @@ def draw(found: StabilityMap, out: Path) -> None:
     largest = float(np.abs(found.rightmost).max())
     norm = SymLogNorm(1e-2 * largest, vmin=-largest, vmax=largest)
     across, up = found.across, found.up
-    shades = axes.pcolormesh(across.values, up.values, found.rightmost, cmap="RdBu_r", norm=norm, shading="nearest")
+    shades = axes.pcolormesh(
+        across.values,
+        up.values,
+        found.rightmost,
+        cmap="RdBu_r",
+        norm=norm,
+        shading="nearest",
+    )
     figure.colorbar(shades, ax=axes, label="real part of the rightmost pole, 1/s (stable below 0)")
     if found.critical is not None:
-        curve = (found.critical, up.values) if across.name == LAG else (across.values, found.critical)
+        over_lag = across.name == LAG
+        curve = (found.critical, up.values) if over_lag else (across.values, found.critical)
         axes.plot(*curve, color="black", linewidth=1.5, label="critical lag, exact")
     elif found.rightmost.min() < 0.0 < found.rightmost.max():
-        axes.contour(across.values, up.values, found.rightmost, levels=[0.0], colors="black", linewidths=1.5)
-        axes.plot([], [], color="black", linewidth=1.5, label=f"critical lag {1e3 * found.lag:g} ms")
-    own = [found.lag if axis.name == LAG else getattr(found.car, axis.name) for axis in (across, up)]
-    axes.plot(*own, "o", color="black", markerfacecolor="white", markersize=8, clip_on=False, zorder=5, label="the vehicle")
+        axes.contour(
+            across.values,
+            up.values,
+            found.rightmost,
+            levels=[0.0],
+            colors="black",
+            linewidths=1.5,
+        )
+        axes.plot(
+            [],
+            [],
+            color="black",
+            linewidth=1.5,
+            label=f"critical lag {1e3 * found.lag:g} ms",
+        )
+    vehicle = found.car._asdict() | {LAG: found.lag}
+    own = [vehicle[axis.name] for axis in (across, up)]
+    axes.plot(
+        *own,
+        "o",
+        color="black",
+        markerfacecolor="white",
+        markersize=8,
+        clip_on=False,
+        zorder=5,
+        label="the vehicle",
+    )
     for axis, scale, limits, label in (
         (across, axes.set_xscale, axes.set_xlim, axes.set_xlabel),
         (up, axes.set_yscale, axes.set_ylim, axes.set_ylabel),
@@ -133,6 +181,6 @@ def draw(found: StabilityMap, out: Path) -> None:
         raise RigtwinError(f"cannot write {out}: {error.strerror}") from None
 
 
-def _changed(setting: tuple[QuarterCar, float], name: str, value: float) -> tuple[QuarterCar, float]:
+def _change(setting: tuple[QuarterCar, float], name: str, value: float) -> tuple[QuarterCar, float]:
     car, lag = setting
     return (car, value) if name == LAG else (car._replace(**{name: value}), lag)

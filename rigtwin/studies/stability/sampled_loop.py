@@ -1,10 +1,14 @@
-"""The whole rig as one linear sampled loop: the controller that runs, around a rig without dry friction and limits.
+"""The whole rig as one linear sampled loop: the controller that runs, around a rig without dry
+friction and limits.
 
-    plant between two ticks     x[k+1] = e^{AT} x[k] + Σ e^{A(T−f)} Γ(f) u[k−n−1] + Γ(T−f) u[k−n],  Γ(t) = ∫₀ᵗ e^{As} ds B
+    plant between two ticks     x[k+1] = e^{AT} x[k] + Σ e^{A(T−f)} Γ(f) u[k−n−1] + Γ(T−f) u[k−n]
+                                Γ(t) = ∫₀ᵗ e^{As} ds B
     input delay                 n T + f, of the actuator and of the computer
-    controller                  the derivative of `controllers.update` at rest, by differences: it is affine there
+    controller                  the derivative of `controllers.update` at rest, by differences: it
+                                is affine there
 
-What the loop cannot reach from its commands, or what its commands do not answer to, has no part in its stability.
+What the loop cannot reach from its commands, or what its commands do not answer to, has no part in
+its stability.
 """
 
 from __future__ import annotations
@@ -41,8 +45,8 @@ from rigtwin.simulation.plant import deflected
 PERTURBATION = 1e-6
 """In each variable's unit; far within every threshold of the controllers."""
 CYLINDER, FED, FORCE, VOLTS, WHEEL, SPEED = slice(0, 4), 4, 5, 6, 7, 8
-"""States of the mechanics: the cylinder's filter, what the lag lets through of its command, motor force, what the lag lets
-through of the voltage, wheel position and velocity."""
+"""States of the mechanics: the cylinder's filter, what the lag lets through of its command, motor
+force, what the lag lets through of the voltage, wheel position and velocity."""
 DRIVEN = (0, 1, 2, 3, FORCE)
 """What both actuators move: every loop goes through them."""
 MOVED = np.array([1, 3])
@@ -50,7 +54,8 @@ MOVED = np.array([1, 3])
 
 
 def decay(configuration: Configuration) -> float:
-    """How fast the slowest motion of the loop dies away, 1/s; below zero it grows, and only dry friction holds it.
+    """How fast the slowest motion of the loop dies away, 1/s; below zero it grows, and only dry
+    friction holds it.
 
     A semi-active damper counts as its least damping, a compensator that makes steps as none.
     """
@@ -70,14 +75,19 @@ def _reachable(edges: NDArray[np.bool_], start: tuple[int, ...]) -> NDArray[np.b
 
 
 def closed_loop(configuration: Configuration) -> Array:
-    """The matrix that takes the state from one tick to the next: of the mechanics, commands under way, sensors, controller."""
+    """The matrix that takes the state from one tick to the next: of the mechanics, commands under
+    way, sensors, controller."""
     period, plant = configuration.timing.period, configuration.plant
     a, b, c = mechanics(plant, configuration.controller.preload)
     (own, by_sensors), (from_state, direct) = linear_controller(configuration)
-    late = [plant.structure_cylinder.delay + plant.computer.delay, plant.motor.delay + plant.computer.delay]
+    late = [
+        plant.structure_cylinder.delay + plant.computer.delay,
+        plant.motor.delay + plant.computer.delay,
+    ]
     registers = [max(1, math.floor(delay / period + 1e-9) + 1) for delay in late]
     transducers = [_transducer(sensor, period) for sensor in sensors(plant)[1:]]
-    sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*(each[part] for each in transducers))) for part in range(3))
+    parts = [[each[part] for each in transducers] for part in range(3)]
+    sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*part)) for part in parts)
     sensing_d = np.diag([each[3] for each in transducers])
 
     sizes = [len(a), sum(registers), len(sensing_a), SIZE]
@@ -95,11 +105,13 @@ def closed_loop(configuration: Configuration) -> Array:
     for number, (delay, length) in enumerate(zip(late, registers, strict=True)):
         whole = math.floor(delay / period + 1e-9)
         part = max(delay - whole * period, 0.0)
-        now, before = _entered(a, b[:, number], period - part), expm(a * (period - part)) @ _entered(a, b[:, number], part)
-        for entry, age in ((now, whole), (before, whole + 1)):
+        entry = b[:, number]
+        now = _integrate_input(a, entry, period - part)
+        before = expm(a * (period - part)) @ _integrate_input(a, entry, part)
+        for change, age in ((now, whole), (before, whole + 1)):
             # Age 0 is the command of this tick, age n what was put into the register n ticks ago.
             source = commands[number] if age == 0 else _unit(total, first + age - 1)
-            matrix[x] += np.outer(entry, source)
+            matrix[x] += np.outer(change, source)
         matrix[first] = commands[number]
         for place in range(1, length):
             matrix[first + place, first + place - 1] = 1.0
@@ -117,7 +129,7 @@ def _unit(size: int, place: int) -> Array:
     return row
 
 
-def _entered(a: Array, b: Array, time: float) -> Array:
+def _integrate_input(a: Array, b: Array, time: float) -> Array:
     """∫₀ᵗ e^{As} ds B."""
     both = np.zeros((len(a) + 1,) * 2)
     both[:-1, :-1], both[:-1, -1] = a, b
@@ -125,15 +137,19 @@ def _entered(a: Array, b: Array, time: float) -> Array:
 
 
 def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
-    """A, B, C of the plant between the commands that act, of plate (m) and voltage (V), and plate, travel (m), load cell (N).
+    """A, B, C of the plant between the commands that act, of plate (m) and voltage (V), and plate,
+    travel (m), load cell (N).
 
-    States: cylinder, what is left of the lags of both commands, motor force, wheel position and velocity.
+    States: cylinder, what is left of the lags of both commands, motor force, wheel position and
+    velocity.
     """
     cylinder, motor = plant.structure_cylinder, plant.motor
     inner, entry, out = continuous(cylinder)
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
-    for number, (lag, gain, place) in enumerate(((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS))):
+    for number, (lag, gain, place) in enumerate(
+        ((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS)),
+    ):
         if lag > 0.0:
             a[place, place], b[place, number] = -1.0 / lag, gain / lag
     if cylinder.lag > 0.0:
@@ -164,12 +180,18 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
 
 
 def _transducer(sensor: object, period: float) -> tuple[Array, Array, Array, float]:
-    """A sensor between its quantity and its sample: A (n, n), B (n, 1), C (1, n), D. Its delay, then its lag, then its gain."""
+    """A sensor between its quantity and its sample: A (n, n), B (n, 1), C (1, n), D. Its delay,
+    then its lag, then its gain."""
     delay, lag, gain = (float(getattr(sensor, name)) for name in ("delay", "lag", "gain"))
     whole = math.floor(delay / period + 1e-9)
     part = max(delay / period - whole, 0.0)
     length, share = whole + 1, 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
-    a, b, late, direct = np.zeros((length + 1,) * 2), np.zeros((length + 1, 1)), np.zeros(length + 1), 0.0
+    a, b, late, direct = (
+        np.zeros((length + 1,) * 2),
+        np.zeros((length + 1, 1)),
+        np.zeros(length + 1),
+        0.0,
+    )
     b[0, 0] = 1.0
     for place in range(1, length):
         a[place, place - 1] = 1.0
@@ -185,9 +207,11 @@ def _transducer(sensor: object, period: float) -> tuple[Array, Array, Array, flo
     return a, b, gain * row[None, :], gain * share * direct
 
 
-def linear_controller(configuration: Configuration) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """How the controller's next state and its two commands that act answer to its state and to plate, travel and load cell:
-    ((SIZE, SIZE), (SIZE, 3)), ((2, SIZE), (2, 3))."""
+def linear_controller(
+    configuration: Configuration,
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """How the controller's next state and its two commands that act answer to its state and to
+    plate, travel and load cell: ((SIZE, SIZE), (SIZE, 3)), ((2, SIZE), (2, 3))."""
     settings = _affine(configuration.controller)
     controlling = controller(settings, configuration.timing.period)
     demand = Demand(0.0, settings.start, settings.preload)
@@ -196,22 +220,31 @@ def linear_controller(configuration: Configuration) -> tuple[tuple[Array, Array]
     state, _ = update(controlling, initial_state(controlling), Measurements(*rest.tolist()), demand)
     numbers = np.array(packed(state), dtype=float)
 
-    def stepped(state: Array, measured: Array) -> Array:
-        after, commands = update(controlling, unpacked(tuple(state.tolist())), Measurements(*measured.tolist()), demand)
+    def tick(state: Array, measured: Array) -> Array:
+        after, commands = update(
+            controlling,
+            unpacked(tuple(state.tolist())),
+            Measurements(*measured.tolist()),
+            demand,
+        )
         return np.concatenate([np.array(packed(after), dtype=float), np.array(commands)[MOVED]])
 
     def slope(change: Array, of_state: bool) -> Array:
         if of_state:
-            ends = [stepped(numbers + sign * change, rest) for sign in (1.0, -1.0)]
+            ends = [tick(numbers + sign * change, rest) for sign in (1.0, -1.0)]
         else:
-            ends = [stepped(numbers, rest + sign * change) for sign in (1.0, -1.0)]
+            ends = [tick(numbers, rest + sign * change) for sign in (1.0, -1.0)]
         found = (ends[0] - ends[1]) / (2.0 * PERTURBATION)
         # What differences of rounded numbers leave is none.
         noise = 1e-15 * np.maximum(np.abs(ends[0]), np.abs(ends[1])) / PERTURBATION * 10.0
         return np.where(np.abs(found) > noise, found, 0.0)
 
-    by_state = np.column_stack([slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)])
-    by_sensor = np.column_stack([slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)])
+    by_state = np.column_stack(
+        [slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)],
+    )
+    by_sensor = np.column_stack(
+        [slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)],
+    )
     return (by_state[:SIZE], by_sensor[:SIZE]), (by_state[SIZE:], by_sensor[SIZE:])
 
 

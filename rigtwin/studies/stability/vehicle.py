@@ -9,7 +9,10 @@ from rigtwin.errors import RigtwinError
 
 SMALLEST, LARGEST = 1e-9, 1e12
 """kg, N/m and Ns/m: what can be computed at all."""
-LEAST, MOST = {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6}, {"mass": 1e6, "stiffness": 1e9, "damping": 1e9}
+LEAST, MOST = (
+    {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6},
+    {"mass": 1e6, "stiffness": 1e9, "damping": 1e9},
+)
 """kg, N/m and Ns/m: beyond these rounding may decide which pole is stable."""
 SHORTEST, LONGEST = 1e-9, 1e6
 """s."""
@@ -34,7 +37,8 @@ class SingleMass(NamedTuple):
 
 
 class QuarterCar(NamedTuple):
-    """Tyre stiffness N/m and damping Ns/m, unsprung mass kg, suspension stiffness N/m and damping Ns/m, sprung mass kg."""
+    """Tyre stiffness N/m and damping Ns/m, unsprung mass kg, suspension stiffness N/m and damping
+    Ns/m, sprung mass kg."""
 
     tyre_stiffness: float
     tyre_damping: float
@@ -57,15 +61,17 @@ class QuarterCar(NamedTuple):
 Vehicle = TypeVar("Vehicle", SingleMass, QuarterCar)
 
 
-def checked(vehicle: Vehicle) -> Vehicle:
-    """The vehicle. Raises RigtwinError unless masses and stiffnesses are above 0 and dampings 0 or more."""
+def validate(vehicle: Vehicle) -> Vehicle:
+    """The vehicle. Raises RigtwinError unless masses and stiffnesses are above 0 and dampings 0 or
+    more."""
     for name, value in vehicle._asdict().items():
         _within(name, value, SMALLEST, LARGEST)
     return vehicle
 
 
 def believable(vehicle: Vehicle) -> Vehicle:
-    """The vehicle. Raises RigtwinError unless it is of a size at which its poles can be told from rounding."""
+    """The vehicle. Raises RigtwinError unless it is of a size at which its poles can be told from
+    rounding."""
     for name, value in vehicle._asdict().items():
         kind = name.rpartition("_")[2]
         _within(name, value, LEAST[kind], MOST[kind])
@@ -75,11 +81,14 @@ def believable(vehicle: Vehicle) -> Vehicle:
 def _within(name: str, value: float, low: float, high: float) -> None:
     damping = name.endswith("damping")
     if not (low <= value <= high or (damping and value == 0.0)):
-        raise RigtwinError(f"{name} {value:g}: expected {'0, or ' if damping else ''}{low:g} to {high:g}")
+        raise RigtwinError(
+            f"{name} {value:g}: expected {'0, or ' if damping else ''}{low:g} to {high:g}",
+        )
 
 
 def checked_time(name: str, value: float) -> float:
-    """A lag or a delay, s. Raises RigtwinError unless it is above 0 and of a size that poles can be told apart at."""
+    """A lag or a delay, s. Raises RigtwinError unless it is above 0 and of a size that poles can be
+    told apart at."""
     if not SHORTEST <= value <= LONGEST:
         raise RigtwinError(f"{name} {value:g}: expected {SHORTEST:g} to {LONGEST:g} s")
     return value

@@ -18,25 +18,27 @@ ANSWERS = 5.0
 """s that a scheduler may take to answer."""
 PATIENCE = 60.0
 """s without any worker until a sweep gives up."""
+KEPT = "what is done is kept, run again to go on"
 
 
-def _same(digest: str, function: Callable[[Any], Any], argument: Any) -> Any:
-    """On a worker: the job, if the worker has the same sources."""
+def _run_if_same(digest: str, function: Callable[[Any], Any], argument: Any) -> Any:
+    """On a worker: do the job, if the worker has the same sources."""
     here = source_digest()
     if here != digest:
-        raise RigtwinError(f"a worker of the cluster has another version of rigtwin: sources {here}, here {digest}")
+        told = f"sources {here}, here {digest}"
+        raise RigtwinError(f"a worker of the cluster has another version of rigtwin: {told}")
     return function(argument)
 
 
-class _Given:
-    """A job at the cluster. What it came to is fetched with that of others, since each fetch is milliseconds."""
+class _Remote:
+    """A job at the cluster. Results are fetched together, since each fetch is milliseconds."""
 
     def __init__(self, future: Any) -> None:
         self.future = future
-        self.fetched: list[Any] = []
+        self.results: list[Any] = []
 
     def result(self) -> Any:
-        return self.fetched[0] if self.fetched else self.future.result()
+        return self.results[0] if self.results else self.future.result()
 
     def cancel(self) -> None:
         self.future.cancel()
@@ -46,7 +48,18 @@ class _Given:
 
 
 class Cluster:
-    """Raises RigtwinError if the package is missing, nobody answers, or it has no workers."""
+    """The workers of a cluster.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, such as tcp://host:8786.
+
+    Raises
+    ------
+    RigtwinError
+        If the package is missing, nobody answers, or the cluster has no workers.
+    """
 
     ahead = 16
     """A job is tens of milliseconds on its way."""
@@ -56,35 +69,40 @@ class Cluster:
             from distributed import Client
             from distributed.scheduler import KilledWorker
         except ImportError:
-            raise RigtwinError("--cluster needs dask.distributed: pip install 'rigtwin[cluster]'") from None
+            missing = "--cluster needs dask.distributed: pip install 'rigtwin[cluster]'"
+            raise RigtwinError(missing) from None
         self.lost: tuple[type[BaseException], ...] = (KilledWorker,)
         self.address = address
         try:
             self._client = Client(address, timeout=ANSWERS, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             said = str(error).splitlines()[0] if str(error) else "no answer"
-            raise RigtwinError(
-                f"no cluster at {address}: {said}; expected a scheduler's address, such as tcp://host:8786"
-            ) from None
+            expected = "expected a scheduler's address, such as tcp://host:8786"
+            raise RigtwinError(f"no cluster at {address}: {said}; {expected}") from None
         self._run = uuid4().hex
         self._given = 0
-        self._ready: deque[_Given] = deque()
+        self._ready: deque[_Remote] = deque()
         if not self.capacity:
             self._client.close()
-            raise RigtwinError(f"the cluster at {address} has no workers; start some: dask worker {address} --nthreads 1")
+            start = f"start some: dask worker {address} --nthreads 1"
+            raise RigtwinError(f"the cluster at {address} has no workers; {start}")
 
     @property
     def capacity(self) -> int:
+        """Threads of all workers."""
         return sum(self._client.nthreads().values())
 
     def submit(self, function: Callable[[Any], Any], argument: Any) -> Any:
+        """Give a job to the cluster."""
         self._given += 1
         key = f"rigtwin-{self._run}-{self._given}"
-        return _Given(self._client.submit(_same, source_digest(), function, argument, key=key, pure=False))
+        job = (_run_if_same, source_digest(), function, argument)
+        return _Remote(self._client.submit(*job, key=key, pure=False))
 
     def next(self, finished: SimpleQueue[Any]) -> Any:
+        """Wait for the next job that is done, and fetch all that are done with it."""
         if not self._ready:
-            self._ready.append(self._waited(finished))
+            self._ready.append(self._wait(finished))
             with suppress(Empty):
                 while True:
                     self._ready.append(finished.get_nowait())
@@ -93,11 +111,11 @@ class Cluster:
                 # What cannot be fetched together says why when it is asked for alone.
                 results: Any = self._client.gather([one.future for one in good])
                 for one, result in zip(good, results, strict=True):
-                    one.fetched.append(result)
+                    one.results.append(result)
         return self._ready.popleft()
 
-    def _waited(self, finished: SimpleQueue[Any]) -> _Given:
-        """The next job that is done."""
+    def _wait(self, finished: SimpleQueue[Any]) -> _Remote:
+        """Wait for the next job that is done."""
         alone = 0.0
         while True:
             before = time.monotonic()
@@ -106,15 +124,18 @@ class Cluster:
             except Empty:
                 pass
             if self._client.status != "running":
-                raise RigtwinError(f"the cluster at {self.address} is gone; what is done is kept, run again to go on")
+                raise RigtwinError(f"the cluster at {self.address} is gone; {KEPT}")
             alone = 0.0 if self.capacity else alone + time.monotonic() - before
             if alone > PATIENCE:
-                raise RigtwinError(
-                    f"the cluster at {self.address} has no workers left; what is done is kept, run again to go on"
-                )
+                raise RigtwinError(f"the cluster at {self.address} has no workers left; {KEPT}")
 
     def __enter__(self) -> Cluster:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._client.close()

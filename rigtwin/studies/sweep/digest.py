@@ -7,13 +7,22 @@ from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
-SOURCES = {"rigtwin": "*.py", "controllers": "*.py", "experiments": "*.py", "machines": "*.toml", "models": "*.xml"}
+SOURCES = {
+    "rigtwin": "*.py",
+    "controllers": "*.py",
+    "experiments": "*.py",
+    "machines": "*.toml",
+    "models": "*.xml",
+}
 """Package → files. They are looked for, not imported."""
 
 
 @cache
 def source_digest() -> str:
-    """Of all sources, twelve hexadecimal digits. The same on two computers means the same answers."""
+    """Digest all sources into twelve hexadecimal digits.
+
+    The same on two computers means the same answers.
+    """
     digest = hashlib.sha256()
     for package, pattern in SOURCES.items():
         spec = find_spec(package)

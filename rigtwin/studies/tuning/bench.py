@@ -1,9 +1,10 @@
-"""Runs candidates in scenarios, each once, and says what they are worth."""
+"""Runs candidates in scenarios, each once, and scores them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from controllers import Settings
 from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip
-from rigtwin.studies.sweep import Store, Workers, swept
+from rigtwin.studies.sweep import Store, Workers, run_jobs
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.studies.tuning.scenario import Scenario
@@ -19,9 +20,18 @@ from rigtwin.studies.tuning.study import Study
 
 
 @dataclass(frozen=True)
-class Worth:
-    """What a candidate is worth over scenarios. figures: measure → the study's quantile of it, not a number if any run
-    tripped; limits: the largest share of a safety limit in any run; trips: share of runs that tripped."""
+class Score:
+    """What a candidate came to over scenarios.
+
+    Parameters
+    ----------
+    figures : dict
+        Measure → the study's quantile of it, not a number if any run tripped.
+    limits : float
+        The largest share of a safety limit in any run.
+    trips : float
+        Share of runs that tripped.
+    """
 
     figures: dict[str, float]
     limits: float
@@ -30,39 +40,66 @@ class Worth:
 
 @dataclass(frozen=True)
 class Bench:
-    """Where the runs of one study are made and kept. progress: called with 1 for each run."""
+    """Where the runs of one study are made and kept.
+
+    Parameters
+    ----------
+    study : Study
+        Whose runs.
+    store : Store
+        Where they are kept.
+    workers : Workers
+        Who makes them.
+    progress : callable, optional
+        Called with 1 for each run.
+    """
 
     study: Study
     store: Store
     workers: Workers
     progress: Callable[[int], object] = lambda _: None
 
-    def runs(
-        self, base: Configuration, candidates: Sequence[Settings], scenarios: Sequence[Scenario]
+    def plan(self, base: Configuration, candidate: Settings, scenario: Scenario) -> Run:
+        """The run of a candidate in a scenario. base: the configuration of everything else."""
+        return Run(
+            experiment=self.study.experiment,
+            configuration=base._replace(controller=candidate, plant=scenario.plant),
+            seed=scenario.seed,
+            first=self.study.first,
+            measures=tuple(measure.name for measure in self.study.goals.measures),
+        )
+
+    def run(
+        self,
+        base: Configuration,
+        candidates: Sequence[Settings],
+        scenarios: Sequence[Scenario],
     ) -> list[list[dict[str, float]]]:
-        """What each candidate's run in each scenario came to: name → figure, as `run` gives it."""
-        names = tuple(measure.name for measure in self.study.measures)
+        """Run every candidate in every scenario.
 
-        def asked(candidate: Settings, scenario: Scenario) -> Run:
-            configuration = base._replace(controller=candidate, plant=scenario.plant)
-            return Run(self.study.experiment, configuration, scenario.seed, self.study.first, names)
-
-        jobs = [[asked(candidate, scenario) for scenario in scenarios] for candidate in candidates]
+        Returns
+        -------
+        list
+            A row a candidate: for each scenario name → figure, as `run.run` gives it.
+        """
+        jobs = [[self.plan(base, each, scenario) for scenario in scenarios] for each in candidates]
         keys = [[job.key for job in row] for row in jobs]
-        together = (pair for row, own in zip(keys, jobs, strict=True) for pair in zip(row, own, strict=True))
-        swept(self.store, self.workers, run, together, self.progress)
+        flat = zip(chain.from_iterable(keys), chain.from_iterable(jobs), strict=True)
+        run_jobs(self.store, self.workers, run, flat, self.progress)
         return [[self.store[key] for key in row] for row in keys]
 
-    def searched(self, candidates: Sequence[Settings], scenarios: Sequence[Scenario]) -> list[Worth]:
-        """What each candidate is worth to the search."""
-        return [self._worth(rows) for rows in self.runs(self.study.searched, candidates, scenarios)]
+    def score(self, candidates: Sequence[Settings], scenarios: Sequence[Scenario]) -> list[Score]:
+        """Score candidates over scenarios of the search."""
+        rows = self.run(self.study.search_configuration, candidates, scenarios)
+        return [self._score(row) for row in rows]
 
-    def _worth(self, rows: Sequence[dict[str, float]]) -> Worth:
-        figures = {
-            each.name: quantile(each, [row[each.name] for row in rows], self.study.quantile) for each in self.study.measures
-        }
-        trips = float(np.mean([row[TRIP] != Trip.NONE for row in rows]))
-        return Worth(figures, max(row[LIMITS] for row in rows), trips)
+    def _score(self, runs: Sequence[dict[str, float]]) -> Score:
+        figures = {}
+        for measure in self.study.goals.measures:
+            values = [run[measure.name] for run in runs]
+            figures[measure.name] = quantile(measure, values, self.study.quantile)
+        trips = float(np.mean([run[TRIP] != Trip.NONE for run in runs]))
+        return Score(figures, max(run[LIMITS] for run in runs), trips)
 
 
 def quantile(measure: Measure, values: Sequence[float] | Array, share: float) -> float:

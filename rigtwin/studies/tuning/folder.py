@@ -1,4 +1,4 @@
-"""A study's folder: settings to run, a recording of the best, tables, pictures, one page to look at."""
+"""A study's folder: settings to run, a recording of the best, tables, pictures, one page."""
 
 from __future__ import annotations
 
@@ -16,52 +16,75 @@ from rigtwin.machine.configuration import Configuration
 from rigtwin.render.plot import save
 from rigtwin.simulation.runner import record
 from rigtwin.studies.tuning import text
-from rigtwin.studies.tuning.outcome import Outcome
-from rigtwin.studies.tuning.pictures import drawn
+from rigtwin.studies.tuning.evaluation import Comparison
+from rigtwin.studies.tuning.pictures import draw
+from rigtwin.studies.tuning.result import TuningResult
 from rigtwin.studies.tuning.run import LIMITS
 from rigtwin.studies.tuning.scenario import APART
 
 RUNS, SETTINGS, BEST, PAGE = "runs.sqlite", "tuned.toml", "best.mcap", "index.html"
+CAPTIONS = {
+    "front": "Each point is a candidate; none of the front is beaten in both.",
+    "held-out": "Change in the same scenario; points are medians, bars their 95 % intervals.",
+    "search": "What the search tried, in order.",
+    "parameters": "The first objective of every candidate over each parameter.",
+}
 
 
-def write(folder: Path, outcome: Outcome, twin: Configuration) -> list[Path]:
-    """Writes all of it; what was written. twin: the rig that the best is recorded on. Raises RigtwinError."""
-    figures = drawn(outcome)
-    pages: dict[str, str] = {
-        SETTINGS: text.toml(outcome),
-        "candidates.csv": _candidates(outcome),
-        "held-out.csv": _held_out(outcome),
-        PAGE: _page(outcome, figures),
+def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]:
+    """Write everything that came out of a study.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to; it is made. Of an earlier study nothing stays that is not written again.
+    result : TuningResult
+        What came out.
+    twin : Configuration
+        The rig that the best is recorded on.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    RigtwinError
+        If it cannot be written.
+    """
+    figures = draw(result)
+    pages = {
+        SETTINGS: text.toml(result),
+        "candidates.csv": _candidates(result),
+        "held-out.csv": _held_out(result),
+        PAGE: _page(result, figures),
     }
-    if len(outcome.study.minimise) == 2:
-        pages |= {f"tuned-{number + 1}.toml": text.toml(outcome, number) for number in range(len(outcome.front))}
-    written = []
+    if len(result.study.goals.minimise) == 2:
+        for point in range(len(result.front)):
+            pages[f"tuned-{point + 1}.toml"] = text.toml(result, point)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        # Of an earlier study nothing stays that this one does not write again.
         for old in (*folder.glob("tuned*.toml"), *(folder / f"{name}.png" for name in CAPTIONS)):
             old.unlink(missing_ok=True)
         for name, content in pages.items():
             temporary = folder / f".{name}.new"
             temporary.write_text(content, encoding="utf-8")
             temporary.replace(folder / name)
-            written.append(folder / name)
     except OSError as error:
         raise RigtwinError(f"cannot write into {folder}: {error.strerror}") from None
     for name, figure in figures.items():
         save(figure, folder / f"{name}.png")
-        written.append(folder / f"{name}.png")
-    _record(folder / BEST, outcome, twin)
-    return [*written, folder / BEST]
+    _record(folder / BEST, result, twin)
+    names = (*pages, *(f"{name}.png" for name in figures), BEST)
+    return [folder / name for name in names]
 
 
-def _record(path: Path, outcome: Outcome, twin: Configuration) -> None:
-    """The tuned settings on the first held-out road."""
-    import experiments
-
-    configuration = twin._replace(controller=outcome.settings)
-    demands = experiments.find(outcome.study.experiment).demands(configuration, APART)
-    record(path, outcome.study.experiment, configuration, demands, APART)
+def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
+    """Record the tuned settings on the first held-out road."""
+    experiment = result.study.experiment
+    configuration = twin._replace(controller=result.settings)
+    record(path, experiment.name, configuration, experiment.demands(configuration, APART), APART)
 
 
 def _csv(rows: list[list[object]]) -> str:
@@ -70,30 +93,42 @@ def _csv(rows: list[list[object]]) -> str:
     return stream.getvalue()
 
 
-def _candidates(outcome: Outcome) -> str:
-    """Every candidate that was tried: its values, what it was worth over the search's scenarios, whether it was allowed."""
-    study = outcome.study
-    names = [measure.name for measure in study.measures]
-    rows: list[list[object]] = [[*(each.key for each in study.parameters), *names, LIMITS, "trips", "allowed"]]
-    for each in outcome.tried:
-        worth = each.worth
-        rows.append([*each.values, *(worth.figures[name] for name in names), worth.limits, worth.trips, int(each.allowed)])
+def _candidates(result: TuningResult) -> str:
+    """Every candidate: its values, its score over the search's scenarios, whether allowed."""
+    study = result.study
+    keys = [parameter.key for parameter in study.parameters]
+    names = [measure.name for measure in study.goals.measures]
+    rows: list[list[object]] = [[*keys, *names, LIMITS, "trips", "allowed"]]
+    for each in result.candidates:
+        score = each.score
+        figures = [score.figures[name] for name in names]
+        rows.append([*each.values, *figures, score.limits, score.trips, int(each.allowed)])
     return _csv(rows)
 
 
-def _held_out(outcome: Outcome) -> str:
+def _held_out(result: TuningResult) -> str:
     """Every comparison, a line a measure."""
     spreads = [f"{when}_{what}" for when in ("before", "after") for what in ("median", "5%", "95%")]
+    names = ["rig", "settings", "against", "measure", "unit", *spreads]
     rows: list[list[object]] = [
-        ["rig", "settings", "against", "measure", "unit", *spreads, "change", "low", "high", "change_in", "no_worse", "runs"]
+        [*names, "change", "low", "high", "change_in", "no_worse", "runs"],
     ]
-    for each in (*outcome.comparisons, *outcome.on_front):
-        for change in each.changes:
-            both = [value for of in (change.before, change.after) for value in (of.median, of.low, of.high)]
-            unit = "%" if change.relative else change.measure.unit
-            which = [each.rig, each.settings, each.against, change.measure.name, change.measure.unit]
-            rows.append([*which, *both, change.median, change.low, change.high, unit, change.better, each.runs])
+    for each in (*result.comparisons, *result.front_comparisons):
+        rows += _rows(each)
     return _csv(rows)
+
+
+def _rows(comparison: Comparison) -> list[list[object]]:
+    rows: list[list[object]] = []
+    for change in comparison.changes:
+        row: list[object] = [comparison.rig, comparison.settings, comparison.against]
+        row += [change.measure.name, change.measure.unit]
+        for spread in (change.before, change.after):
+            row += [spread.median, spread.low, spread.high]
+        unit = "%" if change.relative else change.measure.unit
+        row += [change.median, change.low, change.high, unit, change.better, comparison.runs]
+        rows.append(row)
+    return rows
 
 
 def _svg(figure: Figure) -> str:
@@ -103,15 +138,7 @@ def _svg(figure: Figure) -> str:
     return stream.getvalue()[stream.getvalue().index("<svg") :]
 
 
-CAPTIONS = {
-    "front": "Each point is a candidate; none of the front is beaten in both.",
-    "held-out": "Change against the settings named, in the same scenario; points are medians, bars their 95 % intervals.",
-    "search": "What the search tried, in order.",
-    "parameters": "The first objective of every candidate over each parameter.",
-}
-
-
-def _page(outcome: Outcome, figures: dict[str, Figure]) -> str:
+def _page(result: TuningResult, figures: dict[str, Figure]) -> str:
     """One HTML file: no network, no script."""
     environment = Environment(
         loader=PackageLoader("rigtwin.studies.tuning"),
@@ -121,10 +148,10 @@ def _page(outcome: Outcome, figures: dict[str, Figure]) -> str:
         lstrip_blocks=True,
     )
     return environment.get_template("tuning.html").render(
-        outcome=outcome,
-        study=outcome.study,
+        result=result,
+        study=result.study,
         text=text,
         pictures=[(CAPTIONS[name], _svg(figure)) for name, figure in figures.items()],
-        settings=text.toml(outcome),
+        settings=text.toml(result),
         version=__version__,
     )

@@ -1,4 +1,4 @@
-"""What a test is judged by: the objectives of tuning, each defined once."""
+"""What a test is measured by: the objectives of tuning, each defined once."""
 
 from __future__ import annotations
 
@@ -18,13 +18,24 @@ from rigtwin.simulation.metrics import Tracking, tracked
 from rigtwin.studies.stability.sampled_loop import decay
 
 HEAVE = 3.0
-"""Hz; up to which a body on this suspension heaves. Above, the plate carries the limit cycle by friction, from 3.4 Hz on."""
+"""Hz; up to which a body on this suspension heaves. Above, from 3.4 Hz on, the plate carries the
+limit cycle by friction."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A test that was run to its end, judged from tick `first` on. commands, sensed: shape (ticks, 4), columns of
-    controllers.Commands and .Measurements; sensed: without noise where a twin knows it."""
+    """A test that was run to its end.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        What it was run with.
+    commands, sensed : array
+        Shape (ticks, 4), columns of `controllers.Commands` and `.Measurements`; the latter without
+        noise where a twin knows them.
+    first : int
+        Tick from which on it is measured.
+    """
 
     configuration: Configuration
     commands: Array
@@ -38,29 +49,44 @@ class Trial:
 
     @property
     def plate(self) -> Array:
+        """Its position, m."""
         return self.sensed[self.first :, 1]
 
     @property
     def travel(self) -> Array:
+        """The suspension's, m."""
         return self.sensed[self.first :, 2]
 
     @property
     def tyre(self) -> Array:
         """The tyre's force, N."""
         deflection = self.sensed[:, 0] - self.sensed[:, 1] + self.sensed[:, 2]
-        return tyre_force(self.configuration.plant.tyre, deflection, np.gradient(deflection, self.period))[self.first :]
+        rate = np.gradient(deflection, self.period)
+        return tyre_force(self.configuration.plant.tyre, deflection, rate)[self.first :]
 
     @cached_property
     def tracking(self) -> Tracking:
+        """The errors of thesis Eq. 3.1 and 3.2 against the ideal vehicle."""
         target = ideal(self.configuration, self.commands[:, 0])
         late = slice(self.first, None)
-        shown = Ideal(target.structure[late], target.velocity[late], target.wheel[late], target.force[late], None)
+        motions = (target.structure[late], target.velocity[late], target.wheel[late])
+        shown = Ideal(*motions, target.force[late], None)
         return tracked(shown, self.commands[late], self.plate, self.sensed[late, 3])
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One figure of a test. title: in words; unit; of: the figure; more: whether more of it is better."""
+    """One figure of a test.
+
+    Parameters
+    ----------
+    name, title, unit : str
+        What studies call it, what it is in words, its SI unit.
+    of : callable
+        The figure of a trial.
+    more : bool, optional
+        Whether more of it is better.
+    """
 
     name: str
     title: str
@@ -69,38 +95,62 @@ class Measure:
     more: bool = False
 
 
-def _acceleration(test: Trial) -> Array:
-    return np.diff(test.plate, 2) / test.period**2
+def _ride(trial: Trial) -> float:
+    return rms(np.diff(trial.plate, 2) / trial.period**2)
 
 
-def _heave(test: Trial) -> float:
-    smooth = sosfiltfilt(butter(2, HEAVE, fs=1.0 / test.period, output="sos"), test.plate)
-    return rms(np.diff(smooth, 2) / test.period**2)
+def _heave(trial: Trial) -> float:
+    low_pass = butter(2, HEAVE, fs=1.0 / trial.period, output="sos")
+    return rms(np.diff(sosfiltfilt(low_pass, trial.plate), 2) / trial.period**2)
 
 
-MEASURES = {
-    measure.name: measure
-    for measure in (
-        Measure("ride", "rms body acceleration", "m/s²", lambda test: rms(_acceleration(test))),
-        Measure("heave", f"rms body acceleration up to {HEAVE:g} Hz", "m/s²", _heave),
-        Measure("road_holding", "rms dynamic tyre force", "N", lambda test: float(np.std(test.tyre))),
-        Measure("travel", "rms suspension travel about its mean", "m", lambda test: float(np.std(test.travel))),
-        Measure("tracking", "rms force tracking error e2", "N", lambda test: test.tracking.force_e2),
-        Measure("model_error", "rms force model error e1", "N", lambda test: test.tracking.force_e1),
-        Measure(
-            "force_error", "force error, rms e1 + rms e2", "N", lambda test: test.tracking.force_e1 + test.tracking.force_e2
-        ),
-        Measure("position_tracking", "rms position tracking error e2", "m", lambda test: test.tracking.position_e2),
-        Measure(
-            "position_error",
-            "position error, rms e1 + rms e2",
-            "m",
-            lambda test: test.tracking.position_e1 + test.tracking.position_e2,
-        ),
-        Measure("effort", "rms motor voltage about its mean", "V", lambda test: float(np.std(test.commands[test.first :, 3]))),
-        Measure(
-            "stability_margin", "decay of the linear loop's slowest motion", "1/s", lambda test: decay(test.configuration), True
-        ),
-    )
-}
+def _road_holding(trial: Trial) -> float:
+    return float(np.std(trial.tyre))
+
+
+def _travel(trial: Trial) -> float:
+    return float(np.std(trial.travel))
+
+
+def _force_error(trial: Trial) -> float:
+    return trial.tracking.force_e1 + trial.tracking.force_e2
+
+
+def _position_error(trial: Trial) -> float:
+    return trial.tracking.position_e1 + trial.tracking.position_e2
+
+
+def _effort(trial: Trial) -> float:
+    return float(np.std(trial.commands[trial.first :, 3]))
+
+
+def _margin(trial: Trial) -> float:
+    return decay(trial.configuration)
+
+
+_ALL = (
+    Measure("ride", "rms body acceleration", "m/s²", _ride),
+    Measure("heave", f"rms body acceleration up to {HEAVE:g} Hz", "m/s²", _heave),
+    Measure("road_holding", "rms dynamic tyre force", "N", _road_holding),
+    Measure("travel", "rms suspension travel about its mean", "m", _travel),
+    Measure("tracking", "rms force tracking error e2", "N", lambda trial: trial.tracking.force_e2),
+    Measure("model_error", "rms force model error e1", "N", lambda trial: trial.tracking.force_e1),
+    Measure("force_error", "force error, rms e1 + rms e2", "N", _force_error),
+    Measure(
+        "position_tracking",
+        "rms position tracking error e2",
+        "m",
+        lambda trial: trial.tracking.position_e2,
+    ),
+    Measure("position_error", "position error, rms e1 + rms e2", "m", _position_error),
+    Measure("effort", "rms motor voltage about its mean", "V", _effort),
+    Measure(
+        name="stability_margin",
+        title="decay of the linear loop's slowest motion",
+        unit="1/s",
+        of=_margin,
+        more=True,
+    ),
+)
+MEASURES = {measure.name: measure for measure in _ALL}
 """By the names that studies take. Errors as in thesis Eq. 3.1, 3.2 and Table 4.2."""

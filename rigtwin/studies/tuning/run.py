@@ -1,4 +1,4 @@
-"""One run of one candidate in one scenario, in any process: its measures, how near to its limits it came, any trip."""
+"""One run of one candidate in one scenario, in any process."""
 
 from __future__ import annotations
 
@@ -8,20 +8,35 @@ import math
 from dataclasses import dataclass
 
 from rigtwin.machine.configuration import Configuration, flattened
+from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
 from rigtwin.simulation.runner import Ran, simulated
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.tuning.measures import MEASURES, Trial
 
 LIMITS, TRIP = "limits", "trip"
-"""Besides the measures: the largest share of a safety limit that was reached, and the number of a Trip."""
+"""Besides the measures: the largest share of a safety limit reached, and the number of a Trip."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """seed: of road and noise; first: s, from which on it is judged; measures: by name."""
+    """A run to be made.
 
-    experiment: str
+    Parameters
+    ----------
+    experiment : Experiment
+        The test.
+    configuration : Configuration
+        What it is run with.
+    seed : int
+        Of road and noise.
+    first : float
+        s, from which on it is measured.
+    measures : tuple of str
+        Names of `MEASURES`.
+    """
+
+    experiment: Experiment
     configuration: Configuration
     seed: int
     first: float
@@ -30,24 +45,36 @@ class Run:
     @property
     def key(self) -> str:
         """The same for the same run, whoever asks."""
-        told = [self.experiment, flattened(self.configuration), self.seed, self.first, sorted(self.measures)]
+        told = [
+            self.experiment.name,
+            flattened(self.configuration),
+            self.seed,
+            self.first,
+            sorted(self.measures),
+        ]
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def run(asked: Run) -> dict[str, float]:
-    """Name → figure. A run that tripped has no measures: they are not a number."""
-    import experiments
+def run(job: Run) -> dict[str, float]:
+    """Make a run on the twin.
 
-    demands = experiments.find(asked.experiment).demands(asked.configuration, asked.seed)
-    return figures(asked, simulated(asked.configuration, demands, asked.seed))
+    Returns
+    -------
+    dict
+        Name → figure, of the measures, LIMITS and TRIP. The measures of a run that tripped are
+        not numbers.
+    """
+    demands = job.experiment.demands(job.configuration, job.seed)
+    return figures(job, simulated(job.configuration, demands, job.seed))
 
 
-def figures(asked: Run, ran: Ran) -> dict[str, float]:
-    """The same of a run that was made."""
-    configuration = asked.configuration
-    reached = max(1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, configuration))
-    found = {LIMITS: reached, TRIP: float(ran.trip)}
+def figures(job: Run, ran: Ran) -> dict[str, float]:
+    """Name → figure of a run that was made, as `run` gives it."""
+    configuration = job.configuration
+    shares = (1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, configuration))
+    found = {LIMITS: max(shares), TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:
-        return found | dict.fromkeys(asked.measures, math.nan)
-    test = Trial(configuration, ran.commands, ran.truth, round(asked.first / configuration.timing.period))
-    return found | {name: float(MEASURES[name].of(test)) for name in asked.measures}
+        return found | dict.fromkeys(job.measures, math.nan)
+    first = round(job.first / configuration.timing.period)
+    trial = Trial(configuration, ran.commands, ran.truth, first)
+    return found | {name: float(MEASURES[name].of(trial)) for name in job.measures}

@@ -1,27 +1,37 @@
-"""The circumstances of one run: a road and noise of its own, a rig as it may be. Every candidate meets the same ones."""
+"""The circumstances of one run: a road and noise of its own, a rig as it may be.
+
+Every candidate meets the same ones.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigtwin.components import RigPlant
 from rigtwin.machine.configuration import Configuration, overridden
 from rigtwin.machine.library import find
-from rigtwin.machine.posterior import Changes, Posterior, shifted_within
+from rigtwin.machine.posterior import Changes, Posterior, shifted_within, value_of
 from rigtwin.recording.channels import SUSPENSION_RIG
 from rigtwin.studies.tuning.study import Study
 
-NONE: Changes = {}
 APART = 1_000_000
-"""Between the seeds of search and judgement: no study has as many roads."""
+"""Between the seeds of search and evaluation: no study has as many roads."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """seed: of road and noise; plant: of the rig."""
+    """One road, its noise, and one rig.
+
+    Parameters
+    ----------
+    seed : int
+        Of road and noise.
+    plant : Plant
+        The rig.
+    """
 
     seed: int
     plant: RigPlant
@@ -29,44 +39,66 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Rig:
-    """What is known of a rig. draw: of a configuration and random numbers, the configuration with a rig as it may be; known:
-    `component.parameter` of what that has drawn, which is not varied again."""
+    """What is known of a rig.
 
+    Parameters
+    ----------
+    name : str
+        What it is called in tables.
+    draw : callable
+        Of a configuration and random numbers, the configuration with the rig as it may be.
+    known : frozenset of str
+        `component.parameter` of what that draws, which is not varied again.
+    certain : mapping
+        Component → parameter → a value that it has for certain.
+    """
+
+    name: str
     draw: Callable[[Configuration, np.random.Generator], Configuration]
     known: frozenset[str] = frozenset()
+    certain: Changes = field(default_factory=dict)
 
 
-nominal = Rig(lambda configuration, _: configuration)
+NOMINAL = Rig("nominal twin", lambda configuration, _: configuration)
 """The rig as the study has it."""
 
 
-def diagnosed(posterior: Posterior) -> Rig:
+def calibrated_rig(posterior: Posterior) -> Rig:
     """The rig of a diagnosis, each value as uncertain as that left it."""
-    return Rig(posterior.drawn, frozenset(posterior.intervals))
+    return Rig("calibrated twin", posterior.drawn, frozenset(posterior.intervals))
 
 
-def drawn(study: Study, rig: Rig, count: int, first: int, certain: Changes = NONE) -> list[Scenario]:
-    """Scenarios with seeds from `first` on, each drawn from its seed alone, so that more of them leave the others as they are.
+def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scenario]:
+    """Draw scenarios, each from its seed alone, so that more of them leave the others as they are.
 
-    Tolerances and varied parameters are uniform about the rig, cut off at the parameters' bounds; certain: what has a value for
-    certain.
+    Tolerances and varied parameters are uniform about the rig, cut off at the parameters' bounds.
+
+    Parameters
+    ----------
+    study : Study
+        Whose configuration and variation.
+    rig : Rig
+        What is known of the rig.
+    count : int
+        How many.
+    first : int
+        The first one's seed; the others follow.
     """
-    tolerances = find(SUSPENSION_RIG).tolerances if study.tolerances else ()
-    found = []
-    for seed in range(first, first + count):
+    tolerances = find(SUSPENSION_RIG).tolerances if study.variation.tolerances else ()
+
+    def draw(seed: int) -> Scenario:
         random = np.random.default_rng([seed, 3])
         configuration = rig.draw(study.configuration, random)
-        for tolerance in tolerances:
-            width = study.tolerances * tolerance.width(configuration.plant)
-            key = f"{tolerance.group}.{tolerance.parameter}"
+
+        def shift(key: str, width: float) -> Configuration:
             amount = width * random.uniform(-1.0, 1.0)
-            if key not in rig.known:
-                configuration = shifted_within(configuration, key, amount)
-        for key, share in study.vary.items():
-            group, _, name = key.partition(".")
-            value = float(getattr(getattr(configuration.plant, group), name))
-            amount = value * share * random.uniform(-1.0, 1.0)
-            if key not in rig.known:
-                configuration = shifted_within(configuration, key, amount)
-        found.append(Scenario(seed, overridden(configuration, certain).plant))
-    return found
+            return configuration if key in rig.known else shifted_within(configuration, key, amount)
+
+        for tolerance in tolerances:
+            width = study.variation.tolerances * tolerance.width(configuration.plant)
+            configuration = shift(f"{tolerance.group}.{tolerance.parameter}", width)
+        for key, share in study.variation.shares.items():
+            configuration = shift(key, value_of(configuration, key) * share)
+        return Scenario(seed, overridden(configuration, rig.certain).plant)
+
+    return [draw(seed) for seed in range(first, first + count)]

@@ -5,21 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.resources import files
-from pathlib import Path
 
 from controllers import Settings
 from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Parameter
 
-SHIPPED = Path(str(files("experiments"))) / "tuning"
+Changes = Mapping[str, Mapping[str, object]]
+"""Group → name → value."""
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """No more of a measure than a bound in its unit, or of a measure of which more is better no less. share: the bound is this
-    share of what the settings begun with have; bound is then not a number."""
+    """No more of a measure than a bound; of one of which more is better, no less.
+
+    Parameters
+    ----------
+    measure : Measure
+        What is bounded.
+    bound : float
+        In the measure's unit; not a number if `share` says it.
+    share : float, optional
+        The bound as a share of what the baseline has.
+    """
 
     measure: Measure
     bound: float
@@ -27,51 +36,123 @@ class Constraint:
 
 
 @dataclass(frozen=True)
-class Study:
-    """experiment: by name; configuration: of every run; search: what the search runs differently; baseline: the settings that
-    are compared with; minimise: one objective, or two whose front is looked for; limits: share of any safety limit that no run
-    may exceed; first: s, from which on a run is judged; roads, held_out: scenarios of search and judgement; quantile: of a
-    measure over scenarios; tolerances: half widths of the machine's that scenarios are drawn within; vary:
-    `component.parameter` → share of its value, drawn likewise; judge: name → changes of the rig to judge on besides."""
+class Goals:
+    """What the settings are tuned for.
 
-    name: str
-    title: str
-    experiment: str
-    configuration: Configuration
-    search: Mapping[str, Mapping[str, object]]
-    baseline: Mapping[str, Mapping[str, object]]
-    parameters: tuple[Parameter, ...]
+    Parameters
+    ----------
+    minimise : tuple of Measure
+        One objective, or two whose front is looked for.
+    constraints : tuple of Constraint
+        What the settings are held to besides.
+    limits : float
+        Share of any safety limit that no run may exceed.
+    report : tuple of Measure, optional
+        Measures that are told besides.
+    """
+
     minimise: tuple[Measure, ...]
     constraints: tuple[Constraint, ...]
-    report: tuple[Measure, ...]
     limits: float
-    first: float
-    roads: int
-    held_out: int
-    quantile: float
-    evaluations: int
-    points: int
-    tolerances: float
-    vary: Mapping[str, float]
-    judge: Mapping[str, Mapping[str, Mapping[str, object]]] = field(default_factory=dict)
+    report: tuple[Measure, ...] = ()
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """All that its runs are judged by, the objectives first."""
-        every = (*self.minimise, *(each.measure for each in self.constraints), *self.report)
-        return tuple(dict.fromkeys(every))
+        """All that a run is measured by, the objectives first."""
+        constrained = (each.measure for each in self.constraints)
+        return tuple(dict.fromkeys((*self.minimise, *constrained, *self.report)))
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How much is run.
+
+    Parameters
+    ----------
+    roads : int
+        Scenarios of the search.
+    held_out : int
+        Scenarios of the evaluation.
+    evaluations : int
+        Candidates that the search may try, about.
+    points : int
+        Of a front that are evaluated, at most.
+    """
+
+    roads: int
+    held_out: int
+    evaluations: int
+    points: int
+
+
+@dataclass(frozen=True)
+class Variation:
+    """How a rig differs from scenario to scenario, uniformly about its values.
+
+    Parameters
+    ----------
+    tolerances : float
+        Half widths of the machine's tolerances.
+    shares : mapping
+        `component.parameter` → share of its value.
+    """
+
+    tolerances: float = 0.0
+    shares: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What to tune, for what, and under which circumstances.
+
+    Parameters
+    ----------
+    name, title : str
+        What it is called, and what it is in words.
+    experiment : Experiment
+        The test that is run.
+    configuration : Configuration
+        Of every run.
+    search_changes : mapping
+        What the search runs differently.
+    baseline_changes : mapping
+        What the settings that are compared with have differently.
+    parameters : tuple of Parameter
+        What is tuned.
+    goals : Goals
+        What it is tuned for.
+    budget : Budget
+        How much is run.
+    first : float
+        s, from which on a run is measured.
+    quantile : float
+        Of a measure over scenarios: what settings are scored by.
+    variation : Variation, optional
+        How the rig differs from scenario to scenario.
+    other_rigs : mapping, optional
+        Name → changes of the rig to evaluate on besides.
+    """
+
+    name: str
+    title: str
+    experiment: Experiment
+    configuration: Configuration
+    search_changes: Changes
+    baseline_changes: Changes
+    parameters: tuple[Parameter, ...]
+    goals: Goals
+    budget: Budget
+    first: float
+    quantile: float
+    variation: Variation = Variation()
+    other_rigs: Mapping[str, Changes] = field(default_factory=dict)
 
     @property
-    def reference(self) -> Settings:
-        """The settings that are compared with."""
-        return overridden(self.configuration, self.baseline).controller
+    def baseline_settings(self) -> Settings:
+        """The controller that is compared with."""
+        return overridden(self.configuration, self.baseline_changes).controller
 
     @property
-    def searched(self) -> Configuration:
-        """What a search runs: perhaps shorter or coarser than what is judged."""
-        return overridden(self.configuration, self.search)
-
-
-def shipped() -> dict[str, Path]:
-    """Name → file of the studies that come along."""
-    return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
+    def search_configuration(self) -> Configuration:
+        """What a search runs: perhaps shorter or coarser than what is evaluated."""
+        return overridden(self.configuration, self.search_changes)

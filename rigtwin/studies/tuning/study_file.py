@@ -1,0 +1,309 @@
+"""Reads a study from its TOML file.
+
+Every mistake is one line that names the entry and what was expected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from controllers.quantity import Quantity, fields
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Configuration, assigned, groups, overridden, read_toml
+from rigtwin.machine.posterior import value_of
+from rigtwin.simulation.experiment import Experiment
+from rigtwin.studies.tuning.measures import MEASURES, Measure
+from rigtwin.studies.tuning.parameter import Parameter
+from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Study, Variation
+
+BASELINE = "baseline"
+REQUIRED = ("experiment", "minimise", "parameters")
+KEYS = (
+    *("title", "experiment", "from", "roads", "held_out", "quantile", "evaluations", "points"),
+    *("minimise", "report", "set", "search", "baseline", "parameters", "constraints", "vary"),
+    "judge",
+)
+MOST = 10_000
+"""Scenarios. Fewer than six have no 95 % interval of their median."""
+LONGEST = 100
+"""Characters of a title or a name, which stand in tables and pictures."""
+
+
+def read_study(
+    path: Path,
+    experiments: Mapping[str, Experiment],
+    assignments: Sequence[str] = (),
+    **numbers: int | None,
+) -> Study:
+    """Read a study.
+
+    Parameters
+    ----------
+    path : Path
+        Its file.
+    experiments : mapping
+        Name → experiment, of those that it may run.
+    assignments : sequence of str, optional
+        `group.name=value` for every run, over the study's own.
+    **numbers : int or None
+        Of roads, held_out, evaluations; None for the study's own.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the file, the entry and what was expected.
+    """
+    given: dict[str, dict[str, object]] = {}
+    for own in assigned(assignments):
+        for group, values in own.items():
+            given.setdefault(group, {}).update(values)
+    other = {key: number for key, number in numbers.items() if number is not None}
+
+    def parse(tables: Mapping[str, Any]) -> Study:
+        return parse_study(path.stem, {**tables, **other}, experiments, given)
+
+    return read_toml(path, parse)
+
+
+def parse_study(
+    name: str,
+    tables: Mapping[str, Any],
+    experiments: Mapping[str, Experiment],
+    given: Changes | None = None,
+) -> Study:
+    """Make a study of its TOML tables.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    tables : mapping
+        As they stand in its file.
+    experiments : mapping
+        Name → experiment, of those that it may run.
+    given : mapping, optional
+        Group → name → value for every run, over what the tables have.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the entry and what was expected.
+    """
+    for key in tables:
+        if key not in KEYS:
+            raise RigtwinError(f"unknown {key!r}; there are {', '.join(KEYS)}")
+    for key in REQUIRED:
+        if key not in tables:
+            raise RigtwinError(f"{key} is missing")
+    experiment, given = _experiment(tables["experiment"], experiments), given or {}
+    own = overridden(experiment.configuration, _changes("set", tables.get("set", {})))
+    configuration = overridden(own, given)
+    search = _search(tables.get("search", {}), given)
+    shorter = overridden(configuration, search)
+    _ = shorter.ticks, shorter.substeps
+    first = _number("from", tables.get("from", 0.0), 0.0, 86_400.0)
+    shortest = min(configuration.timing.duration, shorter.timing.duration)
+    if first > shortest - 1.0:
+        expected = f"expected at least a second before the test's end at {shortest:g} s"
+        raise RigtwinError(f"from = {first:g} s: {expected}")
+    return Study(
+        name=name,
+        title=_text("title", tables.get("title", name)),
+        experiment=experiment,
+        configuration=configuration,
+        search_changes=search,
+        baseline_changes=_baseline(tables.get("baseline", {})),
+        parameters=_parameters(tables["parameters"], configuration),
+        goals=_goals(tables),
+        budget=Budget(
+            roads=_whole("roads", tables.get("roads", 16), 1, MOST),
+            held_out=_whole("held_out", tables.get("held_out", 32), 6, MOST),
+            evaluations=_whole("evaluations", tables.get("evaluations", 120), 5, 1_000_000),
+            points=_whole("points", tables.get("points", 7), 2, 100),
+        ),
+        first=first,
+        quantile=_number("quantile", tables.get("quantile", 0.5), 0.0, 1.0),
+        variation=_variation(tables.get("vary", {}), configuration),
+        other_rigs=_other_rigs(tables.get("judge", {}), configuration),
+    )
+
+
+def _experiment(name: object, experiments: Mapping[str, Experiment]) -> Experiment:
+    known = _text("experiment", name)
+    if known not in experiments:
+        raise RigtwinError(f"unknown experiment {known!r}; there are {', '.join(experiments)}")
+    return experiments[known]
+
+
+def _text(key: str, value: object) -> str:
+    if isinstance(value, str) and value.strip() and value.isprintable() and len(value) <= LONGEST:
+        return value
+    expected = f"expected text of one line, {LONGEST} characters at most"
+    raise RigtwinError(f"{key} = {str(value)[:LONGEST]!r}: {expected}")
+
+
+def _number(key: str, value: object, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise RigtwinError(f"{key} = {value!r}: expected a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def _whole(key: str, value: object, low: int, high: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise RigtwinError(f"{key} = {value!r}: expected a whole number from {low} to {high}")
+    return value
+
+
+def _table(where: str, table: object, expected: str) -> Mapping[str, Any]:
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"{where} = {table!r}: expected {expected}")
+    return table
+
+
+def _changes(where: str, table: object) -> dict[str, dict[str, object]]:
+    """`"group.name" = value` entries, or tables of them; every key and value is checked."""
+    found: dict[str, dict[str, object]] = {}
+    expected = 'a table of settings, such as "controller.kp" = 0.5'
+    for key, value in _table(where, table, expected).items():
+        group, dot, name = key.partition(".")
+        if isinstance(value, Mapping) and not dot:
+            found.setdefault(key, {}).update(value)
+        elif dot and name:
+            found.setdefault(group, {})[name] = value
+        else:
+            expected = 'expected group.name, such as "controller.kp" = 0.5'
+            raise RigtwinError(f"{where}: {key} = {value!r}: {expected}")
+    try:
+        overridden(Configuration(), found)
+    except RigtwinError as error:
+        raise RigtwinError(f"{where}: {error}") from None
+    return found
+
+
+def _only(where: str, changes: Changes, allowed: Sequence[str], expected: str) -> None:
+    """Raises RigtwinError for a group that is not among those allowed."""
+    for group in changes:
+        if group not in allowed:
+            raise RigtwinError(f"{where}: {group}: expected {expected}")
+
+
+def _baseline(table: object) -> Changes:
+    changes = _changes("baseline", table)
+    _only("baseline", changes, ["controller"], "settings of the controller alone")
+    return changes
+
+
+def _search(table: object, given: Changes) -> Changes:
+    """What the search runs differently, less what is given at once, which goes for it too."""
+    changes = _changes("search", table)
+    _only("search", changes, ["timing", "safety", "road"], "timing, safety or road")
+    found = {}
+    for group, own in changes.items():
+        fixed = given.get(group, {})
+        found[group] = {key: value for key, value in own.items() if key not in fixed}
+    return found
+
+
+def _measures(key: str, names: object) -> tuple[Measure, ...]:
+    listed = [names] if isinstance(names, str) else names
+    if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
+        raise RigtwinError(f"{key} = {names!r}: expected names of {', '.join(MEASURES)}")
+    for name in listed:
+        if name not in MEASURES:
+            raise RigtwinError(f"{key}: unknown {name!r}; there are {', '.join(MEASURES)}")
+    return tuple(MEASURES[name] for name in dict.fromkeys(listed))
+
+
+def _quantity(key: str, configuration: Configuration) -> Quantity:
+    """The meaning of a setting that is a number. Raises RigtwinError for any other."""
+    group, _, name = key.partition(".")
+    known = groups(configuration)
+    meaning = fields(type(known[group])).get(name) if group in known else None
+    if not isinstance(meaning, Quantity):
+        expected = "expected group.name of a setting that is a number"
+        raise RigtwinError(f"{key}: {expected}; rigtwin list --settings has all")
+    return meaning
+
+
+def _parameters(table: object, configuration: Configuration) -> tuple[Parameter, ...]:
+    expected = 'settings with bounds, such as "controller.kp" = [0.1, 2.0]'
+    entries = _table("parameters", table, expected)
+    if not entries:
+        raise RigtwinError(f"parameters = {entries!r}: expected {expected}")
+    return tuple(_parameter(key, entry, configuration) for key, entry in entries.items())
+
+
+def _parameter(key: str, entry: object, configuration: Configuration) -> Parameter:
+    where = f"parameters: {key}"
+    if not key.startswith("controller."):
+        raise RigtwinError(f"{where}: only the controller is tuned; expected controller.name")
+    meaning = _quantity(key, configuration)
+    own = entry if isinstance(entry, Mapping) else {"between": entry}
+    bounds, scale = own.get("between"), own.get("scale", "linear")
+    if set(own) - {"between", "scale"} or scale not in ("linear", "logarithmic"):
+        expected = 'expected between = [low, high], scale = "logarithmic"'
+        raise RigtwinError(f"{where} = {dict(own)}: {expected}")
+    if not isinstance(bounds, list) or len(bounds) != 2:
+        raise RigtwinError(f"{where} = {bounds!r}: expected its bounds, [low, high]")
+    low, high = (_number(where, bound, meaning.low, meaning.high) for bound in bounds)
+    logarithmic = scale == "logarithmic"
+    if not low < high or (logarithmic and low <= 0.0):
+        expected = "expected low below high, above 0 if logarithmic"
+        raise RigtwinError(f"{where} = [{low:g}, {high:g}]: {expected}")
+    return Parameter(key, low, high, logarithmic, meaning.unit)
+
+
+def _goals(tables: Mapping[str, Any]) -> Goals:
+    asked = tables["minimise"]
+    minimise = _measures("minimise", asked)
+    if len(minimise) not in (1, 2) or (isinstance(asked, list) and len(minimise) != len(asked)):
+        expected = "expected one objective, or two others for their front"
+        raise RigtwinError(f"minimise = {asked!r}: {expected}")
+    expected = f'measures with bounds, such as road_holding = "{BASELINE}"'
+    bounds = dict(_table("constraints", tables.get("constraints", {}), expected))
+    limits = _number("constraints: limits", bounds.pop("limits", 0.9), 0.01, 1.0)
+    constraints = tuple(_constraint(key, value) for key, value in bounds.items())
+    return Goals(minimise, constraints, limits, _measures("report", tables.get("report", [])))
+
+
+def _constraint(key: str, value: object) -> Constraint:
+    where, (measure,) = f"constraints: {key}", _measures("constraints", [key])
+    if not isinstance(value, str):
+        return Constraint(measure, _number(where, value, -1e12, 1e12))
+    share, _, word = value.rpartition(" ")
+    try:
+        factor = float(share or 1.0)
+    except ValueError:
+        factor = math.nan
+    if word != BASELINE or not factor > 0.0 or not math.isfinite(factor):
+        expected = f'expected a number, "{BASELINE}", or such as "0.98 {BASELINE}"'
+        raise RigtwinError(f"{where} = {value!r}: {expected}")
+    return Constraint(measure, math.nan, factor)
+
+
+def _variation(table: object, configuration: Configuration) -> Variation:
+    shares = dict(_table("vary", table, 'shares, such as "motor.coulomb" = 0.3'))
+    tolerances = _number("vary: tolerances", shares.pop("tolerances", 0.0), 0.0, 10.0)
+    for key, value in shares.items():
+        where = f"vary: {key}"
+        if key.partition(".")[0] not in configuration.plant._fields:
+            raise RigtwinError(f"{where}: expected component.parameter of the rig, or tolerances")
+        _quantity(key, configuration)
+        if value_of(configuration, key) == 0.0:
+            advice = "any share of that is nothing; give it a value in [set]"
+            raise RigtwinError(f"{where}: it is 0 in this rig, and {advice}")
+        shares[key] = _number(where, value, 0.0, 1.0)
+    return Variation(tolerances, shares)
+
+
+def _other_rigs(table: object, configuration: Configuration) -> dict[str, Changes]:
+    found: dict[str, Changes] = {}
+    rigs = _table("judge", table, "tables of changes of the rig, [judge.NAME]")
+    for name, changes in rigs.items():
+        where, found[name] = f"judge: {name}", _changes(f"judge: {_text('judge', name)}", changes)
+        expected = 'changes of the rig alone, such as "motor.coulomb" = 18.2'
+        _only(where, found[name], configuration.plant._fields, expected)
+    return found
