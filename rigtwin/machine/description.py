@@ -95,6 +95,7 @@ class _Reader:
         replays = reader.all(self._document.get("replays", []))
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
+        experiments = self._experiments()
         if self._mistakes:
             return None
         reader.tolerate_timing(replays)
@@ -120,12 +121,38 @@ class _Reader:
             form=form,
             sources=components.sources,
             told=components.told,
-            experiments=self._experiments(),
+            experiments=experiments,
         )
 
     def _experiments(self) -> str | Mapping[str, Any]:
         given = self._document.get("experiments", {})
-        return str(given["python"]) if isinstance(given.get("python"), str) else given
+        if isinstance(given, Mapping) and isinstance(given.get("python"), str):
+            return str(given["python"])
+        if not isinstance(given, Mapping):
+            self._mistakes.note("[experiments]", "expected tables, [experiments.NAME]")
+            return {}
+        for name, table in given.items():
+            where = f"[experiments.{name}]"
+            if not isinstance(table, Mapping):
+                self._mistakes.note(where, "expected a table")
+                continue
+            self._mistakes.unknown(where, table, ("summary", "duration", "period", "demands"))
+            for key, low, high in (("duration", 0.01, 86_400.0), ("period", 1e-4, 0.1)):
+                if key in table:
+                    self._mistakes.number(f"{where} {key}", table[key], low, high)
+            demands = table.get("demands")
+            if not isinstance(demands, Mapping) or not demands:
+                self._mistakes.note(where, "demands is missing; expected CHANNEL = \"formula of time\"")
+                continue
+            for channel, text in demands.items():
+                try:
+                    inputs = formula(str(text), {}).inputs
+                except ValueError as error:
+                    self._mistakes.note(f"{where} demands.{channel}", str(error))
+                    continue
+                if set(inputs) - {"time"}:
+                    self._mistakes.note(f"{where} demands.{channel}", f"{text!r}: expected a formula of time alone")
+        return given
 
     def _table(
         self, name: str, known: tuple[str, ...], required: tuple[str, ...] = ()

@@ -157,6 +157,11 @@ class Machine:
         """All observed signals, replay by replay."""
         return tuple(row for replay in self.replays for row in replay.rows)
 
+    @property
+    def units(self) -> dict[str, str]:
+        """Channel, as `/topic.field`, → unit, of the components' channels."""
+        return {".".join(c.channel): c.unit for c in self.components.values() if c.channel is not None}
+
     def form_of(self, row: Row) -> float:
         """Share of a signal that no model is held to."""
         return self.form if self.form is not None else FORM[row.kind]

@@ -73,6 +73,30 @@ class Recording:
     def ticks(self) -> int:
         return len(self.time)
 
+    def __getitem__(self, channel: str) -> Array:
+        """One channel by `/topic.field`, such as `/sensor.load_cell`. Raises RigtwinError if it is missing."""
+        topic, _, name = channel.partition(".")
+        return self.column(topic, name)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """All channels, as `/topic.field`."""
+        return tuple(f"{topic}.{name}" for topic, names in self.columns.items() for name in names)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All channels as a table, a column each, by time in s.
+
+        Raises
+        ------
+        RigtwinError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise RigtwinError("tables need pandas: pip install 'rigtwin[pandas]'") from None
+        return pandas.DataFrame({name: self[name] for name in self.channels}, index=pandas.Index(self.time, name="time"))
+
     def has(self, topic: str, name: str) -> bool:
         return name in self.columns.get(topic, {})
 

@@ -1,31 +1,93 @@
-"""What an experiment is: a configuration, and what it demands of the rig."""
+"""What an experiment is: a configuration, and what it demands of the machine; and those that a machine has."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import Any
 
-from rigtwin.machine.configuration import Configuration
+import numpy as np
+
+from controllers.formula import formula
+from rigtwin.components.rig import RigPlant
+from rigtwin.errors import RigtwinError
+from rigtwin.machine.configuration import Configuration, rebased
+from rigtwin.machine.machine import Machine
 from rigtwin.numerics.arrays import Array
+
+Demands = Array | Mapping[str, Array]
+"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3): ground m, structure m, force N,
+the last two for imposed tests only. Of another machine, each demanded channel's values by its name, shape (ticks,)."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A test that can be run by name; picklable, since its demands are a function of a module.
+    """A test that can be run by name; picklable, if its demands are a function of a module.
 
     Parameters
     ----------
     name, summary, source : str
         What it is called, what it does, where it comes from.
     configuration : Configuration
-        The rig, its controller and the clocks.
+        The machine, its controller and the clocks.
     demands : callable
-        Of a configuration and a seed, the columns of `controllers.Demand` at every tick, shape
-        (ticks, 3): ground m, structure m, force N. The last two count in imposed tests only.
+        Of a configuration and a seed, what it demands.
     """
 
     name: str
     summary: str
     source: str
     configuration: Configuration
-    demands: Callable[[Configuration, int], Array]
+    demands: Callable[[Configuration, int], Any]
+
+
+@dataclass(frozen=True)
+class FormulaDemands:
+    """Demands as a description writes them: channel → a formula of `time`."""
+
+    formulas: Mapping[str, str]
+
+    def __call__(self, configuration: Configuration, seed: int) -> dict[str, Array]:
+        time = np.arange(configuration.ticks) * configuration.timing.period
+        found = {}
+        for name, text in self.formulas.items():
+            compiled = formula(text, {})
+            inputs = [time] * max(len(compiled.inputs), 1)
+            found[name] = compiled.replayed({}, inputs, configuration.timing.period)
+        return found
+
+
+def experiments_of(machine: Machine) -> dict[str, Experiment]:
+    """The experiments of a machine by name: those of the Python module that its description names, or its own tables."""
+    if isinstance(machine.experiments, str):
+        known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
+        if machine.plant == RigPlant():
+            return dict(known)
+        base = machine.configuration
+        return {name: replace(e, configuration=rebased(e.configuration, base)) for name, e in known.items()}
+    return {name: _described(machine, name, table) for name, table in machine.experiments.items()}
+
+
+def _described(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
+    base = machine.configuration
+    clocks = {key: float(table[key]) for key in ("duration", "period") if key in table}
+    timing = base.timing._replace(**clocks)
+    timing = timing._replace(timestep=timing.period / max(1, round(timing.period / base.timing.timestep)))
+    demands = {key: str(text) for key, text in table["demands"].items()}
+    return Experiment(
+        name=name,
+        summary=str(table.get("summary", "")),
+        source=str(machine.path),
+        configuration=base._replace(timing=timing),
+        demands=FormulaDemands(demands),
+    )
+
+
+def find_experiment(machine: Machine, name: str) -> Experiment:
+    """The experiment of that name. Raises RigtwinError listing what there is."""
+    known = experiments_of(machine)
+    if name not in known:
+        there = ", ".join(known) or "none in its description"
+        raise RigtwinError(f"unknown experiment {name!r}; {machine.name} has {there}")
+    return known[name]

@@ -19,7 +19,7 @@ from rigtwin.simulation.twin import Twin
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunResult:
     """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it early."""
 
     path: Path
@@ -65,7 +65,7 @@ def record(
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
     effects: Sequence[str] = (),
-) -> Outcome:
+) -> RunResult:
     """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
 
     effects: as `--effect` takes them; the rig has them, the operator's settings in the recording do not know.
@@ -85,4 +85,4 @@ def record(
             progress(len(block.commands))
         reason = explained(trip, configuration.safety, column)
         writer.finish(reason)
-    return Outcome(path, ticks, reason, trip != Trip.NONE)
+    return RunResult(path, ticks, reason, trip != Trip.NONE)

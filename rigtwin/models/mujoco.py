@@ -1,0 +1,226 @@
+"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the twin that is run.
+
+MuJoCo has the masses, the geometry and gravity; the components' laws act on the joint tick by tick.
+It is slow, and takes no shortcut that needs the joint to be alone. Contacts, joint limits and the
+MJCF's own actuators are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from controllers.formula import run as run_formula
+from rigtwin.components import UNLIMITED, ForceActuator, Guide, PositionSensor, VelocitySensor
+from rigtwin.components.conditioning import actuator, conditioned, holding
+from rigtwin.components.guide import damping, dry_limits, friction, resting, slid
+from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import fresh, transduced, transducer
+from rigtwin.models.guided import Inertia
+from rigtwin.models.joint import ELASTIC, JointModel
+from rigtwin.numerics.arrays import Array
+
+FIXED = 1e12
+"""kg or kg m²; other joints are so heavy that they stay where they are."""
+STIFF = 0.05
+"""Times inertia / step², the stiffest spring that an explicit step bears."""
+OFF = (
+    mujoco.mjtDisableBit.mjDSBL_CONTACT
+    | mujoco.mjtDisableBit.mjDSBL_LIMIT
+    | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+)
+Tick = Callable[[Mapping[str, float], Mapping[str, float]], float]
+"""A controller's command for what its sensors read and for what is demanded, by name."""
+
+
+class MujocoModel(JointModel):
+    """One joint of a machine in MuJoCo."""
+
+    read: dict[str, Array]
+    """Sensor → what the controller read, after `moved`."""
+    noise: Mapping[str, Array] = {}
+    """Sensor → what is added to its reading, shape (ticks,)."""
+    controller: Tick | None = None
+    """What commands the actuator instead of the description's controller."""
+
+    def _mechanics(self, plant: Plant, timestep: float) -> tuple[Any, Any, int, int]:
+        """Model and data with the plant's mass, and where the joint's position and velocity are."""
+        model = mujoco.MjModel.from_xml_path(str(self._machine.model))
+        joint, mass = self._replay.joint, self._replay.mass
+        number = model.joint(joint.name).id
+        at, place = int(model.jnt_dofadr[number]), int(model.jnt_qposadr[number])
+        if mass is not None and joint.inertia > 0.0:
+            share = getattr(plant, mass).mass / joint.inertia
+            model.body_mass[:] *= share
+            model.body_inertia[:] *= share
+            model.dof_armature[at] *= share
+        model.jnt_stiffness[:] = model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
+        others = np.arange(model.nv) != at
+        model.dof_armature[others] = FIXED
+        model.opt.timestep = timestep
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        model.opt.disableflags |= OFF
+        # Two timesteps: the fastest friction constraint MuJoCo takes as it is, so the least creep.
+        model.dof_solref[at] = (2.0 * timestep, 1.0)
+        model.dof_solimp[at] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model, mujoco.MjData(model), place, at
+
+    def carry(self, plant: Plant, signal: Array) -> Array:
+        """The joint under a prescribed motion, shape (4, ticks) as `moved`. signal: what an ideal sensor that moves it would
+        read, shape (ticks,)."""
+        position = np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        self.read = {}
+        return self._carried(plant, position, 0.0)
+
+    def moved(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
+        self.read = {}
+        return super().moved(plant, force, shift)
+
+    def _carried(self, plant: Plant, position: Array, error: float) -> Array:
+        """The force that moves the joint as prescribed, by inverse dynamics."""
+        model, data, place, at = self._mechanics(plant, self._period)
+        guide, inertia = self._parts(plant)
+        dry = friction(guide)
+        velocity = np.gradient(position, self._period)
+        acceleration = np.gradient(velocity, self._period)
+        size = max(guide.coulomb + abs(guide.stribeck) + 0.5 * abs(guide.asymmetry), 1e-300)
+        stroke = max(float(np.ptp(position)), 1e-12)
+        softest = max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
+        out = np.zeros((4, len(position)))
+        out[0], out[1] = position, velocity
+        slider, viscous = float(position[0]), 0.0
+        share = self._period / (guide.relaxation + self._period)
+        for tick in range(len(position)):
+            x, v = float(position[tick]), float(velocity[tick])
+            data.qpos[place], data.qvel[at] = x, v
+            data.qacc[:] = 0.0
+            if inertia.mass > 0.0:
+                data.qacc[at] = acceleration[tick]
+            mujoco.mj_inverse(model, data)
+            load = float(data.qfrc_inverse[at]) + resting(guide, x, inertia.rest)
+            forward, backward = dry_limits(dry, v, load)
+            rubbed, by = slid(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
+            slider += by
+            viscous += share * (damping(guide, v) * v - viscous)
+            out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
+        return out
+
+    def _pushed(self, plant: Plant, mover: ForceActuator, besides: Array) -> Array:
+        """The joint under its force actuator."""
+        h = self._period / self._steps
+        model, data, place, at = self._mechanics(plant, h)
+        guide, inertia = self._parts(plant)
+        data.qpos[place], data.qvel[at] = self._start
+        passive = _Passive(guide, h, inertia, float(data.qpos[place]))
+        drive = actuator(mover, plant.computer, h)
+        held = holding(drive, float(self._command[0]))
+        limit = min(mover.force_limit, UNLIMITED)
+        out, force = np.zeros((4, len(self._command))), 0.0
+        loop = self._reader(plant)
+        for tick in range(len(self._command)):
+            out[0, tick], out[1, tick], out[2, tick] = data.qpos[place], data.qvel[at], force
+            command = loop(tick, float(data.qpos[place]), float(data.qvel[at]))
+            out[3, tick] = command
+            for _ in range(self._steps):
+                pushed = mover.constant * conditioned(drive, held, command)
+                force = min(max(pushed, -limit), limit)
+                load = force + float(besides[tick])
+                passive.act(model, data, at, float(data.qpos[place]), float(data.qvel[at]), force)
+                data.qfrc_applied[at] += load
+                mujoco.mj_step(model, data)
+        return out
+
+    def _reader(self, plant: Plant) -> Callable[[int, float, float], float]:
+        """The command of a tick for the joint's position and velocity, as the controller sees them."""
+        names = self._sensors or self.sensors_of_joint()
+        parts = [getattr(plant, name) for name in names]
+        models = [transducer(part, self._period) for part in parts]
+        states = [fresh(each) for each in models]
+        self.read = {name: np.zeros(self._recording.ticks) for name in names}
+
+        def sense(tick: int, position: float, velocity: float) -> dict[str, float]:
+            found = {}
+            for name, part, each, state in zip(names, parts, models, states, strict=True):
+                true = velocity if isinstance(part, VelocitySensor) else position
+                value = transduced(each, state, true)
+                if name in self.noise:
+                    value += float(self.noise[name][tick])
+                if part.resolution > 0.0:
+                    value = round(value / part.resolution) * part.resolution
+                found[name] = self.read[name][tick] = value
+            return found
+
+        control = self._control
+        if self.controller is not None:
+            own, demanded = self.controller, self._recording.columns.get("/command", {})
+            return lambda tick, x, v: float(
+                own(sense(tick, x, v), {name: float(c[tick]) for name, c in demanded.items()})
+            )
+        if control is None:
+
+            def recorded(tick: int, position: float, velocity: float) -> float:
+                sense(tick, position, velocity)
+                return float(self._command[tick])
+
+            return recorded
+        program = control.formula.with_settings(self._settings)
+        registers, memory = program.registers.copy(), control.formula.memory()
+        by_channel = {self._machine.components[name].channel: name for name in names}
+        columns = [self._recording.column(*channel) for channel in control.channels]
+
+        def compute(tick: int, position: float, velocity: float) -> float:
+            sensed = sense(tick, position, velocity)
+            for number, channel in enumerate(control.channels):
+                name = by_channel.get(channel)
+                registers[number] = columns[number][tick] if name is None else sensed[name]
+            return float(run_formula(program, registers, memory, self._period))
+
+        return compute
+
+    def sensors_of_joint(self) -> list[str]:
+        """The sensors of the joint's position and velocity."""
+        joint = self._replay.joint.name
+        return [
+            name
+            for name, component in self._machine.components.items()
+            if component.joint == joint
+            and isinstance(getattr(self._machine.plant, name), PositionSensor | VelocitySensor)
+        ]
+
+
+class _Passive:
+    """What a guide does to its joint over a timestep."""
+
+    def __init__(self, guide: Guide, timestep: float, inertia: Inertia, position: float) -> None:
+        self._guide, self._dry, self._rest = guide, friction(guide), inertia.rest
+        # As stiff as an explicit step bears, where the description gives a play no spring.
+        self._spring = STIFF * inertia.mass / timestep**2
+        if guide.compliance > 0.0:
+            self._spring = min(self._spring, 1.0 / guide.compliance)
+        self._slider, self._viscous = position, 0.0
+        self._share = timestep / (guide.relaxation + timestep)
+
+    def act(self, model: Any, data: Any, at: int, x: float, v: float, load: float) -> None:
+        """Writes friction into the model and all other forces into the joint's applied force."""
+        guide = self._guide
+        forward, backward = dry_limits(self._dry, v, load)
+        force = -resting(guide, x, self._rest) - guide.drag * v * abs(v)
+        if guide.relaxation > 0.0:
+            self._viscous += self._share * (damping(guide, v) * v - self._viscous)
+            force -= self._viscous
+        else:
+            model.dof_damping[at] = damping(guide, v)
+        if guide.compliance > 0.0 or guide.backlash > 0.0:
+            half = 0.5 * guide.backlash
+            rubbed, by = slid(x - self._slider, half, self._spring, forward, backward)
+            self._slider += by
+            force -= rubbed
+        else:
+            # MuJoCo's dry friction is the same both ways; what one way has more is a force besides.
+            model.dof_frictionloss[at] = 0.5 * (forward + backward)
+            force += 0.5 * (backward - forward)
+        data.qfrc_applied[at] = force
