@@ -20,9 +20,9 @@ from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
-from rigtwin.machine.configuration import Configuration, Safety, Timing
-from rigtwin.machine.configuration import applied
-from rigtwin.machine.library import find
+from rigtwin.description.configuration import Configuration, Safety, Timing
+from rigtwin.description.configuration import applied
+from rigtwin.description.catalogue import find
 from rigtwin.numerics.compiling import kernel, step
 from rigtwin.simulation.loop import BLOCK, run_compiled
 from rigtwin.simulation.plant import Simulation

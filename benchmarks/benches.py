@@ -12,8 +12,8 @@ from tqdm import tqdm
 
 from referee.bench_cases import Case, drawn, recorded
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.machine.library import find
-from rigtwin.machine.setting import nominal
+from rigtwin.description.catalogue import find
+from rigtwin.description.setting import nominal
 from rigtwin.recording import Recording
 
 

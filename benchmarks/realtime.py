@@ -17,7 +17,7 @@ from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.daq.virtual import VirtualCard
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
-from rigtwin.machine.configuration import from_assignments
+from rigtwin.description.configuration import from_assignments
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from experiments import EXPERIMENTS
 from rigtwin.console import table
-from rigtwin.machine.configuration import overridden
+from rigtwin.description.configuration import overridden
 from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
 from rigtwin.studies.tuning.run import Run, run
 

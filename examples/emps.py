@@ -18,8 +18,8 @@ from scipy.signal import butter, sosfiltfilt
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.leftover import remaining
-from rigtwin.machine.library import find
-from rigtwin.machine.setting import nominal
+from rigtwin.description.catalogue import find
+from rigtwin.description.setting import nominal
 from rigtwin.recording import Recording, load
 
 BAND = 40.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.excitation import road_profile
 

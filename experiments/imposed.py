@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers import Mode, Settings
 from experiments.experiment import random_of, time_of
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.excitation import multisine
 from rigtwin.simulation.experiment import Experiment

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from controllers import Settings
 from experiments.experiment import flat_ground
 from rigtwin.components import Carriage, RigPlant, Tyre
-from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration, Timing
 from rigtwin.simulation.experiment import Experiment
 
 

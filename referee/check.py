@@ -102,8 +102,8 @@ def _key(recordings: Path, number: int) -> str:
 def answer(files: Files) -> dict[str, Any]:
     """One case's answer, of its recording and the one held out. Runs where there are neither the key nor the other cases."""
     from rigtwin.diagnosis import diagnose as module
-    from rigtwin.machine.configuration import Configuration
-    from rigtwin.machine.library import find
+    from rigtwin.description.configuration import Configuration
+    from rigtwin.description.catalogue import find
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
 

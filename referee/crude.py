@@ -10,7 +10,7 @@ from controllers import Measurements
 from rigtwin.components import RigPlant, Scales, Swing, candidates
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.machine.library import find
+from rigtwin.description.catalogue import find
 from rigtwin.recording import load
 from rigtwin.recording.channels import SUSPENSION_RIG
 from rigtwin.signals.noise import white_noise

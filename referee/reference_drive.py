@@ -19,7 +19,7 @@ from controllers import (
 )
 from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
 from referee.reference_rig import disturbed
-from rigtwin.machine.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.runner import Ran

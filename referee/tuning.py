@@ -22,7 +22,7 @@ from referee.reference_plant import Truth
 from referee.reference_rig import Law, run
 from referee.test_signals import asked
 from rigtwin.console import table
-from rigtwin.machine.posterior import Posterior, load_posterior
+from rigtwin.description.posterior import Posterior, load_posterior
 from rigtwin.studies.sweep import run_jobs
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.evaluation import Comparison, compare
@@ -112,8 +112,8 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     """
     from rigtwin.diagnosis.calibrated import toml
     from rigtwin.diagnosis.diagnose import diagnose
-    from rigtwin.machine.configuration import Configuration
-    from rigtwin.machine.library import find
+    from rigtwin.description.configuration import Configuration
+    from rigtwin.description.catalogue import find
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
 

@@ -12,16 +12,16 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.components import Effect
+from rigtwin.description import catalogue
+from rigtwin.description.configuration import Configuration, applied, overridden
+from rigtwin.description.configuration import without as take_out
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.diagnosis.compare import Comparison
 from rigtwin.diagnosis.compare import compare as compare_with_twin
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
-from rigtwin.machine import library
-from rigtwin.machine.configuration import Configuration, applied, overridden
-from rigtwin.machine.configuration import without as take_out
-from rigtwin.machine.machine import Machine, Structure
 from rigtwin.models.machine_twin import run_machine
 from rigtwin.recording import export, reader
 from rigtwin.render.plot import draw
@@ -134,12 +134,12 @@ def machine(name: str | Path) -> Machine:
     RigtwinError
         With the first mistake in the description, or with what there is.
     """
-    return library.find(str(name))
+    return catalogue.find(str(name))
 
 
 def machines() -> dict[str, Path]:
     """The machines that come along: name → description."""
-    return library.shipped()
+    return catalogue.shipped()
 
 
 def machine_of(recording: reader.Recording) -> Machine:
@@ -147,13 +147,13 @@ def machine_of(recording: reader.Recording) -> Machine:
     described = getattr(recording, "described", None)
     if described is not None:
         return described
-    if recording.machine not in library.shipped():
-        known = ", ".join(library.shipped())
+    if recording.machine not in catalogue.shipped():
+        known = ", ".join(catalogue.shipped())
         raise RigtwinError(
             f"{recording.path}: it is of machine {recording.machine!r}; give its description, "
             f"machine=\"F.toml\" or --machine F.toml (shipped ones: {known})"
         )
-    return library.find(recording.machine)
+    return catalogue.find(recording.machine)
 
 
 def experiments(of: Machine) -> dict[str, Experiment]:
@@ -367,7 +367,7 @@ def _several(given: reader.Recording | Sequence[reader.Recording]) -> Iterator[r
 def _described(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
     if given is None:
         return machine_of(recording)
-    return given if isinstance(given, Machine) else library.find(str(given))
+    return given if isinstance(given, Machine) else catalogue.find(str(given))
 
 
 def twin_of(

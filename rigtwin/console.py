@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
-    from rigtwin.machine.configuration import Configuration
+    from rigtwin.description.configuration import Configuration
 
 
 def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
-    from rigtwin.machine.configuration import from_assignments, from_toml
+    from rigtwin.description.configuration import from_assignments, from_toml
 
     if parsed.config is not None:
         configuration = from_toml(configuration, parsed.config)

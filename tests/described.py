@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rigtwin.machine.description import load
-from rigtwin.machine.machine import Machine
+from rigtwin.description.document import load
+from rigtwin.description.machine import Machine
 from rigtwin.recording import Recording
 
 BODIES = {

@@ -13,8 +13,8 @@ from referee.benches import ActuatorTruth, DamperTruth, actuator_position, dampe
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.localisation import travelled
 from rigtwin.importing.convert import convert
-from rigtwin.machine.library import SHIPPED, find
-from rigtwin.machine.setting import nominal
+from rigtwin.description.catalogue import SHIPPED, find
+from rigtwin.description.setting import nominal
 from rigtwin.recording import Recording, load
 
 EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"

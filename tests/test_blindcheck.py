@@ -22,7 +22,7 @@ from rigtwin.components import RigPlant
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.components import candidates
-from rigtwin.machine.library import find as machine_of
+from rigtwin.description.catalogue import find as machine_of
 from rigtwin.recording import load
 
 KNOWN = {effect.name for effect in candidates(RigPlant())} | {"setting@controller"}

@@ -12,7 +12,7 @@ from referee.reference_rig import run
 from referee.test_signals import asked
 from referee.tuning import Case, check, draw_rig, text
 from rigtwin.cli import main
-from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.simulation.runner import simulated
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store

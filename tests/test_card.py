@@ -21,7 +21,7 @@ from rigtwin.hardware.daq.table import ChannelTable, fit, load_table, parsed, tr
 from rigtwin.hardware.daq.terminals import Terminals, WiredTwin
 from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
-from rigtwin.machine.configuration import Configuration, Safety, read_toml
+from rigtwin.description.configuration import Configuration, Safety, read_toml
 
 TABLE = load_table(CARD)
 PERIOD = 1e-3

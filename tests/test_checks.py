@@ -11,7 +11,7 @@ from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant
 from rigtwin.diagnosis.checks import check, longest_run
 from rigtwin.diagnosis.compare import configuration_of
-from rigtwin.machine.configuration import Timing
+from rigtwin.description.configuration import Timing
 from rigtwin.components import candidates
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record

@@ -13,9 +13,9 @@ from rigtwin.components import RigPlant
 from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
 from rigtwin.diagnosis.replays import REPLAYS
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, Timing, from_assignments
+from rigtwin.description.configuration import Configuration, Timing, from_assignments
 from rigtwin.components import candidates, find
-from rigtwin.machine.configuration import applied
+from rigtwin.description.configuration import applied
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.conftest import rig_recording

@@ -12,7 +12,7 @@ from controllers import Mode, Settings
 from rigtwin.components.cylinder import continuous
 from rigtwin.components import Cylinder
 from rigtwin.diagnosis.component import replay_cylinder
-from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration, Timing
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin

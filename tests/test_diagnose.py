@@ -21,11 +21,11 @@ from rigtwin.diagnosis.next_test import proposed
 from rigtwin.diagnosis.sampling import outstanding
 from rigtwin.diagnosis.unknown_input import located
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, from_toml, overridden
+from rigtwin.description.configuration import Configuration, from_toml, overridden
 from rigtwin.components import find
-from rigtwin.machine.configuration import without
-from rigtwin.machine.library import find as machine_of
-from rigtwin.machine.posterior import load_posterior
+from rigtwin.description.configuration import without
+from rigtwin.description.catalogue import find as machine_of
+from rigtwin.description.posterior import load_posterior
 from rigtwin.models.predictor import Motion
 from rigtwin.recording import Recording
 from tests.conftest import rig_recording

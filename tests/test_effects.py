@@ -14,9 +14,9 @@ from rigtwin.components.conditioning import actuator, conditioned, holding
 from rigtwin.components.guide import breakaway, friction, gap_at
 from rigtwin.components import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, RigPlant, Rail, Tyre
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration, Timing
 from rigtwin.components import KINDS, candidates, find
-from rigtwin.machine.configuration import applied
+from rigtwin.description.configuration import applied
 from rigtwin.recording import load
 from rigtwin.simulation.converters import sampled, sensing
 from rigtwin.simulation.loop import run, run_compiled

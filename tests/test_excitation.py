@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Road
+from rigtwin.description.configuration import Road
 from rigtwin.signals.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
 
 TIME = np.arange(45_000) * 1e-3

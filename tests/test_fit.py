@@ -17,8 +17,8 @@ from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
 from rigtwin.diagnosis.next_test import tried
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.components import KINDS, find
-from rigtwin.machine.configuration import applied
-from rigtwin.machine.library import find as machine_of
+from rigtwin.description.configuration import applied
+from rigtwin.description.catalogue import find as machine_of
 from rigtwin.recording import Recording
 
 RIG = machine_of("suspension-rig")

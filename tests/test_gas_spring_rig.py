@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from experiments import find
 from experiments.thesis.trial import trial
 from rigtwin.diagnosis.compare import compare, configuration_of
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.models.quarter_car import Reduced
 from rigtwin.recording import load
 from rigtwin.simulation.ideal import ideal

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide, PositionActuator
-from rigtwin.machine.library import find
-from rigtwin.machine.machine import Machine
+from rigtwin.description.catalogue import find
+from rigtwin.description.machine import Machine
 from rigtwin.models.following import followed
 from rigtwin.models.guided import Inertia, carried, limits, slid
 from rigtwin.models.replaying import Setup, predictor

@@ -10,7 +10,7 @@ import pytest
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, Timing, from_assignments
+from rigtwin.description.configuration import Configuration, Timing, from_assignments
 from rigtwin.recording import load
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import Block, run, run_compiled

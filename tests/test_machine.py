@@ -13,10 +13,10 @@ from rigtwin.components import RigPlant
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import possible
 from rigtwin.diagnosis.trials import searched, trials
-from rigtwin.machine.description import examined, load
+from rigtwin.description.document import examined, load
 from rigtwin.components import find as effect_of
-from rigtwin.machine.library import find, shipped
-from rigtwin.machine.setting import from_assignments, nominal, overridden, without
+from rigtwin.description.catalogue import find, shipped
+from rigtwin.description.setting import from_assignments, nominal, overridden, without
 from tests.described import MJCF, TOML, described, recording_of
 
 

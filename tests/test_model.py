@@ -14,7 +14,7 @@ from experiments import EXPERIMENTS
 from rigtwin.components.cylinder import continuous
 from rigtwin.components import Carriage, Motor, RigPlant, Rail, Tyre
 from rigtwin.diagnosis.component import replay_carriage
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
 from tests.reference import coulomb_carriage
 

@@ -11,9 +11,9 @@ from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.diagnosis.trials import TRIALS, trials
-from rigtwin.machine.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.components import Effect, candidates
-from rigtwin.machine.library import find as machine_of
+from rigtwin.description.catalogue import find as machine_of
 from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled

@@ -10,7 +10,7 @@ import pytest
 
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.report import bars, html, plots
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from tests.browser import BROWSER, looked_at
 from tests.test_diagnose import RIG, drifting, spoilt
 from tests.test_fit import recorded

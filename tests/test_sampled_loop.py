@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from experiments import EXPERIMENTS
 from experiments import find as experiment
-from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.simulation.runner import simulated, unlimited
 from rigtwin.studies.stability.sampled_loop import closed_loop, decay, mechanics
 

@@ -25,7 +25,7 @@ from rigtwin.hardware.realtime import Pacer, in_real_time, machine_lacks, monoto
 from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
 from rigtwin.hardware.session.plan import planned
 from rigtwin.hardware.session.record import Test, record_in_real_time
-from rigtwin.machine.configuration import Configuration, from_assignments
+from rigtwin.description.configuration import Configuration, from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 

@@ -25,7 +25,7 @@ from rigtwin.hardware.faults.processes import tried as tried_apart
 from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
-from rigtwin.machine.configuration import from_assignments
+from rigtwin.description.configuration import from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 from rigtwin.simulation.safety import Trip

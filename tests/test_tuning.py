@@ -19,8 +19,8 @@ from experiments import find as experiment
 from experiments.tuning import STUDIES, find_study
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, from_toml, overridden
-from rigtwin.machine.posterior import Otherwise, Posterior, load_posterior, written
+from rigtwin.description.configuration import Configuration, from_toml, overridden
+from rigtwin.description.posterior import Otherwise, Posterior, load_posterior, written
 from rigtwin.recording import load
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here

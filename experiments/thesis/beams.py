@@ -17,7 +17,7 @@ from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.render.plot import COLOURS, SENSED
 from rigtwin.simulation.ideal import ideal
 from rigtwin.simulation.runner import simulated

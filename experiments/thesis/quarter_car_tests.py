@@ -15,7 +15,7 @@ from experiments.quarter_car import ROAD_CHAPTER_7
 from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial, vehicle
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, COLOURS, SENSED
 from rigtwin.simulation.ideal import ideal

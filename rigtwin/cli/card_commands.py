@@ -15,6 +15,7 @@ import numpy as np
 
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
+from rigtwin.description.configuration import Configuration, applied
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,
@@ -35,7 +36,6 @@ from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import Test, record_at_leisure, record_in_real_time
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED
-from rigtwin.machine.configuration import Configuration, applied
 from rigtwin.recording import load
 
 PORTS = 65535

@@ -16,7 +16,7 @@ from rigtwin.errors import RigtwinError
 def list_experiments(parsed: Namespace) -> int:
     from controllers.quantity import Quantity
     from experiments import EXPERIMENTS, find
-    from rigtwin.machine.configuration import parameters
+    from rigtwin.description.configuration import parameters
 
     if parsed.settings is None:
         rows = [("experiment", "what", "source", "seconds")]
@@ -178,7 +178,7 @@ def info(parsed: Namespace) -> int:
     if recording.lateness:
         print(late(recording.lateness))
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
-    for channel in channels_of(recording.machine, recording.columns):
+    for channel in channels_of(recording.columns):
         values = recording.column(channel.topic, channel.name)
         with np.errstate(over="ignore"):
             figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
@@ -255,8 +255,8 @@ def stability(parsed: Namespace) -> int:
 
 def calibrate(parsed: Namespace) -> int:
     from controllers import Compensator, Settings
+    from rigtwin.description.configuration import Configuration, overridden
     from rigtwin.diagnosis.checks import check
-    from rigtwin.machine.configuration import Configuration, overridden
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
     from rigtwin.studies.friction_spikes import BOUNDS, calibrated

@@ -10,8 +10,8 @@ from rigtwin.console import apart, configured, table, writable, write_json
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
+    from rigtwin.description.machine import Machine
     from rigtwin.diagnosis.residual import Residual
-    from rigtwin.machine.machine import Machine
     from rigtwin.recording import Recording
 
 
@@ -19,10 +19,10 @@ def compare(parsed: Namespace) -> int:
     from tqdm import tqdm
 
     from rigtwin.components import RigPlant
+    from rigtwin.description.configuration import Configuration, Timing, applied
     from rigtwin.diagnosis.compare import compare as replay_all
     from rigtwin.diagnosis.compare import compare_recordings, configuration_of, differences
     from rigtwin.diagnosis.replays import REPLAYS
-    from rigtwin.machine.configuration import Configuration, Timing, applied
     from rigtwin.recording import load
     from rigtwin.recording.channels import SUSPENSION_RIG
 
@@ -190,7 +190,7 @@ def diagnose(parsed: Namespace) -> int:
 
 def machine_of(recording: Recording, described: str | None) -> Machine:
     """The machine that a recording is of, or that of a description."""
-    from rigtwin.machine.library import find, shipped
+    from rigtwin.description.catalogue import find, shipped
 
     if described is not None:
         return find(described)
@@ -207,8 +207,8 @@ def base_of(machine: Machine, parsed: Namespace) -> Any:
     """The twin that recordings are compared with, as the command line has it: a Configuration, or a Setup of a described
     machine."""
     from rigtwin.components import RigPlant
-    from rigtwin.machine import setting
-    from rigtwin.machine.configuration import Configuration, Timing, without
+    from rigtwin.description import setting
+    from rigtwin.description.configuration import Configuration, Timing, without
     from rigtwin.recording.channels import SUSPENSION_RIG
 
     if machine.name != SUSPENSION_RIG:

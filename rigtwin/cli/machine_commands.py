@@ -9,7 +9,7 @@ from rigtwin.console import table
 
 
 def machines(_parsed: Namespace) -> int:
-    from rigtwin.machine.library import find, shipped
+    from rigtwin.description.catalogue import find, shipped
 
     rows = [("machine", "title", "components", "observed")]
     for name in shipped():
@@ -29,8 +29,8 @@ def machines(_parsed: Namespace) -> int:
 
 
 def machine(parsed: Namespace) -> int:
-    from rigtwin.machine.description import examined
-    from rigtwin.machine.library import shipped
+    from rigtwin.description.catalogue import shipped
+    from rigtwin.description.document import examined
 
     path: Path = shipped().get(str(parsed.description)) or parsed.description
     found, mistakes = examined(path)

@@ -10,8 +10,8 @@ from tqdm import tqdm
 
 from experiments.tuning import STUDIES, find_study
 from rigtwin.console import table
+from rigtwin.description.posterior import Posterior, load_posterior
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.posterior import Posterior, load_posterior
 from rigtwin.studies.sweep import Store, open_workers
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.folder import PAGE, RUNS, SETTINGS, write

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.components.effect import GROUPS
+from rigtwin.description.configuration import Configuration, Nothing, flattened
+from rigtwin.description.posterior import Otherwise, Posterior, written
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, Nothing, flattened
-from rigtwin.machine.posterior import Otherwise, Posterior, written
 
 if TYPE_CHECKING:
     from rigtwin.diagnosis.result import Diagnosis

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, single
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine, Structure
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise, without_mains
 
@@ -64,7 +64,7 @@ def compare(
         return Comparison(signal_residuals(evidence), {}, notes, gap)
     replays = ComponentReplays(recording, configuration)
     left_out: dict[str, str] = {}
-    if not recording.controller:
+    if not recording.controller or OWN in recording.controller:
         left_out = dict.fromkeys(
             ("controller", "closed_loop"),
             "the recording does not say what the controller was told to do",

@@ -20,7 +20,7 @@ from rigtwin.components.cylinder import (
     sampled,
     settled,
 )
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate, kernel
 from rigtwin.simulation.mechanics import Handles, build, handles

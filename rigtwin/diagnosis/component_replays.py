@@ -11,6 +11,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.sensors import seen, unseen
+from rigtwin.description.configuration import Configuration
 from rigtwin.diagnosis.component import (
     Output,
     replay_carriage,
@@ -19,7 +20,6 @@ from rigtwin.diagnosis.component import (
     replay_motor,
 )
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
-from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import Motion, band, motion, rms, white_noise, without_mains

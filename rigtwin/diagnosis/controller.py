@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from rigtwin.components.quantity import Quantity, fields
+from rigtwin.description.control import Control
 from rigtwin.diagnosis.residual import rounding
-from rigtwin.machine.control import Control
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms

@@ -8,9 +8,9 @@ from itertools import permutations
 
 import numpy as np
 
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine, Row
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine, Row
 from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording

@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from rigtwin.components import Effect, find, title, with_parameters
 from rigtwin.components.plant import Plant
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import OWN, Machine
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Judged, gap_level, judged, with_effects
@@ -39,8 +41,6 @@ from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import Sampled, outstanding
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.unknown_input import Disturbed, located
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
@@ -263,8 +263,9 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     found: dict[tuple[str, str], Deviation] = {}
     for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
         control = evidence.machine.control
-        if control is None or not (recording.controller or control.exact is not None):
-            # Nobody said what the controller was told to do.
+        told = recording.controller or (control is not None and control.exact is not None)
+        if control is None or not told or OWN in recording.controller:
+            # Nobody said what the controller was told to do, or it was another.
             continue
         deviation = ControllerReplay(control, recording, configuration.controller).deviation()
         if deviation is not None:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from rigtwin.components.plant import Plant
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine
-from rigtwin.machine.tolerance import Tolerance
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine
+from rigtwin.description.tolerance import Tolerance
 from rigtwin.models.choose import model_of
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array

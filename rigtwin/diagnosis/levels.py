@@ -12,11 +12,11 @@ import numpy as np
 from controllers import Measurements
 from rigtwin.components import RigPlant, with_parameters
 from rigtwin.components.plant import Plant
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Structure
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Structure
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, spectrum

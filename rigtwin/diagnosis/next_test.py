@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
+from rigtwin.description.configuration import Configuration, flattened
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit, Space
-from rigtwin.machine.configuration import Configuration, flattened
-from rigtwin.machine.machine import Machine
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.runner import simulated, unlimited

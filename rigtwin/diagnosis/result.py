@@ -8,12 +8,12 @@ from typing import Any
 
 from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis import calibrated, report, text
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine
 
 
 @dataclass(frozen=True)

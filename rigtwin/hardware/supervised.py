@@ -24,10 +24,10 @@ from controllers import (
     update,
 )
 from controllers.force import MOTOR_CONSTANT
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import Lateness, monotonic
 from rigtwin.hardware.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
-from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.rig import DrivenRig

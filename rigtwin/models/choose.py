@@ -9,8 +9,8 @@ import numpy as np
 
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.machine import Machine, Structure
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.models.joint import JointModel
 from rigtwin.models.model import Form, Model
 from rigtwin.models.quarter_car import QuarterCarModel

@@ -18,9 +18,9 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import fresh, seen, transducer
-from rigtwin.machine.configuration import Configuration
-from rigtwin.machine.control import FormulaControl
-from rigtwin.machine.machine import Machine, ReplayOf, Row
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import FormulaControl
+from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import followed
 from rigtwin.models.guided import RIGID, Inertia, Loop, carried, pushed

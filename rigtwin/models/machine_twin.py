@@ -11,10 +11,10 @@ from rigtwin import __version__
 from rigtwin.components import ForceSensor, PositionSensor, VelocitySensor
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import seen
+from rigtwin.description.configuration import Configuration, applied, flattened
+from rigtwin.description.control import Channel
+from rigtwin.description.machine import Machine, ReplayOf
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, applied, flattened
-from rigtwin.machine.control import Channel
-from rigtwin.machine.machine import Machine, ReplayOf
 from rigtwin.models.joint import RUNAWAY
 from rigtwin.models.mujoco import MujocoModel, Tick
 from rigtwin.numerics.arrays import Array

@@ -31,7 +31,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
 from rigtwin.components.sensors import seen
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array

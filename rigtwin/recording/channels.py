@@ -49,13 +49,12 @@ SESSION = (
 """Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis reads it."""
 
 
-def channels_of(machine: str, columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
-    """The channels that a recording of a machine holds: those of the table, with unit and meaning, if it is of the machine that
-    the table is about; else whatever there is."""
+def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
+    """The channels that a recording holds, those of the table first, with unit and meaning; then whatever else there is."""
     there = [(topic, name) for topic, names in columns.items() for name in names]
-    if machine == SUSPENSION_RIG:
-        return [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
-    return [Channel(topic, name, "", "") for topic, name in there]
+    known = [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
+    named = {(channel.topic, channel.name) for channel in known}
+    return known + [Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named]
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:

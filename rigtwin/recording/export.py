@@ -24,7 +24,7 @@ def export(recording: Recording, path: Path) -> None:
 
 
 def _csv(recording: Recording, path: Path) -> None:
-    there = channels_of(recording.machine, recording.columns)
+    there = channels_of(recording.columns)
     names = ["time", *(f"{channel.topic[1:]}.{channel.name}" for channel in there)]
     units = ["s", *(channel.unit for channel in there)]
     table = np.column_stack([recording.time, *(recording.column(c.topic, c.name) for c in there)])
@@ -37,7 +37,7 @@ def _mat(recording: Recording, path: Path) -> None:
     for topic, values in recording.columns.items():
         content[topic[1:]] = dict(values)
     units = {
-        f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.machine, recording.columns)
+        f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.columns)
     }
     content["units"] = {name: unit for name, unit in units.items()}
     savemat(path, content, oned_as="column")

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zstandard
@@ -33,6 +33,9 @@ from rigtwin.recording.schema import (
     known_topics,
     tags,
 )
+
+if TYPE_CHECKING:
+    import pandas
 
 _DAMAGE = (
     McapError,
@@ -159,7 +162,7 @@ def load(path: Path) -> Recording:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
         if max(times) >= 2**63:
             raise RigtwinError(f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start")
-        values = _decoded(path, channel, schemas.get(channel.schema_id), data, machine == SUSPENSION_RIG)
+        values = _decoded(path, channel, schemas.get(channel.schema_id), data)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
         said = f"; it ended: {metadata[END_RECORD].get('reason', '')}" if END_RECORD in metadata else ""
@@ -236,8 +239,8 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
     return controller
 
 
-def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes], rig: bool) -> dict[str, Array]:
-    """The columns of a topic. rig: whether it is of the machine of the channel table; of any other, every number is kept."""
+def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes]) -> dict[str, Array]:
+    """The columns of a topic: every number in it, those that the channel table names first."""
     names = topic_fields(channel.topic)
     if channel.message_encoding == "json":
         decode: Callable[[bytes], Mapping[str, Any]] = json.loads
@@ -246,7 +249,7 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
         present, numbers, decode = _protobuf(path, schema)
         block = b"".join(data)
-        ours = [name for name in names if name in present] if rig else present
+        ours = [*(name for name in names if name in present), *(n for n in present if n not in names)]
         if numbers == list(range(1, len(present) + 1)) and len(block) == len(data) * len(present) * FIELD.itemsize:
             fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
             if (fields["tag"] == tags(len(present))).all():
@@ -262,7 +265,8 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
         if not isinstance(row, Mapping):
             raise RigtwinError(f"{path}: message {number} on {channel.topic} cannot be read; expected an object of numbers")
         rows.append(row)
-    ours = [name for name in names if any(name in row for row in rows)] if rig else _numbers(rows)
+    ours = [name for name in names if any(name in row for row in rows)]
+    ours += [name for name in _numbers(rows) if name not in ours]
     if not ours:
         raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
     return {name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows]) for name in ours}

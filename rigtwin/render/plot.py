@@ -14,9 +14,10 @@ from matplotlib.figure import Figure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.recording.channels import SUSPENSION_RIG
 
 COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
+RIG_SENSORS = ("structure_lvdt", "load_cell")
+"""By which a quarter car's recording is known."""
 KINDS = (".png", ".svg", ".pdf")
 
 
@@ -110,7 +111,7 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     checked_ending(out)
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
-    panels = PANELS if recording.machine == SUSPENSION_RIG else _plainly(recording)
+    panels = PANELS if all(recording.has("/sensor", name) for name in RIG_SENSORS) else _plainly(recording)
     there = [
         (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
         for panel in panels

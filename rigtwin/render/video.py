@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -19,10 +20,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from rigtwin.components import PositionActuator, PositionSensor, VelocitySensor
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.recording.channels import SUSPENSION_RIG
 from rigtwin.render.plot import ASKED, SENSED, stretch
 from rigtwin.simulation.mechanics import SCENE
 from rigtwin.simulation.structure_motion import recorded_wing
@@ -45,7 +47,8 @@ NO_RENDERING = (
 def film(
     recording: Recording,
     out: Path,
-    camera: str = "overview",
+    machine: Machine,
+    camera: str | None = None,
     start: float = 0.0,
     until: float | None = None,
     magnify: float = 1.0,
@@ -60,21 +63,23 @@ def film(
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
     if not 0.0 < magnify <= 20.0:
         raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
-    if recording.machine != SUSPENSION_RIG:
-        raise RigtwinError(f"{recording.path}: it is of machine {recording.machine!r}; only {SUSPENSION_RIG} can be filmed")
-    for name in ("structure_lvdt", "suspension_lvdt", "ground_lvdt"):
-        if recording.has("/sensor", name) and not np.isfinite(recording.column("/sensor", name)).all():
-            raise RigtwinError(f"{recording.path}: /sensor.{name} has values that are no numbers; nothing can be drawn of it")
+    motions = _motions(recording, machine)
+    for joint, values in motions.items():
+        if not np.isfinite(values).all():
+            raise RigtwinError(
+                f"{recording.path}: the position of {joint} has values that are no numbers; "
+                "nothing can be drawn of it"
+            )
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
-    motions = {name: magnify * values[ticks] for name, values in _motions(recording).items()}
-    traces = _Traces(recording, ticks)
+    motions = {name: magnify * values[ticks] for name, values in motions.items()}
+    traces = _Traces(_curves(recording, machine), recording.time, ticks)
     beams = recorded_wing(recording)
     bent = None if beams is None else magnify * beams[ticks]
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
-        with _renderer(camera) as render, av.open(str(temporary), "w", format="mp4") as container:
+        with _renderer(machine, camera) as render, av.open(str(temporary), "w", format="mp4") as container:
             stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
             stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
             for number, tick in enumerate(frames):
@@ -93,14 +98,60 @@ def film(
             temporary.unlink(missing_ok=True)
 
 
-def _motions(recording: Recording) -> dict[str, Array]:
-    """Joint → position in m at every tick, from the sensors alone, so that any recording can be filmed."""
-    structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
-    travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
-    ground = np.zeros_like(structure)
-    if recording.has("/sensor", "ground_lvdt"):
-        ground = _smooth(recording.column("/sensor", "ground_lvdt"), recording.period)
-    return {"ground": ground, "carriage": structure - travel, "structure": structure}
+def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
+    """Joint → position at every tick, m or rad, from what was recorded alone, so that any recording can be filmed."""
+    if machine.structure is Structure.QUARTER_CAR:
+        structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
+        travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
+        ground = np.zeros_like(structure)
+        if recording.has("/sensor", "ground_lvdt"):
+            ground = _smooth(recording.column("/sensor", "ground_lvdt"), recording.period)
+        return {"ground": ground, "carriage": structure - travel, "structure": structure}
+    found: dict[str, Array] = {}
+    for of in (PositionSensor, PositionActuator, VelocitySensor):
+        # A position as measured, else as commanded, else as its velocity adds up to.
+        for name, component in machine.components.items():
+            channel = component.channel
+            fits = type(getattr(machine.plant, name)) is of and component.joint not in found
+            if fits and channel is not None and recording.has(*channel):
+                signal = recording.column(*channel)
+                summed = np.cumsum(signal - np.mean(signal)) * recording.period
+                found[component.joint] = summed if of is VelocitySensor else signal
+    if not found:
+        raise RigtwinError(f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it")
+    return found
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line under the scene. axis: its title; label: in the legend."""
+
+    axis: str
+    label: str
+    colour: str
+    values: Array
+
+
+def _curves(recording: Recording, machine: Machine) -> list[Curve]:
+    """What is drawn under the scene."""
+    if machine.structure is Structure.QUARTER_CAR:
+        wanted = [
+            ("force, N", "measured", SENSED, "/sensor", "load_cell", 1.0),
+            ("force, N", "demanded", ASKED, "/command", "force", 1.0),
+            ("travel, mm", "measured", SENSED, "/sensor", "suspension_lvdt", 1e3),
+        ]
+    else:
+        wanted = []
+        for component in machine.components.values():
+            if component.channel is not None:
+                topic, name = component.channel
+                colour = SENSED if topic == "/sensor" else ASKED
+                wanted.append((f"{name}, {component.unit or '1'}", "", colour, topic, name, 1.0))
+    return [
+        Curve(axis, label, colour, scale * recording.column(topic, name))
+        for axis, label, colour, topic, name, scale in wanted
+        if recording.has(topic, name)
+    ]
 
 
 def _smooth(signal: Array, period: float) -> Array:
@@ -121,12 +172,16 @@ def _context() -> Any:
 
 
 @contextmanager
-def _renderer(camera: str) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
+def _renderer(
+    machine: Machine, camera: str | None
+) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
     """A function from joint positions, and the beams' heights over their centre where there are any, to a picture."""
-    model = mujoco.MjModel.from_xml_path(str(SCENE))
+    quarter_car = machine.structure is Structure.QUARTER_CAR
+    model = mujoco.MjModel.from_xml_path(str(SCENE if quarter_car else machine.model))
     cameras = [model.camera(number).name for number in range(model.ncam)]
-    if camera not in cameras:
-        raise RigtwinError(f"unknown camera {camera!r}; there are {', '.join(cameras)}")
+    camera = camera or (cameras[0] if cameras else "free")
+    if camera not in (*cameras, "free"):
+        raise RigtwinError(f"unknown camera {camera!r}; there are {', '.join([*cameras, 'free'])}")
     data = mujoco.MjData(model)
     context = _context()
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
@@ -134,7 +189,10 @@ def _renderer(camera: str) -> Iterator[Callable[[dict[str, float], Array | None]
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
     scene = mujoco.MjvScene(model, maxgeom=500)
     options, view = mujoco.MjvOption(), mujoco.MjvCamera()
-    view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
+    if camera == "free":
+        mujoco.mjv_defaultFreeCamera(model, view)
+    else:
+        view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera(camera).id
     window = mujoco.MjrRect(0, 0, WIDTH, SCENE_HEIGHT)
     picture = np.empty((SCENE_HEIGHT, WIDTH, 3), np.uint8)
 
@@ -173,22 +231,21 @@ def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
 class _Traces:
     """Force and travel drawn once; every frame adds the line that marks its time."""
 
-    def __init__(self, recording: Recording, ticks: slice) -> None:
-        time = recording.time[ticks]
+    def __init__(self, curves: Sequence[Curve], time: Array, ticks: slice) -> None:
+        time = time[ticks]
         figure = Figure(figsize=(WIDTH / 100, TRACE_HEIGHT / 100), dpi=100)
         canvas = FigureCanvasAgg(figure)
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        if recording.has("/sensor", "load_cell"):
-            upper.plot(time, recording.column("/sensor", "load_cell")[ticks], color=SENSED, linewidth=0.8, label="measured")
-        if recording.has("/command", "force"):
-            upper.plot(time, recording.column("/command", "force")[ticks], color=ASKED, linewidth=0.9, label="demanded")
-        upper.set_ylabel("force, N", fontsize=8)
-        if upper.lines:
-            upper.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
-        lower.plot(time, 1e3 * recording.column("/sensor", "suspension_lvdt")[ticks], color=SENSED, linewidth=0.8)
-        lower.set_ylabel("travel, mm", fontsize=8)
+        titles = list(dict.fromkeys(curve.axis for curve in curves))[:2]
+        axes = figure.subplots(max(len(titles), 1), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, title in zip(axes, titles, strict=False):
+            for curve in (each for each in curves if each.axis == title):
+                axis.plot(time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label)
+            axis.set_ylabel(title, fontsize=8)
+            if len(axis.lines) > 1:
+                axis.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
+        upper, lower = axes[0], axes[-1]
         lower.set_xlabel("time, s", fontsize=8)
-        for axis in (upper, lower):
+        for axis in axes:
             axis.grid(alpha=0.3)
             axis.tick_params(labelsize=7)
             axis.set_xlim(time[0], time[-1])

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from rigtwin.description.configuration import Road
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Road
 from rigtwin.numerics.arrays import Array
 
 FADE = 1.0

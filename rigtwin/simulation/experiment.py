@@ -11,9 +11,9 @@ import numpy as np
 
 from controllers.formula import formula
 from rigtwin.components.rig import RigPlant
+from rigtwin.description.configuration import Configuration, rebased
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, rebased
-from rigtwin.machine.machine import Machine
 from rigtwin.numerics.arrays import Array
 
 Demands = Array | Mapping[str, Array]

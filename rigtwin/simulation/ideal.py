@@ -11,7 +11,7 @@ from controllers import Settings, Skyhook, Structure, Travel
 from controllers.beam import at_start, modes
 from controllers.gas_spring import gas_force
 from controllers.skyhook import semi_active_damping
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.plant import deflected

@@ -6,8 +6,10 @@ give the same numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -25,7 +27,8 @@ from controllers import (
     unpacked,
     update,
 )
-from rigtwin.machine.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration, Safety
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sampled
@@ -52,10 +55,65 @@ class Block:
     column: int = 0
 
 
-def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Block]:
-    """Runs a test tick by tick. demands: shape (ticks, 3), columns of controllers.Demand."""
-    controlling = controller(configuration.controller, configuration.timing.period)
-    state, watch = initial_state(controlling), watching()
+Tick = Callable[[Measurements, Demand], Commands]
+"""One tick of a controller: a function, or the bound method `tick` of an object."""
+
+
+def check_commands(given: object) -> Commands:
+    """Commands that can be written to a rig. Raises RigtwinError for anything else."""
+    try:
+        commands = Commands(*(float(value) for value in given))  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        commands = Commands(math.nan, math.nan, math.nan, math.nan)
+    if not all(math.isfinite(value) for value in commands):
+        names = ", ".join(Commands._fields)
+        raise RigtwinError(f"the controller gave {str(given)[:80]}; expected finite {names}")
+    return commands
+
+
+class TickController(Protocol):
+    """A controller of one's own: an object with one method."""
+
+    def tick(self, measured: Measurements, demand: Demand) -> Commands:
+        """The commands of a tick for what was measured and what the test demands."""
+        ...
+
+
+class RigController:
+    """The controller of the rig, tick by tick in Python."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        self._controlling = controller(configuration.controller, configuration.timing.period)
+        self._state = initial_state(self._controlling)
+
+    def tick(self, measured: Measurements, demand: Demand) -> Commands:
+        self._state, commands = update(self._controlling, self._state, measured, demand)
+        return commands
+
+
+def run(
+    rig: Rig, configuration: Configuration, demands: Array, tick: Tick | None = None
+) -> Iterator[Block]:
+    """Runs a test tick by tick.
+
+    Parameters
+    ----------
+    rig
+        Twin, card or replay.
+    configuration
+        Of the test.
+    demands
+        Columns of controllers.Demand, shape (ticks, 3).
+    tick
+        A controller of one's own; by default the rig's with the configuration's settings.
+
+    Raises
+    ------
+    RigtwinError
+        If a controller of one's own gives anything but four finite commands.
+    """
+    own = tick is not None
+    tick, watch = tick or RigController(configuration).tick, watching()
     rig.start()
     try:
         for first in range(0, len(demands), BLOCK):
@@ -69,7 +127,9 @@ def run(rig: Rig, configuration: Configuration, demands: Array) -> Iterator[Bloc
                 if isinstance(rig, Twin) and rig.misses(1)[0]:
                     commands = rig.held
                 else:
-                    state, commands = update(controlling, state, measured, Demand(*demand.tolist()))
+                    commands = tick(measured, Demand(*demand.tolist()))
+                    if own:
+                        commands = check_commands(commands)
                 rows.append((commands, measured))
                 number, column = judged(
                     configuration.safety, configuration.timing.period, watch, measured, commands

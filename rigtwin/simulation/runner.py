@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin import __version__
-from rigtwin.machine.configuration import Configuration, Safety, applied, flattened
+from rigtwin.description.configuration import Configuration, Safety, applied, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.simulation.loop import run_compiled
+from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.simulation.loop import Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explained
 from rigtwin.simulation.twin import Twin
 
@@ -65,21 +66,53 @@ def record(
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
     effects: Sequence[str] = (),
+    *,
+    machine: str = SUSPENSION_RIG,
+    controller: Tick | None = None,
 ) -> RunResult:
-    """Runs `demands`, shape (ticks, 3), on the twin into a new recording at `path`.
+    """Runs a test on the twin of a quarter car into a new recording.
 
-    effects: as `--effect` takes them; the rig has them, the operator's settings in the recording do not know.
+    A trip, an interruption or an exception leaves a readable recording that says why it ended.
 
-    progress is called with the ticks done since its last call. A trip, an interruption or an exception leaves a readable
-    recording that says why it ended. Raises RigtwinError before anything is written if the configuration is at fault.
+    Parameters
+    ----------
+    path
+        Of the recording.
+    experiment
+        The test's name.
+    configuration
+        What the operator knows.
+    demands
+        Columns of controllers.Demand, shape (ticks, 3).
+    seed
+        Of the sensors' noise.
+    progress
+        Called with the ticks done since its last call.
+    effects
+        As `--effect` takes them; the rig has them, the operator's settings do not know of them.
+    machine
+        The machine's name.
+    controller
+        One of one's own instead of the rig's, tick by tick in Python; the recording then says
+        nothing of a controller's settings but where the test started.
+
+    Raises
+    ------
+    RigtwinError
+        Before anything is written, if the configuration is at fault.
     """
     actual = applied(configuration, list(effects))
     twin = Twin(actual, float(demands[0, 0]), seed)
     settings = flattened(configuration)
+    told: dict[str, object] = dict(settings["controller"])
+    blocks = run_compiled(twin, actual, demands)
+    if controller is not None:
+        told = {"own": True, **{name: told[name] for name in ("start", "preload")}}
+        blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
-    with Writer(path, experiment, configuration.timing.period, settings["controller"]) as writer:
+    with Writer(path, experiment, configuration.timing.period, told, machine) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
-        for block in run_compiled(twin, actual, demands):
+        for block in blocks:
             writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
             progress(len(block.commands))

@@ -17,7 +17,7 @@ from controllers import Commands, Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import RigPlant
-from rigtwin.machine.configuration import Safety
+from rigtwin.description.configuration import Safety
 from rigtwin.numerics.arrays import Array
 
 MOTOR_LAG = RigPlant().motor.time_constant

@@ -19,7 +19,7 @@ from controllers import (
     update,
 )
 from controllers.beam import MODES
-from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from controllers import Commands, Measurements
 from controllers.force import MOTOR_CONSTANT
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Disturbance, sampled, sensing

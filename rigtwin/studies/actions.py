@@ -10,8 +10,8 @@ from dm_env import specs
 
 from controllers import Commands, Controller, Demand, Measurements, Settings, State, update
 from controllers.quantity import Quantity, fields
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 
 

@@ -31,8 +31,8 @@ from dm_env import specs
 
 from controllers import Commands, Demand, Measurements, controller, initial_state
 from rigtwin.components.tyre import tyre_force
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip, judged, watching
 from rigtwin.simulation.twin import Twin

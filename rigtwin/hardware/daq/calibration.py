@@ -10,9 +10,9 @@ import numpy as np
 
 from controllers import Measurements, Mode, Settings
 from controllers.force import MOTOR_CONSTANT
+from rigtwin.description.configuration import Configuration, Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, Line
-from rigtwin.machine.configuration import Configuration, Timing
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.rig import DrivenRig
 

@@ -14,8 +14,8 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 from controllers import Measurements
 from controllers.quantity import Quantity, fields
+from rigtwin.description.configuration import Safety, checked, read_toml
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Safety, checked, read_toml
 from rigtwin.recording.channels import CHANNELS
 
 Group = TypeVar("Group")

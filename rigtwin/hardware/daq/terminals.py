@@ -7,6 +7,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from controllers.compiled import compilable
 from rigtwin.components import RigPlant
+from rigtwin.description.configuration import Configuration
 from rigtwin.hardware.daq.conversion import (
     Conversion,
     conversion,
@@ -18,7 +19,6 @@ from rigtwin.hardware.daq.conversion import (
 )
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.realtime import Pacer
-from rigtwin.machine.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sampled, sensors

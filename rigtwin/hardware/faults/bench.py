@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from controllers.force import MOTOR_CONSTANT
+from rigtwin.description.configuration import Safety
 from rigtwin.hardware.daq.conversion import conversion, to_values
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.terminals import Terminals
-from rigtwin.machine.configuration import Safety
 from rigtwin.numerics.arrays import Array
 
 SEEN_LVDT, SEEN_FORCE = 0.03, 150.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from controllers import Commands
 from controllers import update as healthy
+from rigtwin.description.configuration import overridden
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import ChannelTable
@@ -25,7 +26,6 @@ from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, Kind
 from rigtwin.hardware.session.record import Test, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervised import ARMED, LOOKING, SETTLING
-from rigtwin.machine.configuration import overridden
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 

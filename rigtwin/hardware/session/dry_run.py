@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
+from rigtwin.description.configuration import Configuration, flattened
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, written
-from rigtwin.machine.configuration import Configuration, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.peaks import Peak, peaks

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rigtwin.cli.session_commands import permitted, run, test_of
+from rigtwin.description.configuration import read_toml
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import read_toml
 from rigtwin.recording import load
 
 LONGEST = 3600.0

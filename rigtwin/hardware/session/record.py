@@ -10,6 +10,7 @@ from typing import Any
 
 from controllers import update
 from rigtwin import __version__
+from rigtwin.description.configuration import Configuration, applied, flattened
 from rigtwin.hardware.daq.card import Card, connected, require_client
 from rigtwin.hardware.daq.table import ChannelTable, fit, written
 from rigtwin.hardware.daq.terminals import Terminals
@@ -19,7 +20,6 @@ from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.recorder import Keeper
 from rigtwin.hardware.session.watched import Watched
 from rigtwin.hardware.supervised import Ended, Update, supervise
-from rigtwin.machine.configuration import Configuration, applied, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer, twin_values
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD

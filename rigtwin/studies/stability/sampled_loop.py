@@ -37,7 +37,7 @@ from rigtwin.components import RigPlant
 from rigtwin.components.cylinder import continuous
 from rigtwin.components.gas_spring import stiffness
 from rigtwin.components.tyre import tyre_force
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import deflected

@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from controllers import Settings
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store, Workers, run_jobs

@@ -11,8 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from rigtwin import __version__
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration
 from rigtwin.render.plot import save
 from rigtwin.simulation.runner import record
 from rigtwin.studies.tuning import text

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.components.tyre import tyre_force
-from rigtwin.machine.configuration import Configuration
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, ideal

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from controllers import Settings
-from rigtwin.machine.posterior import Posterior
+from rigtwin.description.posterior import Posterior
 from rigtwin.studies.tuning.bench import Bench, Score
 from rigtwin.studies.tuning.evaluation import Comparison, evaluate
 from rigtwin.studies.tuning.parameter import set_values

@@ -7,7 +7,7 @@ import json
 import math
 from dataclasses import dataclass
 
-from rigtwin.machine.configuration import Configuration, flattened
+from rigtwin.description.configuration import Configuration, flattened
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
 from rigtwin.simulation.runner import Ran, simulated

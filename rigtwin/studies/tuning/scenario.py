@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rigtwin.components import RigPlant
-from rigtwin.machine.configuration import Configuration, overridden
-from rigtwin.machine.library import find
-from rigtwin.machine.posterior import Changes, Posterior, shifted_within, value_of
+from rigtwin.description.catalogue import find
+from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.description.posterior import Changes, Posterior, shifted_within, value_of
 from rigtwin.recording.channels import SUSPENSION_RIG
 from rigtwin.studies.tuning.study import Study
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from controllers import Settings
-from rigtwin.machine.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Parameter

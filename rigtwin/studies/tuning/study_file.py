@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from controllers.quantity import Quantity, fields
+from rigtwin.description.configuration import Configuration, assigned, groups, overridden, read_toml
+from rigtwin.description.posterior import value_of
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, assigned, groups, overridden, read_toml
-from rigtwin.machine.posterior import value_of
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import MEASURES, Measure
 from rigtwin.studies.tuning.parameter import Parameter

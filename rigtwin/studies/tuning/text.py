@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from rigtwin.console import table
-from rigtwin.machine.configuration import parameters
+from rigtwin.description.configuration import parameters
 from rigtwin.studies.tuning.evaluation import Change, Comparison, Spread
 from rigtwin.studies.tuning.result import TUNED_NOMINAL, TuningResult, settings_of
 from rigtwin.studies.tuning.scenario import NOMINAL

@@ -25,7 +25,7 @@ Applied = TypeVar("Applied")
 P = TypeVar("P", bound=Plant)
 C = TypeVar("C", bound=tuple)
 POSTERIOR = "posterior"
-"""The table of a calibrated twin's file beside its values; rigtwin.machine.posterior reads it."""
+"""The table of a calibrated twin's file beside its values; rigtwin.description.posterior reads it."""
 MOST_TICKS = 100_000_000
 """More than a day at 1 kHz."""
 

@@ -10,10 +10,10 @@ from typing import Any
 from rigtwin import components
 from rigtwin.components import KINDS, UNLIMITED, RigPlant
 from rigtwin.components.quantity import Quantity, fields
-from rigtwin.machine.machine import Component, Structure
-from rigtwin.machine.mechanism import Mechanism
-from rigtwin.machine.mistakes import Mistakes, near
-from rigtwin.machine.tolerance import Tolerance
+from rigtwin.description.machine import Component, Structure
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.tolerance import Tolerance
 
 TYPES: dict[str, type] = {
     "mass": components.Mass,

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from controllers.quantity import Quantity, fields
-from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import (
+from rigtwin.description.configuration import (
     POSTERIOR,
     Configuration,
     groups,
@@ -23,6 +22,7 @@ from rigtwin.machine.configuration import (
     read_toml,
     values_of,
 )
+from rigtwin.errors import RigtwinError
 
 NORMAL_95 = 1.959964
 """Standard deviations from the middle to the end of a 95 % interval."""

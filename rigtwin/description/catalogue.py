@@ -6,9 +6,9 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from rigtwin.description.document import load
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.description import load
-from rigtwin.machine.machine import Machine
 
 SHIPPED = Path(str(files("machines")))
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from rigtwin.description.machine import Joint
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.machine import Joint
 
 OBJECTS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,

@@ -12,13 +12,13 @@ from typing import Any
 
 from controllers.formula import Formula, formula
 from rigtwin.components import Computer, Mains, RigPlant
+from rigtwin.description.component_tables import MOVING, Components
+from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.components import MOVING, Components
-from rigtwin.machine.control import PYTHON, Channel, Control, FormulaControl
-from rigtwin.machine.machine import Machine, Structure
-from rigtwin.machine.mechanism import Mechanism
-from rigtwin.machine.mistakes import Mistakes, near
-from rigtwin.machine.replays import Replays
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments")
 NOMINAL = ("known", "rough")

@@ -11,14 +11,16 @@ from typing import Any
 
 from rigtwin.components import Effect, candidates
 from rigtwin.components.quantity import Quantity
+from rigtwin.description.configuration import Configuration, Nothing, overridden
+from rigtwin.description.control import Control
+from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.configuration import Configuration, Nothing, overridden
-from rigtwin.machine.control import Control
-from rigtwin.machine.tolerance import Tolerance
 from rigtwin.recording import Recording
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
 """Kind of signal → share of it that no model is held to, where a description does not say: of forces less is known."""
+OWN = "own"
+"""Of a recording's controller settings: that it was none that the machine describes."""
 TURNING = {
     "m": "rad",
     "N": "Nm",
@@ -139,7 +141,7 @@ class Machine:
         changes: dict[str, dict[str, object]] = {
             "timing": {"period": period, "duration": duration, "timestep": period / steps},
         }
-        given = dict(recording.controller)
+        given = {name: value for name, value in recording.controller.items() if name != OWN}
         if given and self.control is not None:
             changes["controller"] = given
         for parameter, setting in self.told.items():

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rigtwin.description.component_tables import MOVING, SENSED, Components
+from rigtwin.description.control import Control, FormulaControl
+from rigtwin.description.machine import Joint, ReplayOf, Row, Structure
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
-from rigtwin.machine.components import MOVING, SENSED, Components
-from rigtwin.machine.control import Control, FormulaControl
-from rigtwin.machine.machine import Joint, ReplayOf, Row, Structure
-from rigtwin.machine.mechanism import Mechanism
-from rigtwin.machine.mistakes import Mistakes, near
-from rigtwin.machine.tolerance import Tolerance
 
 TICKS_LATE = 0.5
 """Ticks by which a sample may be early or late."""
