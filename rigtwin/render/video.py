@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.components import PositionActuator, PositionSensor, VelocitySensor
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -74,7 +74,7 @@ def film(
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in motions.items()}
     traces = _Traces(_curves(recording, machine), recording.time, ticks)
-    beams = recorded_wing(recording)
+    beams = _beams(recording, machine)
     bent = None if beams is None else magnify * beams[ticks]
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
@@ -120,6 +120,13 @@ def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
     if not found:
         raise RigtwinError(f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it")
     return found
+
+
+def _beams(recording: Recording, machine: Machine) -> Array | None:
+    """The beams' heights over their centre, if the structure model was one of beams."""
+    if machine.structure is not Structure.QUARTER_CAR or OWN in recording.controller:
+        return None
+    return recorded_wing(recording)
 
 
 @dataclass(frozen=True)
