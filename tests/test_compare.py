@@ -17,8 +17,8 @@ from rigtwin.machine.configuration import Configuration, Timing, from_assignment
 from rigtwin.machine.effects import applied, candidates, find
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
-from tests.conftest import rig_recording
-from tests.test_effects import text
+from tests.helpers.effects import text
+from tests.helpers.recordings import beginning, rig_recording
 
 LIMITS = {
     "motor": 3.0,
@@ -35,7 +35,7 @@ def ratios(recording: Recording) -> dict[str, float]:
     return {name: result.ratio for name, result in compare(recording, configuration_of(recording)).replays.items()}
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def nominal(example) -> dict[str, float]:
     return ratios(example)
 
@@ -49,7 +49,7 @@ def test_the_shipped_rig_recording_leaves_noise_alone(nominal):
 
 @pytest.mark.parametrize("name", ["nominal-road10", "nominal-drop"])
 def test_nominal_recordings_leave_noise_alone(name):
-    found = ratios(rig_recording(name))
+    found = ratios(beginning(rig_recording(name), 8.0))
     for component, limit in LIMITS.items():
         assert found[component] <= limit, component
 
@@ -64,7 +64,7 @@ TOUCHED = {
 
 @pytest.mark.parametrize("name", TOUCHED)
 def test_faults_of_the_stand_in_rig_stand_out_where_they_are(name, nominal):
-    found = ratios(rig_recording(name))
+    found = ratios(beginning(rig_recording(name), 8.0))
     for component in COMPONENTS:
         times = found[component] / nominal[component]
         if component in TOUCHED[name]:
@@ -88,7 +88,7 @@ OWN_FAULTS = {
 @pytest.mark.parametrize("name", ["imposed"])
 def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, name, fault):
     experiment = EXPERIMENTS[name]
-    faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=10.0)), [fault])
+    faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=5.0)), [fault])
     path = tmp_path / "f.mcap"
     record(path, name, faulty, experiment.demands(faulty, 11), 11)
     found = ratios(load(path))
@@ -171,7 +171,7 @@ LEFT_OVER = {
 def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise is left."""
     experiment = EXPERIMENTS["imposed"]
-    configuration = experiment.configuration._replace(timing=Timing(duration=6.0))
+    configuration = experiment.configuration._replace(timing=Timing(duration=4.0))
     path = tmp_path / "e.mcap"
     record(path, "imposed", configuration, experiment.demands(configuration, 5), 5, effects=[text(name)])
     recording = load(path)

@@ -2,40 +2,20 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from experiments import EXPERIMENTS
 from rigtwin.components.parameters import Plant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
-from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
 from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
-from rigtwin.diagnosis.next_test import tried
 from rigtwin.diagnosis.trials import TRIALS
-from rigtwin.machine.effects import KINDS, applied, find
-from rigtwin.machine.library import find as machine_of
-from rigtwin.recording import Recording
+from rigtwin.machine.effects import KINDS, find
+from tests.helpers.twin import RIG, evidence_of, recorded
 
-RIG = machine_of("suspension-rig")
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
 """Kinds that are read off the signals."""
-
-
-@cache
-def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5) -> Recording:
-    """A test on the twin with effects."""
-    configuration = EXPERIMENTS[name].configuration
-    configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
-    demands = EXPERIMENTS[name].demands(configuration, seed)
-    return tried(name, applied(configuration, list(effects)), demands)
-
-
-def evidence_of(*recordings: Recording) -> Evidence:
-    return Evidence(RIG, recordings, [configuration_of(recording) for recording in recordings])
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from rigtwin.machine.description import examined, load
 from rigtwin.machine.effects import find as effect_of
 from rigtwin.machine.library import find, shipped
 from rigtwin.machine.setting import from_assignments, nominal, overridden, without
-from tests.described import MJCF, TOML, described, recording_of
+from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
 @pytest.mark.parametrize("name", shipped())

@@ -31,7 +31,7 @@ from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.studies.tuning.scenario import APART, diagnosed, drawn, nominal
 from rigtwin.studies.tuning.search import Search, Tried, best, bound_of, front
 from rigtwin.studies.tuning.study import Constraint, Study, shipped
-from tests.browser import BROWSER, looked_at
+from tests.helpers.browser import BROWSER, looked_at
 
 SMALL = """
 title = "a small study"
