@@ -49,6 +49,7 @@ def test_recordings_of_the_stand_in_rig_have_no_fault(name):
     assert faults(shipped(name)) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.stem for path in BESIDE.glob("*.mcap")))
 def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
     assert faults(beside(name)) == {}
@@ -57,7 +58,7 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
 @pytest.mark.parametrize("name", [e.name for e in candidates(Plant())])
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
-    configuration = experiment.configuration._replace(timing=Timing(duration=5.0))
+    configuration = experiment.configuration._replace(timing=Timing(duration=3.0))
     record(tmp_path / "e.mcap", "imposed", configuration, experiment.demands(configuration, 2), 2, effects=[text(name)])
     found = faults(load(tmp_path / "e.mcap"))
     assert set(found.values()) <= {"clipped"}, "saturation looks like clipping, and is"

@@ -88,7 +88,7 @@ def test_a_known_effect_is_named_in_twenty_seconds(name):
 def test_a_friction_taken_out_of_the_twin_is_found():
     base = without(Configuration(), "coulomb@rail")
     assert base.plant.rail.coulomb == 0.0
-    outcome = answer(recorded("imposed"), base=base)
+    outcome = answer(recorded("imposed", seconds=4.0), base=base)
     assert names(outcome) == {"coulomb@rail"}
     estimate = outcome.diagnosis.effects[0].parameters["coulomb"]
     assert estimate.value == pytest.approx(50.0, rel=0.05)
@@ -125,7 +125,7 @@ def test_several_recordings_are_explained_together():
 
 def test_held_out_recordings_judge_the_correction():
     effects = ("coulomb@rail=75",)
-    outcome = answer(recorded("imposed", effects), held_out=(recorded("imposed", effects, 8.0, 9),))
+    outcome = answer(recorded("imposed", effects, 4.0), held_out=(recorded("imposed", effects, 4.0, 9),))
     gap = outcome.diagnosis.gap
     assert gap is not None
     assert gap.held_out == "1 held-out recording"
@@ -311,7 +311,7 @@ def test_a_sensor_cut_off_is_named_and_its_ticks_left_out():
 
 def test_the_command_writes_what_it_says(tmp_path, capsys):
     rig = tmp_path / "rig.mcap"
-    assert main(["run", "imposed", "--set", "timing.duration=6", "--effect", "viscous@rail=200", "--out", str(rig)]) == 0
+    assert main(["run", "imposed", "--set", "timing.duration=4", "--effect", "viscous@rail=200", "--out", str(rig)]) == 0
     report, answer, twin = tmp_path / "r.html", tmp_path / "a.json", tmp_path / "t.toml"
     assert main(["diagnose", str(rig), "--html", str(report), "--json", str(answer), "--save-twin", str(twin)]) == 0
     said = capsys.readouterr().out

@@ -120,16 +120,10 @@ def test_ticks_where_a_sensor_is_cut_off_do_not_count():
     assert np.array_equal(cut_off(clipped), clipped == 0.8)
 
 
-def test_no_effect_is_named_where_there_is_none(nominal):
-    found = attribute(nominal)
-    assert found.best is None
-    assert not found.unknown
-    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)
-
-
 def test_two_effects_are_told_apart():
     evidence = evidence_of(recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96")))
     found = attribute(evidence)
     assert found.best is not None
     assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}
     assert sum(found.shares.values()) == pytest.approx(found.explained)
+    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)

@@ -226,7 +226,7 @@ def test_kill_9_loses_at_most_half_a_second(tmp_path):
 
 def test_kill_9_while_the_twin_runs(tmp_path):
     path = tmp_path / "k.mcap"
-    command = [sys.executable, "-m", "rigtwin.cli", "run", "road10", "--out", str(path), "--set", "timing.duration=600"]
+    command = [sys.executable, "-m", "rigtwin.cli", "run", "road10", "--out", str(path), "--set", "timing.duration=120"]
     process = subprocess.Popen(command)
     deadline = time.monotonic() + 300
     while (not path.exists() or path.stat().st_size < 300_000) and time.monotonic() < deadline:
