@@ -70,7 +70,7 @@ TOUCHED = {
 }
 
 
-def stands_out(name: str, found: dict[str, float], nominal: dict[str, float], elsewhere: float) -> None:
+def assert_stands_out(name: str, found: dict[str, float], nominal: dict[str, float], elsewhere: float) -> None:
     """Asserts that the components touched are off, and that no other is by so many times."""
     for component in COMPONENTS:
         times = found[component] / nominal[component]
@@ -82,13 +82,13 @@ def stands_out(name: str, found: dict[str, float], nominal: dict[str, float], el
 
 @pytest.mark.parametrize("name", [name for name in TOUCHED if name in SHIPPED])
 def test_faults_of_the_stand_in_rig_stand_out_where_they_are(name, nominal):
-    stands_out(name, ratios(shipped(name)), nominal, 1.35)
+    assert_stands_out(name, ratios(shipped(name)), nominal, 1.35)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TOUCHED)
 def test_faults_of_the_stand_in_rig_stand_out_alone_in_twenty_seconds(name):
-    stands_out(name, ratios(beside(name)), ratios(shipped("nominal-imposed")), 1.15)
+    assert_stands_out(name, ratios(beside(name)), ratios(shipped("nominal-imposed")), 1.15)
 
 
 OWN_FAULTS = {

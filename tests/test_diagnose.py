@@ -28,7 +28,7 @@ from tests.helpers.recordings import SHIPPED, beside, shipped
 from tests.helpers.twin import RIG, answer, evidence_of, recorded
 
 SLOW = pytest.mark.slow
-"""A quarter of a minute and more each; of every sort of answer one is always tried."""
+"""Of every sort of answer one is always tried."""
 
 
 def names(outcome: Outcome) -> set[str]:
@@ -58,7 +58,7 @@ KNOWN = {
 }
 
 
-def named(outcome: Outcome, name: str) -> None:
+def assert_named(outcome: Outcome, name: str) -> None:
     """Asserts that the answer is this one alone, with its magnitude, and closes the gap as it says."""
     effect, parameter, value, nominal = KNOWN[name]
     assert outcome.diagnosis.verdict == "explained"
@@ -76,13 +76,13 @@ def named(outcome: Outcome, name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in KNOWN if name in SHIPPED])
 def test_a_known_effect_is_named_with_its_magnitude(name):
-    named(answer(shipped(name)), name)
+    assert_named(answer(shipped(name)), name)
 
 
 @SLOW
 @pytest.mark.parametrize("name", KNOWN)
 def test_a_known_effect_is_named_in_twenty_seconds(name):
-    named(answer(beside(name)), name)
+    assert_named(answer(beside(name)), name)
 
 
 def test_a_friction_taken_out_of_the_twin_is_found():
