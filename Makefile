@@ -1,4 +1,4 @@
-.PHONY: setup demo test check benchmark gallery docs contract system browser clean
+.PHONY: setup demo test test-slow check benchmark gallery docs contract system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -8,7 +8,8 @@ OUT := out
 
 help:
 	@echo "make demo       set up, record a rig with a defect, diagnose it, plot and film a drop test"
-	@echo "make test       set up, run all tests"
+	@echo "make test       set up, run all tests but the slow ones"
+	@echo "make test-slow  the slow ones: longer recordings, more of a sort"
 	@echo "make setup      make $(VENV) with everything in it"
 	@echo "make check      ruff and pyright"
 	@echo "make benchmark  speeds, side by side"
@@ -37,8 +38,12 @@ demo: setup system
 	$(BIN)/rigtwin video $(OUT)/drop.mcap -o $(OUT)/drop.mp4 --until 10
 	@echo "look at $(OUT)/report.html, $(OUT)/drop.png and $(OUT)/drop.mp4"
 
+# A file's tests share what they recorded and diagnosed: one worker takes them all.
 test: setup system browser
-	$(BIN)/python -m pytest -n auto --dist loadgroup
+	$(BIN)/python -m pytest -n auto --dist loadfile
+
+test-slow: setup system
+	$(BIN)/python -m pytest -n auto -m slow
 
 browser:
 	@bash scripts/browser.sh

@@ -1,26 +1,14 @@
-"""Recordings of a stand-in rig, made by other code, where a checkout has them beside it."""
+"""Fixtures of several files of tests."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
-from rigtwin.recording import Recording, load
-
-RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
-EXAMPLE = Path(__file__).parents[1] / "examples" / "nominal-imposed.mcap"
-
-
-def rig_recording(name: str) -> Recording:
-    """A recording of the stand-in rig; skips the test where it is absent."""
-    path = RECORDINGS / f"{name}.mcap"
-    if not path.exists():
-        pytest.skip(f"no {path}")
-    return load(path)
+from rigtwin.recording import Recording
+from tests.helpers.recordings import EXAMPLE, beginning, shipped
 
 
 @pytest.fixture(scope="session")
 def example() -> Recording:
-    """The recording that the project ships."""
-    return load(EXAMPLE)
+    """8 s of a rig without defects, which is not the twin."""
+    return beginning(shipped(EXAMPLE.stem), 8.0)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.benches import recording_of
 from referee.bench_cases import ACTUATORS, DAMPERS, Case, drawn
 from referee.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, sampled, wander
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
@@ -16,6 +16,7 @@ from rigtwin.importing.convert import convert
 from rigtwin.description.catalogue import SHIPPED, find
 from rigtwin.description.setting import nominal
 from rigtwin.recording import Recording, load
+from tests.helpers.benches import recording_of
 
 EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"
 SINGLE = {
@@ -38,9 +39,10 @@ SINGLE = {
 """Truth → effects to be named, with their magnitudes."""
 
 
-def answered(truth: ActuatorTruth | DamperTruth, seed: int = 5) -> Outcome:
+@cache
+def answered(truth: ActuatorTruth | DamperTruth) -> Outcome:
     machine = "actuator" if isinstance(truth, ActuatorTruth) else "damper"
-    recording = recording_of(Case(machine, frozenset(), truth, 1e-3, seed))
+    recording = recording_of(Case(machine, frozenset(), truth, 1e-3, 5))
     described = find(recording.machine)
     return diagnose(described, [recording], nominal(described))
 

@@ -20,7 +20,7 @@ import pytest
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.recording import load
-from tests.conftest import EXAMPLE
+from tests.helpers.recordings import EXAMPLE
 
 QUICK = ["--set", "timing.duration=0.5"]
 

@@ -31,7 +31,7 @@ from controllers import (
 from controllers.filters import low_pass
 from controllers.force import MOTOR_CONSTANT, force_loop
 from controllers.skyhook import semi_active_damping
-from tests.conftest import rig_recording
+from tests.helpers.recordings import beginning, rig_recording
 
 PERIOD = 1e-3
 EVERY = [
@@ -123,7 +123,7 @@ def test_first_sample_sets_the_filters():
 
 @pytest.mark.parametrize("name", ["nominal-imposed", "nominal-road10", "nominal-drop"])
 def test_commands_of_the_stand_in_rig_reproduce(name):
-    recording = rig_recording(name)
+    recording = beginning(rig_recording(name), 8.0)
     settings = Settings(mode=Mode.parse(str(recording.controller["mode"])))
     columns = [recording.column("/sensor", field) for field in Measurements._fields]
     demands = [recording.column("/command", field) for field in Demand._fields]

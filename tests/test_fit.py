@@ -2,41 +2,20 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
-from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
 from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
-from rigtwin.diagnosis.next_test import tried
 from rigtwin.diagnosis.trials import TRIALS
 from rigtwin.components import KINDS, find
-from rigtwin.description.configuration import applied
-from rigtwin.description.catalogue import find as machine_of
-from rigtwin.recording import Recording
+from tests.helpers.twin import RIG, evidence_of, recorded
 
-RIG = machine_of("suspension-rig")
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
 """Kinds that are read off the signals."""
-
-
-@cache
-def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5) -> Recording:
-    """A test on the twin with effects."""
-    configuration = EXPERIMENTS[name].configuration
-    configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
-    demands = EXPERIMENTS[name].demands(configuration, seed)
-    return tried(name, applied(configuration, list(effects)), demands)
-
-
-def evidence_of(*recordings: Recording) -> Evidence:
-    return Evidence(RIG, recordings, [configuration_of(recording) for recording in recordings])
 
 
 @pytest.fixture(scope="module")
@@ -141,16 +120,10 @@ def test_ticks_where_a_sensor_is_cut_off_do_not_count():
     assert np.array_equal(cut_off(clipped), clipped == 0.8)
 
 
-def test_no_effect_is_named_where_there_is_none(nominal):
-    found = attribute(nominal)
-    assert found.best is None
-    assert not found.unknown
-    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)
-
-
 def test_two_effects_are_told_apart():
     evidence = evidence_of(recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96")))
     found = attribute(evidence)
     assert found.best is not None
     assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}
     assert sum(found.shares.values()) == pytest.approx(found.explained)
+    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)

@@ -16,7 +16,7 @@ from rigtwin.models.guided import Inertia, carried, limits, slid
 from rigtwin.models.replaying import Setup, predictor
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smoothed
-from tests.described import described, recording_of
+from tests.helpers.described import described, recording_of
 
 PERIOD = 1e-3
 

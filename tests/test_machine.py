@@ -17,7 +17,7 @@ from rigtwin.description.document import examined, load
 from rigtwin.components import find as effect_of
 from rigtwin.description.catalogue import find, shipped
 from rigtwin.description.setting import from_assignments, nominal, overridden, without
-from tests.described import MJCF, TOML, described, recording_of
+from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
 @pytest.mark.parametrize("name", shipped())

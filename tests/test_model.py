@@ -16,7 +16,7 @@ from rigtwin.components import Carriage, Motor, RigPlant, Rail, Tyre
 from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
-from tests.reference import coulomb_carriage
+from tests.helpers.reference import coulomb_carriage
 
 STEP = 2.5e-4
 NOMINAL = RigPlant()

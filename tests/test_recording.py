@@ -24,7 +24,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import Writer, load
 from rigtwin.recording.channels import CHANNELS, topic_fields
 from rigtwin.recording.export import export
-from tests.conftest import EXAMPLE, rig_recording
+from tests.helpers.recordings import EXAMPLE, SHIPPED, shipped
 
 CONTROLLER = {"mode": "mil", "kp": 0.3}
 
@@ -97,10 +97,11 @@ def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
             recording.column("/sensor", omit)
 
 
-def test_example_and_stand_in_recordings():
-    recording = load(EXAMPLE)
-    assert (recording.ticks, recording.period, recording.notes) == (20_000, 1e-3, ())
-    assert rig_recording("nominal-drop").ticks == 20_000
+@pytest.mark.parametrize("name", SHIPPED)
+def test_recordings_that_come_with_the_project(name):
+    recording = shipped(name)
+    ticks = 20_000 if name == EXAMPLE.stem else 8_000
+    assert (recording.ticks, recording.period, recording.notes) == (ticks, 1e-3, ())
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.77, 0.9, 0.999])
@@ -225,9 +226,9 @@ def test_kill_9_loses_at_most_half_a_second(tmp_path):
 
 def test_kill_9_while_the_twin_runs(tmp_path):
     path = tmp_path / "k.mcap"
-    command = [sys.executable, "-m", "rigtwin.cli", "run", "road10", "--out", str(path), "--set", "timing.duration=600"]
+    command = [sys.executable, "-m", "rigtwin.cli", "run", "road10", "--out", str(path), "--set", "timing.duration=120"]
     process = subprocess.Popen(command)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while (not path.exists() or path.stat().st_size < 300_000) and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(process.pid, signal.SIGKILL)

@@ -18,7 +18,7 @@ from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sl
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin
-from tests.test_fit import recorded
+from tests.helpers.twin import recorded
 
 SECONDS = 4.0
 QUIET = RigPlant()._replace(

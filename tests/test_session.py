@@ -216,7 +216,13 @@ def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):
 # Calibration
 
 
-@pytest.mark.parametrize("signs", list(itertools.product((1, -1), repeat=7))[::9])
+WIRINGS = list(itertools.product((1, -1), repeat=len(TABLE.lines)))
+EACH_LINE_BOTH_WAYS = WIRINGS[::25]
+
+
+@pytest.mark.parametrize(
+    "signs", [*EACH_LINE_BOTH_WAYS, *(pytest.param(signs, marks=pytest.mark.slow) for signs in WIRINGS[4::9])]
+)
 def test_every_wrong_sign_is_found(signs):
     from rigtwin.hardware.daq.card import Card
     from rigtwin.hardware.daq.transport import InProcess

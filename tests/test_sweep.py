@@ -20,37 +20,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, iterate_results, open_workers, run_jobs
 from rigtwin.studies.sweep.cluster import _run_if_same
 from rigtwin.studies.sweep.workers import Here
-
-
-def square(number: int) -> dict[str, float]:
-    return {"square": float(number * number)}
-
-
-def faulty(number: int) -> int:
-    if number == 3:
-        raise RigtwinError(f"{number} cannot be done")
-    return number
-
-
-def deadly(argument: tuple[str, int]) -> int:
-    """Kills its process the first time that it is called with 5."""
-    mark, number = argument
-    if number == 5 and not Path(mark).exists():
-        Path(mark).write_text("died here")
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 10 * number
-
-
-def always_deadly(number: int) -> int:
-    if number == 2:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
-
-
-def process(_: int) -> int:
-    time.sleep(0.02)
-    return os.getpid()
-
+from tests.helpers.jobs import always_deadly, deadly, faulty, process, slow, square
 
 VALUES = {
     "number": 0.1 + 0.2,
@@ -200,17 +170,12 @@ SWEEP = """
 import sys
 from pathlib import Path
 from rigtwin.studies.sweep import Store, open_workers, run_jobs
-from tests.test_sweep import slow
+from tests.helpers.jobs import slow
 
 if __name__ == "__main__":
     with open_workers(2) as workers, Store(Path(sys.argv[1])) as store:
         run_jobs(store, workers, slow, ((str(n), n) for n in range(40)), lambda _: print("done", flush=True))
 """
-
-
-def slow(number: int) -> int:
-    time.sleep(0.05)
-    return number
 
 
 def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):

@@ -40,7 +40,7 @@ from rigtwin.studies.tuning.scenario import (
 from rigtwin.studies.tuning.search import Candidate, Search, bound_of, find_best, find_front
 from rigtwin.studies.tuning.study import Constraint, Study
 from rigtwin.studies.tuning.study_file import parse_study
-from tests.browser import BROWSER, looked_at
+from tests.helpers.browser import BROWSER, looked_at
 
 SMALL = """
 title = "a small study"

@@ -1,0 +1,1 @@
+"""What tests share and cannot have as a fixture. No tests in here."""

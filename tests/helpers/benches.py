@@ -1,0 +1,20 @@
+"""What the referee's benches write, as a file would hold it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from referee.bench_cases import Case, recorded
+from rigtwin.recording import Recording
+
+
+def recording_of(case: Case) -> Recording:
+    data = recorded(case)
+    time = np.arange(len(data.first)) * case.period
+    if case.machine == "actuator":
+        columns = {"/command": {"position": data.first}, "/sensor": {"position": data.second}}
+        return Recording(Path("actuator"), "position-actuator", "", case.period, time, columns, {})
+    columns = {"/sensor": {"displacement": data.first, "force": data.second}}
+    return Recording(Path("damper"), "damper-bench", "", case.period, time, columns, {})

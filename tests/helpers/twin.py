@@ -1,0 +1,35 @@
+"""Tests on the twin with effects, made once a process, and what a diagnosis begins with."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from experiments import EXPERIMENTS
+from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.diagnose import Outcome, diagnose
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.next_test import tried
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.configuration import applied
+from rigtwin.description.catalogue import find as machine_of
+from rigtwin.recording import Recording
+
+RIG = machine_of("suspension-rig")
+
+
+@cache
+def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5) -> Recording:
+    """A test on the twin with effects."""
+    configuration = EXPERIMENTS[name].configuration
+    configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
+    demands = EXPERIMENTS[name].demands(configuration, seed)
+    return tried(name, applied(configuration, list(effects)), demands)
+
+
+def evidence_of(*recordings: Recording) -> Evidence:
+    return Evidence(RIG, recordings, [configuration_of(recording) for recording in recordings])
+
+
+def answer(*recordings: Recording, base: Configuration | None = None, held_out: tuple[Recording, ...] = ()) -> Outcome:
+    """What the diagnosis of the suspension rig says of them."""
+    return diagnose(RIG, recordings, base or Configuration(), held_out)
