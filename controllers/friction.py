@@ -163,8 +163,8 @@ def stepped(
         level += jump
         pending = (FIRST_STEP - 1.0) * jump if settings.compensator == Compensator.TWO_STEP else 0.0
     added = level + pending
-    after = Compensation(travel, velocity, acceleration, window, open_for, wait, pending, added, *REST[MOTOR:])
-    return after, velocities, errors
+    steps: Any = (travel, velocity, acceleration, window, open_for, wait, pending, added)
+    return Compensation(*(steps + REST[MOTOR:])), velocities, errors
 
 
 @compilable

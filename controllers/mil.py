@@ -1,4 +1,7 @@
-"""Model in the loop: one tick of the whole rig controller, a plain function of (controller, state, measurements, demand)."""
+"""Model in the loop: one tick of the whole rig controller.
+
+A plain function of controller, state, measurements and demand.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,17 @@ from controllers.beam import AT_REST, Modes, Six, at_start, beam, centre, modes
 from controllers.compiled import compilable
 from controllers.filters import low_pass
 from controllers.force import MOTOR_CONSTANT, force_loop
-from controllers.friction import NO_ERRORS, NO_VELOCITIES, REST, Compensation, Errors, Velocities, observed, pushed, stepped
+from controllers.friction import (
+    NO_ERRORS,
+    NO_VELOCITIES,
+    REST,
+    Compensation,
+    Errors,
+    Velocities,
+    observed,
+    pushed,
+    stepped,
+)
 from controllers.gas_spring import gas_force
 from controllers.settings import Compensator, Mode, Settings, Structure, Travel
 from controllers.signals import Commands, Demand, Measurements
@@ -96,8 +109,14 @@ def unpacked(values: tuple[float, ...]) -> State:
 
 
 @compilable
-def update(controller: Controller, state: State, measured: Measurements, demand: Demand) -> tuple[State, Commands]:
-    """One tick: filters, suspension model with skyhook, friction compensation, force loop, structure model."""
+def update(
+    controller: Controller,
+    state: State,
+    measured: Measurements,
+    demand: Demand,
+) -> tuple[State, Commands]:
+    """One tick: filters, suspension model and skyhook, friction compensation, force loop, structure
+    model."""
     settings, period = controller.settings, controller.period
     sample = measured.suspension_lvdt
     if settings.travel == Travel.GROUND:
@@ -111,7 +130,8 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
         force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
     else:
         travel = low_pass(state.travel, sample, settings.filter_position, period)
-        velocity = low_pass(state.velocity, (sample - state.sample) / period, settings.filter_velocity, period)
+        rate = (sample - state.sample) / period
+        velocity = low_pass(state.velocity, rate, settings.filter_velocity, period)
         force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
 
     modal, modal_rates = state.modal, state.modal_rates
@@ -119,14 +139,18 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
         demanded = demand.force
         position, structure_velocity = demand.structure, 0.0
     else:
-        demanded = suspension_force(settings, travel, velocity) - skyhook_force(settings, state.structure_velocity, velocity)
+        skyhook = skyhook_force(settings, state.structure_velocity, velocity)
+        demanded = suspension_force(settings, travel, velocity) - skyhook
         carried = force
         if settings.gas_force > 0.0:
-            # The load cell is on the motor's rod; what the real spring beside it carries follows from its travel.
-            carried += gas_force(settings.gas_force, settings.gas_length, settings.gas_exponent, -travel)
+            # The load cell is on the motor's rod; what the real spring beside it carries follows
+            # from its travel.
+            length, exponent = settings.gas_length, settings.gas_exponent
+            carried += gas_force(settings.gas_force, length, exponent, -travel)
         if settings.structure == Structure.BEAM:
             modal, modal_rates = beam(controller.modes, modal, modal_rates, carried)
-            position, structure_velocity = centre(controller.modes, modal), centre(controller.modes, modal_rates)
+            position = centre(controller.modes, modal)
+            structure_velocity = centre(controller.modes, modal_rates)
         else:
             position, structure_velocity = point_mass(
                 settings, state.structure_position, state.structure_velocity, carried, period
@@ -144,7 +168,8 @@ def update(controller: Controller, state: State, measured: Measurements, demand:
             error=demanded - force,
             period=period,
         )
-    integral, voltage = force_loop(settings, state.integral, demanded, force, compensation.added, period)
+    added = compensation.added
+    integral, voltage = force_loop(settings, state.integral, demanded, force, added, period)
     compensation = pushed(compensation, MOTOR_CONSTANT * voltage, period)
     after = State(
         sample=sample,

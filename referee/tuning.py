@@ -239,7 +239,7 @@ def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
     """All cases for other programs."""
     name = study.goals.minimise[0].name
 
-    def told(comparison: Comparison) -> dict[str, object] | None:
+    def describe(comparison: Comparison) -> dict[str, object] | None:
         if not comparison.changes:
             return None
         return asdict(replace(comparison.of(name), measure=None))  # type: ignore[arg-type]
@@ -248,8 +248,8 @@ def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
         {
             "defect": case.defect,
             "diagnosed": case.found,
-            "against_nominal": told(case.against_nominal),
-            "against_before": told(case.against_before),
+            "against_nominal": describe(case.against_nominal),
+            "against_before": describe(case.against_before),
         }
         for case in cases
     ]

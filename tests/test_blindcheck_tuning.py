@@ -1,4 +1,5 @@
-"""Tuning on a diagnosis, judged on the referee's plant: that plant under the rig's own controller, and the check itself."""
+"""Tuning on a diagnosis, evaluated on the referee's plant: that plant under the rig's controller,
+and the check itself."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ from rigtwin.studies.tuning.study_file import parse_study
 
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
 def test_the_rigs_controller_does_what_the_referees_own_does(test):
-    """Both laws were written from one description; on one plant with the same noise they command the same."""
+    """Both laws have one description; on one plant with the same noise they command the same."""
     truth = Truth(missed=0.02)
     law, demands = asked(test, np.random.default_rng(3))
     demands = demands[:4000]
@@ -81,10 +82,11 @@ STUDY = {
 
 
 def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, monkeypatch):
-    """With what a diagnosis would say taken as given: the rig has more friction than the nominal one."""
+    """What a diagnosis would say is taken as given: the rig has more friction than nominal."""
     import referee.tuning as module
 
-    monkeypatch.setattr(module, "diagnose_rig", lambda _: ("more friction", "[motor]\ncoulomb = 28.0\n"))
+    answer = ("more friction", "[motor]\ncoulomb = 28.0\n")
+    monkeypatch.setattr(module, "diagnose_rig", lambda _: answer)
     said: list[Case] = []
     with Store(tmp_path / "s.sqlite") as store:
         study = parse_study("s", STUDY, EXPERIMENTS)
@@ -96,7 +98,8 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     (case,) = found
     assert case.found == "more friction"
     assert case.against_nominal.runs == 6
-    assert case.against_nominal.of("force_error").after == case.against_before.of("force_error").after
+    both = (case.against_nominal, case.against_before)
+    assert len({each.of("force_error").after for each in both}) == 1
     assert "1 of 1" in text(study, found) or "0 of 1" in text(study, found)
 
 
@@ -104,16 +107,19 @@ def test_what_is_better_is_counted_by_its_interval():
     study = parse_study("s", STUDY, EXPERIMENTS)
 
     def case(number: int, after: list[float], trips: float = 0.0) -> Case:
-        rows = [
-            [{"force_error": value, TRIP: trips, LIMITS: 0.5} for value in values] for values in ([10.0] * len(after), after)
-        ]
-        against = compare(study.goals.measures, "rig", ("before", rows[0]), ("tuned", rows[1]))
+        def rows(values: list[float]) -> list[dict[str, float]]:
+            return [{"force_error": value, TRIP: trips, LIMITS: 0.5} for value in values]
+
+        before, tuned = rows([10.0] * len(after)), rows(after)
+        against = compare(study.goals.measures, "rig", ("before", before), ("tuned", tuned))
         return Case(number, "coulomb@motor", "found", against, against)
 
     better, worse = [9.0 + 0.1 * n for n in range(8)], [11.0 + 0.1 * n for n in range(8)]
     mixed = [9.0, 11.0] * 4
-    printed = text(study, [case(0, better), case(1, worse), case(2, mixed), case(3, mixed, trips=2.0)])
-    assert "better for the diagnosis on 1 of 4, worse on 1, no difference to be told on 1, tripped on 1" in printed
+    cases = [case(0, better), case(1, worse), case(2, mixed), case(3, mixed, trips=2.0)]
+    printed = text(study, cases)
+    assert "better for the diagnosis on 1 of 4, worse on 1, no difference" in printed
+    assert "no difference to be told on 1, tripped on 1" in printed
     assert "tripped" in printed
 
 
