@@ -12,7 +12,17 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 from controllers import Settings
-from controllers.beam import FREEDOMS, MODES, all_modes, assembled, at_start, beam, centre, element, modes
+from controllers.beam import (
+    FREEDOMS,
+    MODES,
+    all_modes,
+    assembled,
+    at_start,
+    beam,
+    centre,
+    element,
+    modes,
+)
 
 SETTINGS = Settings()
 PERIOD = 1e-3

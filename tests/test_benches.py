@@ -7,14 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigtwin.description.setting import nominal
 
 from referee.bench_cases import ACTUATORS, DAMPERS, Case, drawn
-from referee.benches import ActuatorTruth, DamperTruth, actuator_position, damper_force, sampled, wander
+from referee.benches import (
+    ActuatorTruth,
+    DamperTruth,
+    actuator_position,
+    damper_force,
+    sampled,
+    wander,
+)
+from rigtwin.description.catalogue import SHIPPED, find
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.localisation import travelled
 from rigtwin.importing.convert import convert
-from rigtwin.description.catalogue import SHIPPED, find
-from rigtwin.description.setting import nominal
 from rigtwin.recording import Recording, load
 from tests.helpers.benches import recording_of
 

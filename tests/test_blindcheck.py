@@ -18,11 +18,10 @@ from referee.reference_plant import Truth
 from referee.reference_rig import Law, quiet, run
 from referee.score import misses, rows, table, wilson
 from referee.test_signals import TESTS, asked
-from rigtwin.components import RigPlant
+from rigtwin.components import RigPlant, candidates
+from rigtwin.description.catalogue import find as machine_of
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.components import candidates
-from rigtwin.description.catalogue import find as machine_of
 from rigtwin.recording import load
 
 KNOWN = {effect.name for effect in candidates(RigPlant())} | {"setting@controller"}

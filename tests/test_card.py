@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
+from rigtwin.description.configuration import Configuration, Safety, read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card, CardFault, connected
@@ -21,7 +22,6 @@ from rigtwin.hardware.daq.table import ChannelTable, fit, load_table, parsed, tr
 from rigtwin.hardware.daq.terminals import Terminals, WiredTwin
 from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
-from rigtwin.description.configuration import Configuration, Safety, read_toml
 
 TABLE = load_table(CARD)
 PERIOD = 1e-3

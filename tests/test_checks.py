@@ -6,13 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rigtwin.diagnosis.checks import check, longest_run
 
 from experiments import EXPERIMENTS
-from rigtwin.components import RigPlant
-from rigtwin.diagnosis.checks import check, longest_run
-from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.components import RigPlant, candidates
 from rigtwin.description.configuration import Timing
-from rigtwin.components import candidates
+from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import text

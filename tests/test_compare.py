@@ -6,16 +6,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
-from rigtwin.components import RigPlant
-from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
-from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
-from rigtwin.errors import RigtwinError
-from rigtwin.description.configuration import Configuration, Timing, from_assignments
 from rigtwin.components import candidates, find
-from rigtwin.description.configuration import applied
+from rigtwin.description.configuration import Configuration, Timing, applied, from_assignments
+from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
+from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import text

@@ -7,8 +7,16 @@ import pytest
 from controllers import Mode, Settings, Skyhook
 from controllers.quantity import Quantity, fields
 from experiments import EXPERIMENTS
+from rigtwin.description.configuration import (
+    Configuration,
+    flattened,
+    from_assignments,
+    from_toml,
+    groups,
+    overridden,
+    parameters,
+)
 from rigtwin.errors import RigtwinError
-from rigtwin.description.configuration import Configuration, flattened, from_assignments, from_toml, groups, overridden, parameters
 from rigtwin.recording.schema import RECORD
 
 EVERY = list(parameters(Configuration()))

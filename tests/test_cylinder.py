@@ -9,10 +9,10 @@ import pytest
 from scipy.signal import lsim
 
 from controllers import Mode, Settings
-from rigtwin.components.cylinder import continuous
 from rigtwin.components import Cylinder
-from rigtwin.diagnosis.component import replay_cylinder
+from rigtwin.components.cylinder import continuous
 from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin

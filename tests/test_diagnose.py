@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigtwin.models.predictor import Motion
 
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
-from rigtwin.components import RigPlant
+from rigtwin.components import RigPlant, find
+from rigtwin.description.configuration import Configuration, overridden, without
 from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
 from rigtwin.diagnosis.diagnose import Outcome
@@ -20,10 +22,6 @@ from rigtwin.diagnosis.next_test import proposed
 from rigtwin.diagnosis.sampling import outstanding
 from rigtwin.diagnosis.unknown_input import located
 from rigtwin.errors import RigtwinError
-from rigtwin.description.configuration import Configuration, overridden
-from rigtwin.components import find
-from rigtwin.description.configuration import without
-from rigtwin.models.predictor import Motion
 from rigtwin.recording import Recording
 from tests.helpers.recordings import SHIPPED, beside, shipped
 from tests.helpers.twin import RIG, answer, evidence_of, recorded

@@ -10,13 +10,24 @@ import pytest
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
+from rigtwin.components import (
+    KINDS,
+    Carriage,
+    Computer,
+    Cylinder,
+    LoadCell,
+    Lvdt,
+    Motor,
+    Rail,
+    RigPlant,
+    Tyre,
+    candidates,
+    find,
+)
 from rigtwin.components.conditioning import actuator, conditioned, holding
 from rigtwin.components.guide import breakaway, friction, gap_at
-from rigtwin.components import Carriage, Computer, Cylinder, LoadCell, Lvdt, Motor, RigPlant, Rail, Tyre
+from rigtwin.description.configuration import Configuration, Timing, applied
 from rigtwin.errors import RigtwinError
-from rigtwin.description.configuration import Configuration, Timing
-from rigtwin.components import KINDS, candidates, find
-from rigtwin.description.configuration import applied
 from rigtwin.recording import load
 from rigtwin.simulation.converters import sampled, sensing
 from rigtwin.simulation.loop import run, run_compiled

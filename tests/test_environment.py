@@ -11,8 +11,8 @@ from dm_env import StepType, test_utils
 
 from experiments import find
 from experiments.environment import environment
-from rigtwin.errors import RigtwinError
 from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.errors import RigtwinError
 from rigtwin.simulation.runner import simulated
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.actions import Actuators, Schedule

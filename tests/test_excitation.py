@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.errors import RigtwinError
 from rigtwin.description.configuration import Road
+from rigtwin.errors import RigtwinError
 from rigtwin.signals.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
 
 TIME = np.arange(45_000) * 1e-3

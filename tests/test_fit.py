@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
+from rigtwin.diagnosis.trials import TRIALS
 
-from rigtwin.components import RigPlant
+from rigtwin.components import KINDS, RigPlant, find
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, cut_off, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
-from rigtwin.diagnosis.joint_trials import JOINT_TRIALS
-from rigtwin.diagnosis.trials import TRIALS
-from rigtwin.components import KINDS, find
 from tests.helpers.twin import RIG, evidence_of, recorded
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 
 from controllers import Compensator, Settings
-from controllers.friction import ERRORS, HISTORY, NO_ERRORS, NO_VELOCITIES, REST, expected, observed, pushed, risen, stepped
+from controllers.friction import (
+    ERRORS,
+    HISTORY,
+    NO_ERRORS,
+    NO_VELOCITIES,
+    REST,
+    expected,
+    observed,
+    pushed,
+    risen,
+    stepped,
+)
 from rigtwin.signals.noise import rms
 
 PERIOD = 1e-3

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from numba import njit
 
-from rigtwin.components.gas_spring import GasSpring, charged, designed, equilibrium, spring_force, stiffness
+from rigtwin.components.gas_spring import (
+    GasSpring,
+    charged,
+    designed,
+    equilibrium,
+    spring_force,
+    stiffness,
+)
 from rigtwin.errors import RigtwinError
 
 SPRING = GasSpring(167_285.0, 0.673, 1.4)

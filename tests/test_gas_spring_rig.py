@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from experiments import find
 from experiments.thesis.trial import trial
-from rigtwin.diagnosis.compare import compare, configuration_of
 from rigtwin.description.configuration import Configuration
+from rigtwin.diagnosis.compare import compare, configuration_of
 from rigtwin.models.quarter_car import Reduced
 from rigtwin.recording import load
 from rigtwin.simulation.ideal import ideal

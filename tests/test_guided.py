@@ -7,13 +7,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from rigtwin.models.replaying import Setup, predictor
 
 from rigtwin.components import Guide, PositionActuator
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import followed
 from rigtwin.models.guided import Inertia, carried, limits, slid
-from rigtwin.models.replaying import Setup, predictor
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smoothed
 from tests.helpers.described import described, recording_of

@@ -9,8 +9,8 @@ import pytest
 
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
-from rigtwin.errors import RigtwinError
 from rigtwin.description.configuration import Configuration, Timing, from_assignments
+from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import Block, run, run_compiled

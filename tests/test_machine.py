@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigtwin.description.setting import from_assignments, nominal, overridden, without
+from rigtwin.diagnosis.trials import searched, trials
 
 from rigtwin.cli import main
 from rigtwin.components import RigPlant
-from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.fit import possible
-from rigtwin.diagnosis.trials import searched, trials
-from rigtwin.description.document import examined, load
 from rigtwin.components import find as effect_of
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.setting import from_assignments, nominal, overridden, without
+from rigtwin.description.document import examined, load
+from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.fit import possible
 from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
@@ -72,6 +72,7 @@ def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
 @pytest.mark.parametrize("name", [name for name in shipped() if name != "suspension-rig"])
 def test_every_effect_of_a_machine_can_be_searched_for(name):
     from rigtwin.diagnosis.joint_trials import Scales
+
     from rigtwin.diagnosis.swing import SHARES, Swing
 
     machine = find(name)

@@ -11,10 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, dlsim
 
 from experiments import EXPERIMENTS
+from rigtwin.components import Carriage, Motor, Rail, RigPlant, Tyre
 from rigtwin.components.cylinder import continuous
-from rigtwin.components import Carriage, Motor, RigPlant, Rail, Tyre
-from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.description.configuration import Configuration
+from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
 from tests.helpers.reference import coulomb_carriage
 

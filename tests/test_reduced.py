@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rigtwin.diagnosis.trials import TRIALS, trials
 
 from experiments import EXPERIMENTS
-from rigtwin.components import RigPlant
+from rigtwin.components import Effect, RigPlant, candidates
+from rigtwin.description.catalogue import find as machine_of
+from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.diagnosis.trials import TRIALS, trials
-from rigtwin.description.configuration import Configuration, Safety
-from rigtwin.components import Effect, candidates
-from rigtwin.description.catalogue import find as machine_of
 from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled

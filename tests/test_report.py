@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from rigtwin.description.configuration import Configuration, from_toml, overridden
+from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.report import bars, html, plots
-from rigtwin.description.configuration import Configuration, from_toml, overridden
-from rigtwin.description.posterior import load_posterior
 from tests.helpers.browser import BROWSER, looked_at
 from tests.helpers.recordings import replace_sensors
 from tests.helpers.twin import answer, recorded

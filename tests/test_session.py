@@ -16,16 +16,24 @@ import pytest
 
 from controllers import Measurements
 from rigtwin.cli import main
+from rigtwin.description.configuration import Configuration, from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.calibration import FORCE, at_rest, bumps, responses, signed, spanned, zeroed
+from rigtwin.hardware.daq.calibration import (
+    FORCE,
+    at_rest,
+    bumps,
+    responses,
+    signed,
+    spanned,
+    zeroed,
+)
 from rigtwin.hardware.daq.table import load_table, written
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, machine_lacks, monotonic, sleep_until
 from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
 from rigtwin.hardware.session.plan import planned
 from rigtwin.hardware.session.record import Test, record_in_real_time
-from rigtwin.description.configuration import Configuration, from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 

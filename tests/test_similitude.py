@@ -11,7 +11,15 @@ from controllers import Settings
 from controllers.quantity import Quantity, fields
 from experiments.thesis import similitude as study
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.similitude import Dimension, dimension, largest_change, pi_groups, scale_values, scaling, slow_down
+from rigtwin.studies.similitude import (
+    Dimension,
+    dimension,
+    largest_change,
+    pi_groups,
+    scale_values,
+    scaling,
+    slow_down,
+)
 
 BASES = ("kg", "m", "s")
 QUARTER_CAR = {"mass": "kg", "stiffness": "N/m", "damping": "Ns/m", "stroke": "m", "gravity": "m/s^2", "time": "s"}

@@ -18,7 +18,14 @@ from rigtwin.errors import RigtwinError
 from rigtwin.studies.stability.critical import critical_delay, critical_lag
 from rigtwin.studies.stability.delayed import rightmost_delay_root
 from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, Setting, mode
-from rigtwin.studies.stability.loop import LOOPS, bound, delay_function, lag_polynomial, lag_roots, single_mass
+from rigtwin.studies.stability.loop import (
+    LOOPS,
+    bound,
+    delay_function,
+    lag_polynomial,
+    lag_roots,
+    single_mass,
+)
 from rigtwin.studies.stability.mapping import Axis, around, draw, stability_map
 from rigtwin.studies.stability.models import (
     MODELS,

@@ -15,6 +15,7 @@ import pytest
 from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
+from rigtwin.description.configuration import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
@@ -25,7 +26,6 @@ from rigtwin.hardware.faults.processes import tried as tried_apart
 from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
-from rigtwin.description.configuration import from_assignments
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 from rigtwin.simulation.safety import Trip

@@ -6,7 +6,12 @@ from collections import Counter
 
 import pytest
 
-from experiments.thesis import quarter_car_stability, root_loci, single_mass_stability, vehicles_stability
+from experiments.thesis import (
+    quarter_car_stability,
+    root_loci,
+    single_mass_stability,
+    vehicles_stability,
+)
 from experiments.thesis.entry import Entry, share
 from experiments.thesis.loci import drawing, of_damping_ratio, of_wheel_mass
 

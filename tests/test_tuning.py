@@ -18,9 +18,9 @@ from experiments import EXPERIMENTS
 from experiments import find as experiment
 from experiments.tuning import STUDIES, find_study
 from rigtwin.cli import main
-from rigtwin.errors import RigtwinError
 from rigtwin.description.configuration import Configuration, from_toml, overridden
 from rigtwin.description.posterior import Otherwise, Posterior, load_posterior, written
+from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here

@@ -5,13 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 from experiments import EXPERIMENTS
+from rigtwin.description.catalogue import find as machine_of
+from rigtwin.description.configuration import Configuration, applied
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.next_test import tried
-from rigtwin.description.configuration import Configuration
-from rigtwin.description.configuration import applied
-from rigtwin.description.catalogue import find as machine_of
 from rigtwin.recording import Recording
 
 RIG = machine_of("suspension-rig")
