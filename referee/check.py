@@ -105,14 +105,14 @@ def answer(files: Files) -> dict[str, Any]:
     from rigtwin.description.configuration import Configuration
     from rigtwin.description.catalogue import find
     from rigtwin.recording import load
-    from rigtwin.recording.channels import SUSPENSION_RIG
+    from rigtwin.recording.channels import DEFAULT_MACHINE
 
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         names = ("recording.mcap", "held-out.mcap")
         for name, content in zip(names, files, strict=True):
             (Path(folder) / name).write_bytes(content)
         recording, held_out = (load(Path(folder) / name) for name in names)
-        return module.diagnose(find(SUSPENSION_RIG), [recording], Configuration(), [held_out]).diagnosis.document()
+        return module.diagnose(find(DEFAULT_MACHINE), [recording], Configuration(), [held_out]).diagnosis.document()
 
 
 def named(content: bytes) -> str:

@@ -12,7 +12,7 @@ from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.description.catalogue import find
 from rigtwin.recording import load
-from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.signals.noise import white_noise
 from rigtwin.simulation.runner import simulated, unlimited
 
@@ -29,7 +29,7 @@ NO_SIZES = Scales(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 def black_box(path: Path) -> str:
     """The effect whose closed loop comes nearest to a recording tick by tick, or `none`."""
     recording = load(path)
-    machine = find(SUSPENSION_RIG)
+    machine = find(DEFAULT_MACHINE)
     configuration = machine.configuration_of(recording)
     ticks = min(recording.ticks, round(SECONDS / recording.period))
     free = unlimited(configuration._replace(timing=configuration.timing._replace(timestep=0.5 * recording.period)))

@@ -115,14 +115,14 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     from rigtwin.description.configuration import Configuration
     from rigtwin.description.catalogue import find
     from rigtwin.recording import load
-    from rigtwin.recording.channels import SUSPENSION_RIG
+    from rigtwin.recording.channels import DEFAULT_MACHINE
 
     truth, _, random = draw_rig(*case)
     law, demands = asked("imposed", random)
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "recording.mcap"
         write(path, law, *run(truth, law, demands, random))
-        outcome = diagnose(find(SUSPENSION_RIG), [load(path)], Configuration())
+        outcome = diagnose(find(DEFAULT_MACHINE), [load(path)], Configuration())
     return outcome.diagnosis.sentence, toml(outcome)
 
 

@@ -6,19 +6,28 @@ The commands of the command line call these functions and nothing else.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.components import Effect
 from rigtwin.description import catalogue
-from rigtwin.description.configuration import Configuration, applied, overridden
+from rigtwin.description.configuration import (
+    Changes,
+    Configuration,
+    applied,
+    parameters,
+    with_changes,
+)
 from rigtwin.description.configuration import without as take_out
 from rigtwin.description.machine import Machine, Structure
-from rigtwin.diagnosis.compare import Comparison
+from rigtwin.diagnosis.compare import Comparison, differences
 from rigtwin.diagnosis.compare import compare as compare_with_twin
+from rigtwin.diagnosis.compare import compare_recordings as find_differences
+from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
@@ -29,9 +38,11 @@ from rigtwin.render.video import film
 from rigtwin.simulation.experiment import Demands, Experiment, experiments_of, find_experiment
 from rigtwin.simulation.loop import TickController
 from rigtwin.simulation.runner import record
+from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
-Settings = Mapping[str, Mapping[str, Any]]
-"""Group → name → value: {"rail": {"coulomb": 60}, "timing": {"duration": 5}}."""
+Settings = Changes | Sequence[Changes]
+"""Group → name → value, {"rail": {"coulomb": 60}, "timing": {"duration": 5}}; or the path of a TOML file that holds them; or
+several of these, one over the other."""
 Effects = Mapping[str, float | Mapping[str, float]] | Sequence[str]
 """Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect` takes."""
 Demanding = Callable[[Configuration, int], Demands]
@@ -49,7 +60,14 @@ class Recording(reader.Recording):
     """
 
     described: Machine | None = field(default=None, repr=False)
-    """The machine that it is of, where it was made by `run`."""
+    """The machine that it is of, where it was said."""
+    report: tuple[str, ...] = field(default=(), repr=False)
+    """What was found in the data that it was made of, where it was imported."""
+
+    @property
+    def tripped(self) -> bool:
+        """Whether a limit ended the test."""
+        return self.end.startswith("trip")
 
     def plot(self, out: str | Path, start: float = 0.0, until: float | None = None) -> Path:
         """Draws it.
@@ -99,20 +117,22 @@ class Recording(reader.Recording):
         return {name: known[name] for name in self.channels if name in known}
 
 
-def load(path: str | Path) -> Recording:
+def load(path: str | Path, of: Machine | str | Path | None = None) -> Recording:
     """Reads a recording.
 
     Parameters
     ----------
     path
         Of an MCAP file, whoever wrote it.
+    of
+        The machine, or its name or description; by default the one that the recording names.
 
     Raises
     ------
     RigtwinError
         If it is no recording, is empty, or is of a format that this version does not read.
     """
-    return _faced(reader.load(Path(path)), None)
+    return _faced(reader.load(Path(path)), machine(of) if isinstance(of, str | Path) else of)
 
 
 def _faced(plain: reader.Recording, described: Machine | None) -> Recording:
@@ -151,7 +171,7 @@ def machine_of(recording: reader.Recording) -> Machine:
         known = ", ".join(catalogue.shipped())
         raise RigtwinError(
             f"{recording.path}: it is of machine {recording.machine!r}; give its description, "
-            f"machine=\"F.toml\" or --machine F.toml (shipped ones: {known})"
+            f'machine="F.toml" or --machine F.toml (shipped ones: {known})'
         )
     return catalogue.find(recording.machine)
 
@@ -186,7 +206,7 @@ def run(
     *,
     seed: int = 0,
     effects: Effects = (),
-    settings: Settings | None = None,
+    settings: Settings = (),
     controller: TickController | Callable[..., Any] | None = None,
     path: str | Path | None = None,
     progress: Callable[[int], object] = lambda _ticks: None,
@@ -222,9 +242,11 @@ def run(
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
     test = _experiment(on, experiment)
-    configuration = overridden(test.configuration, settings or {})
+    configuration = with_changes(test.configuration, settings)
     if path is not None:
-        _record(Path(path), on, test, configuration, seed, effect_texts(effects), controller, progress)
+        _record(
+            Path(path), on, test, configuration, seed, effect_texts(effects), controller, progress
+        )
         return _faced(reader.load(Path(path)), on)
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         kept = Path(folder) / f"{test.name}-{seed}.mcap"
@@ -251,7 +273,7 @@ def _record(
     controller: TickController | Callable[..., Any] | None,
     progress: Callable[[int], object],
 ) -> None:
-    tick = getattr(controller, "tick", controller)
+    tick: Any = getattr(controller, "tick", controller)
     demands = test.demands(configuration, seed)
     if on.structure is Structure.QUARTER_CAR:
         record(
@@ -276,7 +298,7 @@ def diagnose(
     *,
     machine: Machine | str | Path | None = None,
     held_out: reader.Recording | Sequence[reader.Recording] = (),
-    settings: Settings | None = None,
+    settings: Settings = (),
     without: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Diagnosis:
@@ -327,7 +349,7 @@ def compare(
     recording: reader.Recording,
     *,
     machine: Machine | str | Path | None = None,
-    settings: Settings | None = None,
+    settings: Settings = (),
     effects: Effects = (),
     progress: Callable[[str], object] = lambda _replay: None,
 ) -> Comparison:
@@ -357,6 +379,57 @@ def compare(
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 
 
+def compare_recordings(
+    first: reader.Recording, second: reader.Recording
+) -> tuple[dict[str, Residual], tuple[str, ...]]:
+    """Two recordings of one test, sensor by sensor.
+
+    Parameters
+    ----------
+    first, second
+        Of one machine.
+
+    Returns
+    -------
+    What they differ by, by sensor; and what was not the same in the tests, a line each.
+
+    Raises
+    ------
+    RigtwinError
+        If their periods differ or they share no sensor.
+    """
+    return find_differences(machine_of(first), first, second), differences(first, second)
+
+
+def calibrate(recording: reader.Recording) -> Calibration:
+    """The friction compensator's settings that a recording of the suspension rig asks for.
+
+    Parameters
+    ----------
+    recording
+        Made without compensation, that reverses often, such as `friction-road`.
+
+    Raises
+    ------
+    RigtwinError
+        If the data are unfit, or a compensator found from them would do harm.
+    """
+    of = machine_of(recording)
+    if of.structure is not Structure.QUARTER_CAR:
+        raise RigtwinError(
+            f"{recording.path}: it is of machine {of.name!r}; expected {Structure.QUARTER_CAR.value}"
+        )
+    configuration = of.configuration_of(recording)
+    require_fit(of, recording, configuration)
+    found = find_compensator(recording, configuration.controller)
+    if found.detected < 0.8 * found.reversals or found.false > 0.1 * found.reversals:
+        raise RigtwinError(
+            f"{recording.path}: a compensator found from it would do harm; record a test that "
+            "reverses often, such as friction-road, without compensation"
+        )
+    return found
+
+
 def _several(given: reader.Recording | Sequence[reader.Recording]) -> Iterator[reader.Recording]:
     if isinstance(given, reader.Recording):
         yield given
@@ -372,7 +445,7 @@ def _described(recording: reader.Recording, given: Machine | str | Path | None) 
 
 def twin_of(
     of: Machine,
-    settings: Settings | None = None,
+    settings: Settings = (),
     taken_out: Sequence[str] = (),
     effects: Sequence[str] = (),
 ) -> Configuration:
@@ -394,14 +467,19 @@ def twin_of(
     RigtwinError
         For any other setting, or an effect that is not there.
     """
-    changes = settings or {}
-    for group, values in changes.items():
-        if group not in (*of.plant._fields, "controller") and set(values) - {"timestep"}:
+    base = with_changes(of.configuration, settings)
+    for (key, value, _), (_, described, _) in zip(
+        parameters(base), parameters(of.configuration), strict=True
+    ):
+        group, _, name = key.partition(".")
+        own = group in of.plant._fields or (
+            group == "controller" and of.structure is Structure.JOINTS
+        )
+        if value != described and not own and (group, name) != ("timing", "timestep"):
             raise RigtwinError(
-                f"{group}: a comparison changes the plant and timing.timestep only; "
+                f"{key}: a comparison changes the plant and timing.timestep only; "
                 "all other settings are the recording's own"
             )
-    base = overridden(of.configuration, changes)
     for name in taken_out:
         base = take_out(base, name)
     return applied(base, effects)
@@ -424,6 +502,5 @@ def import_data(data: str | Path, mapping: str | Path, out: str | Path) -> Recor
     RigtwinError
         Naming the column, unit or line that is at fault.
     """
-    for _ in convert(Path(data), Path(mapping), Path(out)):
-        pass
-    return load(out)
+    report = convert(Path(data), Path(mapping), Path(out))
+    return replace(load(out), report=tuple(report))

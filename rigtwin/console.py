@@ -6,7 +6,7 @@ import json
 import math
 import os
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,13 @@ def configured(configuration: Configuration, parsed: Namespace) -> Configuration
     if parsed.config is not None:
         configuration = from_toml(configuration, parsed.config)
     return from_assignments(configuration, parsed.set)
+
+
+def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
+    """The changes of `--set`. Raises RigtwinError for what is none."""
+    from rigtwin.description.configuration import assigned
+
+    return list(assigned(texts))
 
 
 def apart(out: Path, *inputs: Path) -> Path:
@@ -78,5 +85,13 @@ def finite(document: object) -> object:
 def write_json(path: Path, document: object) -> None:
     try:
         path.write_text(json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
+    except OSError as error:
+        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a file. Raises RigtwinError if it cannot."""
+    try:
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None

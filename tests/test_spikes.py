@@ -15,7 +15,7 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.runner import record
-from rigtwin.studies.friction_spikes import BOUNDS, calibrated, filter_lag, reversals
+from rigtwin.studies.friction_spikes import BOUNDS, find_compensator, filter_lag, reversals
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def recording(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def calibration(recording):
-    return calibrated(recording, find("friction-road").configuration.controller)
+    return find_compensator(recording, find("friction-road").configuration.controller)
 
 
 def test_reversals_are_where_the_true_velocity_changes_sign(recording):
@@ -67,7 +67,7 @@ def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
 
 
 def test_same_seed_same_settings(recording, calibration):
-    again = calibrated(recording, find("friction-road").configuration.controller)
+    again = find_compensator(recording, find("friction-road").configuration.controller)
     assert again.settings == calibration.settings
     assert np.array_equal(again.envelope, calibration.envelope)
 
@@ -75,16 +75,16 @@ def test_same_seed_same_settings(recording, calibration):
 def test_refuses_what_it_cannot_use(recording, example):
     settings = find("friction-road").configuration.controller
     with pytest.raises(RigtwinError, match="compensator 'observer'; expected 'none'"):
-        calibrated(recording, settings._replace(compensator=Compensator.OBSERVER))
+        find_compensator(recording, settings._replace(compensator=Compensator.OBSERVER))
     with pytest.raises(RigtwinError, match="reverses"):
-        calibrated(dataclasses.replace(example, columns=_still(example)), settings)
+        find_compensator(dataclasses.replace(example, columns=_still(example)), settings)
     columns = {topic: {name: values.copy() for name, values in channels.items()} for topic, channels in example.columns.items()}
     columns["/sensor"]["load_cell"][7] = np.nan
     with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are no numbers"):
-        calibrated(dataclasses.replace(example, columns=columns), settings)
+        find_compensator(dataclasses.replace(example, columns=columns), settings)
     columns["/sensor"]["load_cell"] = filter_lag(186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period)
     with pytest.raises(RigtwinError, match="no dry friction"):
-        calibrated(dataclasses.replace(example, columns=columns), settings)
+        find_compensator(dataclasses.replace(example, columns=columns), settings)
 
 
 def _still(recording):

@@ -33,7 +33,7 @@ from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.runner import record, simulated
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.friction_spikes import BOUNDS, Calibration, calibrated, detections, filter_lag
+from rigtwin.studies.friction_spikes import BOUNDS, Calibration, find_compensator, detections, filter_lag
 
 LOOPS: dict[str, dict[str, float]] = {"fitted": {"kp": 1.0, "ki": 190.0}, "nominal": {"kp": 0.3, "ki": 10.0}}
 """Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows Table 3.5, `fitted` those with
@@ -86,7 +86,7 @@ def calibration(loop: str) -> tuple[Calibration, dict[str, float]]:
         path = Path(folder) / "friction-road.mcap"
         demands = experiment.demands(configuration, CALIBRATION_SEED)
         record(path, "friction-road", configuration, demands, CALIBRATION_SEED)
-        found = calibrated(load(path), configuration.controller)
+        found = find_compensator(load(path), configuration.controller)
     return found, {name: float(getattr(found.settings, name)) for name in (*BOUNDS, "friction_step")}
 
 

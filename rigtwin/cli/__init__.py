@@ -7,9 +7,9 @@ import io
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from keyword import iskeyword
+from types import ModuleType
 
-from rigtwin.cli.arguments import diagnosing, recordings, studying, testing
-from rigtwin.cli.arguments.shared import added
 from rigtwin.errors import RigtwinError
 
 OVERVIEW = """\
@@ -29,14 +29,46 @@ your own machine: docs/tutorial.md
 """
 
 
+COMMANDS = (
+    "list",
+    "run",
+    "session",
+    "card",
+    "faults",
+    "effects",
+    "info",
+    "plot",
+    "video",
+    "export",
+    "import",
+    "calibrate",
+    "compare",
+    "diagnose",
+    "machines",
+    "machine",
+    "blindcheck",
+    "reproduce",
+    "tune",
+    "stability",
+)
+"""In the order of the help; each has a module of its name here."""
+
+
+def _module(command: str) -> ModuleType:
+    return import_module(f"rigtwin.cli.{command}{'_' if iskeyword(command) else ''}")
+
+
 def _parser() -> argparse.ArgumentParser:
-    top = argparse.ArgumentParser(
-        prog="rigtwin", description=OVERVIEW, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    form = argparse.RawDescriptionHelpFormatter
+    top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=form)
     top.add_argument("--version", action="store_true", help="print the version and stop")
-    command = added(top.add_subparsers(dest="command", metavar="command"))
-    for group in (testing, recordings, diagnosing, studying):
-        group.add(command)
+    commands = top.add_subparsers(dest="command", metavar="command")
+    for name in COMMANDS:
+        module = _module(name)
+        about = f"{module.SUMMARY}.\n\n{module.MORE}"
+        module.add_arguments(
+            commands.add_parser(name, help=module.SUMMARY, description=about, formatter_class=form)
+        )
     return top
 
 
@@ -55,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if parsed.command is None:
         parser.error("a command is missing; rigtwin --help lists them")
     try:
-        return import_module("rigtwin.cli.commands").COMMANDS[parsed.command](parsed)
+        return _module(parsed.command).execute(parsed)
     except RigtwinError as error:
         print(f"rigtwin: {' '.join(str(error).split())}", file=sys.stderr)
         return 1

@@ -242,9 +242,25 @@ KINDS = (
             **_each(_offset, *DESCRIBED_SENSORS, PositionActuator),
         },
     ),
-    Kind("hum", "mains hum", ("hum",), "amplitude of the mains line", _each(None, *DECLARED, *DESCRIBED_SENSORS)),
-    Kind("noise", "white noise", ("white",), "white noise, rms", _each(None, *DECLARED, *DESCRIBED_SENSORS)),
     Kind(
-        "quantisation", "quantisation", ("resolution",), "size of one bit", _each(None, *DECLARED, *DESCRIBED_SENSORS)
+        "hum",
+        "mains hum",
+        ("hum",),
+        "amplitude of the mains line",
+        _each(None, *DECLARED, *DESCRIBED_SENSORS),
+    ),
+    Kind(
+        "noise",
+        "white noise",
+        ("white",),
+        "white noise, rms",
+        _each(None, *DECLARED, *DESCRIBED_SENSORS),
+    ),
+    Kind(
+        "quantisation",
+        "quantisation",
+        ("resolution",),
+        "size of one bit",
+        _each(None, *DECLARED, *DESCRIBED_SENSORS),
     ),
 )

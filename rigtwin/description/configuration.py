@@ -283,6 +283,23 @@ def from_assignments(configuration: Configuration, assignments: Sequence[str]) -
     return configuration
 
 
+Changes = Mapping[str, Mapping[str, object]] | str | Path
+"""Group → name → value, or the path of a TOML file that holds them."""
+
+
+def with_changes(
+    configuration: Configuration, changes: Changes | Sequence[Changes]
+) -> Configuration:
+    """The configuration with changes, or with several, one over the other. Raises RigtwinError for any that is not allowed."""
+    if isinstance(changes, str | Path):
+        return from_toml(configuration, Path(changes))
+    if isinstance(changes, Mapping):
+        return overridden(configuration, changes)
+    for each in changes:
+        configuration = with_changes(configuration, each)
+    return configuration
+
+
 def at_effect(
     configuration: Configuration, effect: Effect, values: Mapping[str, float]
 ) -> Configuration:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -85,7 +86,7 @@ class FormulaControl:
     inputs: Mapping[str, Channel]
     exact: float | None = None
 
-    @property
+    @cached_property
     def settings(self) -> Any:
         values = self.formula.settings
         return settings_of(values, "the description") if values else Nothing()

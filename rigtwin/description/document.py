@@ -142,7 +142,9 @@ class _Reader:
                     self._mistakes.number(f"{where} {key}", table[key], low, high)
             demands = table.get("demands")
             if not isinstance(demands, Mapping) or not demands:
-                self._mistakes.note(where, "demands is missing; expected CHANNEL = \"formula of time\"")
+                self._mistakes.note(
+                    where, 'demands is missing; expected CHANNEL = "formula of time"'
+                )
                 continue
             for channel, text in demands.items():
                 try:
@@ -151,7 +153,9 @@ class _Reader:
                     self._mistakes.note(f"{where} demands.{channel}", str(error))
                     continue
                 if set(inputs) - {"time"}:
-                    self._mistakes.note(f"{where} demands.{channel}", f"{text!r}: expected a formula of time alone")
+                    self._mistakes.note(
+                        f"{where} demands.{channel}", f"{text!r}: expected a formula of time alone"
+                    )
         return given
 
     def _table(

@@ -162,7 +162,9 @@ class Machine:
     @property
     def units(self) -> dict[str, str]:
         """Channel, as `/topic.field`, → unit, of the components' channels."""
-        return {".".join(c.channel): c.unit for c in self.components.values() if c.channel is not None}
+        return {
+            ".".join(c.channel): c.unit for c in self.components.values() if c.channel is not None
+        }
 
     def form_of(self, row: Row) -> float:
         """Share of a signal that no model is held to."""

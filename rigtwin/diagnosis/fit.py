@@ -378,7 +378,7 @@ class Fitter:
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
         return fit
 
-    def _shaken(self, fit: Fit, space: Space, base: Plant | None) -> Fit:
+    def _shaken(self, fit: Fit, space: Space, base: Plant) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
         Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):

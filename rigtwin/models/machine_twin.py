@@ -30,7 +30,11 @@ def demanded_channels(machine: Machine) -> list[Channel]:
     found: list[Channel] = []
     for replay in machine.replays:
         mover = machine.components[replay.moved_by[0]]
-        own = {c.channel for c in machine.components.values() if c.joint == replay.joint.name and c.element == "sensor"}
+        own = {
+            c.channel
+            for c in machine.components.values()
+            if c.joint == replay.joint.name and c.element == "sensor"
+        }
         if replay.closed and machine.control is not None:
             found += [channel for channel in machine.control.channels if channel not in own]
         elif mover.channel is not None:
@@ -91,16 +95,21 @@ def run_machine(
     period = configuration.timing.period
     with Writer(path, experiment, period, told, machine.name, fields) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
-        tables = {topic.strip("/"): np.column_stack(list(names.values())) for topic, names in columns.items()}
+        tables = {
+            topic.strip("/"): np.column_stack(list(names.values()))
+            for topic, names in columns.items()
+        }
         for first in range(0, ticks, BLOCK):
-            writer.append(**{topic: table[first : first + BLOCK] for topic, table in tables.items()})
+            writer.append(
+                **{topic: table[first : first + BLOCK] for topic, table in tables.items()}
+            )
         writer.finish(FINISHED)
     return RunResult(path, ticks, FINISHED, False)
 
 
 BLOCK = 250
 """Ticks that are written at a time."""
-FINISHED = "finished"
+FINISHED = "completed"
 
 
 def _demanded(machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]) -> Columns:
@@ -108,20 +117,28 @@ def _demanded(machine: Machine, wanted: Sequence[Channel], demands: Mapping[str,
     names = {f"{topic}.{name}" for topic, name in wanted} | {name for _, name in wanted}
     if unknown := [name for name in demands if name not in names]:
         there = ", ".join(name for _, name in wanted)
-        raise RigtwinError(f"{machine.name}: nothing takes the demand {unknown[0]!r}; there are {there}")
+        raise RigtwinError(
+            f"{machine.name}: nothing takes the demand {unknown[0]!r}; there are {there}"
+        )
     lengths = set()
     for topic, name in wanted:
         given = demands.get(f"{topic}.{name}", demands.get(name))
         if given is None:
             there = ", ".join(name for _, name in wanted)
-            raise RigtwinError(f"{machine.name}: no demand for {topic}.{name}; a test gives {there}")
+            raise RigtwinError(
+                f"{machine.name}: no demand for {topic}.{name}; a test gives {there}"
+            )
         values = np.asarray(given, float)
         if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
-            raise RigtwinError(f"{machine.name}: demand {name}: expected finite numbers, one a tick")
+            raise RigtwinError(
+                f"{machine.name}: demand {name}: expected finite numbers, one a tick"
+            )
         lengths.add(len(values))
         columns.setdefault(topic, {})[name] = values
     if len(lengths) > 1:
-        raise RigtwinError(f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} ticks; expected one length")
+        raise RigtwinError(
+            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} ticks; expected one length"
+        )
     return columns
 
 
@@ -138,13 +155,19 @@ def _simulate(
     period, plant = configuration.timing.period, configuration.plant
     mover = machine.components[replay.moved_by[0]]
     assert mover.channel is not None
-    output = mover.channel[1] if mover.element == "actuator" and (replay.closed or controller is not None) else None
+    output = (
+        mover.channel[1]
+        if mover.element == "actuator" and (replay.closed or controller is not None)
+        else None
+    )
     if output is not None:
         columns.setdefault("/command", {})[output] = np.zeros(ticks)
     sensors = [
         (name, component.channel)
         for name, component in machine.components.items()
-        if component.element == "sensor" and component.joint == replay.joint.name and component.channel is not None
+        if component.element == "sensor"
+        and component.joint == replay.joint.name
+        and component.channel is not None
     ]
     made = {topic: dict(names) for topic, names in columns.items()}
     for _, (topic, name) in sensors:
@@ -159,7 +182,9 @@ def _simulate(
     else:
         moved = model.moved(plant)
     if not np.isfinite(moved).all() or np.max(np.abs(moved[:2])) >= RUNAWAY:
-        raise RigtwinError(f"{machine.name}: joint {replay.joint.name} runs away; the loop is not stable")
+        raise RigtwinError(
+            f"{machine.name}: joint {replay.joint.name} runs away; the loop is not stable"
+        )
     if output is not None:
         columns["/command"][output] = moved[3]
     for name, (topic, field) in sensors:
@@ -173,8 +198,12 @@ def _simulate(
         columns.setdefault(topic, {})[field] = reading
 
 
-def _noise(plant: Plant, name: str, ticks: int, period: float, random: np.random.Generator) -> Array:
+def _noise(
+    plant: Plant, name: str, ticks: int, period: float, random: np.random.Generator
+) -> Array:
     sensor = getattr(plant, name)
     phase = random.uniform(0.0, 2.0 * np.pi)
-    hum = sensor.hum * np.sin(2.0 * np.pi * plant.mains.frequency * period * np.arange(ticks) + phase)
+    hum = sensor.hum * np.sin(
+        2.0 * np.pi * plant.mains.frequency * period * np.arange(ticks) + phase
+    )
     return sensor.white * random.standard_normal(ticks) + hum

@@ -72,7 +72,9 @@ class MujocoModel(JointModel):
     def carry(self, plant: Plant, signal: Array) -> Array:
         """The joint under a prescribed motion, shape (4, ticks) as `moved`. signal: what an ideal sensor that moves it would
         read, shape (ticks,)."""
-        position = np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        position = (
+            np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        )
         self.read = {}
         return self._carried(plant, position, 0.0)
 

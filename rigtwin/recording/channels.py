@@ -18,8 +18,8 @@ class Channel:
     meaning: str
 
 
-SUSPENSION_RIG = "suspension-rig"
-"""The machine of the channel table."""
+DEFAULT_MACHINE = "suspension-rig"
+"""Of recordings and commands that name none."""
 CHANNELS = (
     Channel("/command", "ground", "m", "ground cylinder position demanded"),
     Channel("/command", "structure", "m", "structure cylinder position demanded"),

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
+from rigtwin.recording.channels import DEFAULT_MACHINE, topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -151,7 +151,7 @@ def load(path: Path) -> Recording:
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period, machine = _period(path, about), about.get("machine", SUSPENSION_RIG)
+    period, machine = _period(path, about), about.get("machine", DEFAULT_MACHINE)
     controller = _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
+from rigtwin.recording.channels import DEFAULT_MACHINE, topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -88,7 +88,7 @@ class Writer:
         experiment: str,
         period: float,
         controller: Mapping[str, object],
-        machine: str = SUSPENSION_RIG,
+        machine: str = DEFAULT_MACHINE,
         fields: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
         """period in s; controller: the operator's settings as `config.controller` holds them; fields: of each topic, by default

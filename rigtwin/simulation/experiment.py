@@ -65,7 +65,10 @@ def experiments_of(machine: Machine) -> dict[str, Experiment]:
         if machine.plant == RigPlant():
             return dict(known)
         base = machine.configuration
-        return {name: replace(e, configuration=rebased(e.configuration, base)) for name, e in known.items()}
+        return {
+            name: replace(e, configuration=rebased(e.configuration, base))
+            for name, e in known.items()
+        }
     return {name: _described(machine, name, table) for name, table in machine.experiments.items()}
 
 
@@ -73,7 +76,9 @@ def _described(machine: Machine, name: str, table: Mapping[str, Any]) -> Experim
     base = machine.configuration
     clocks = {key: float(table[key]) for key in ("duration", "period") if key in table}
     timing = base.timing._replace(**clocks)
-    timing = timing._replace(timestep=timing.period / max(1, round(timing.period / base.timing.timestep)))
+    timing = timing._replace(
+        timestep=timing.period / max(1, round(timing.period / base.timing.timestep))
+    )
     demands = {key: str(text) for key, text in table["demands"].items()}
     return Experiment(
         name=name,

@@ -13,7 +13,7 @@ from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, Safety, applied, flattened
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.simulation.loop import Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explained
 from rigtwin.simulation.twin import Twin
@@ -67,7 +67,7 @@ def record(
     progress: Callable[[int], object] = lambda _: None,
     effects: Sequence[str] = (),
     *,
-    machine: str = SUSPENSION_RIG,
+    machine: str = DEFAULT_MACHINE,
     controller: Tick | None = None,
 ) -> RunResult:
     """Runs a test on the twin of a quarter car into a new recording.

@@ -71,6 +71,13 @@ class Calibration:
     false: int
     delay: float
 
+    def toml(self) -> str:
+        """The settings as a TOML file's text, for `--config`."""
+        names = ("friction_step", *BOUNDS)
+        values = [f"{name} = {float(getattr(self.settings, name)):.6g}" for name in names]
+        compensator = f'compensator = "{Compensator.TWO_STEP.label}"'
+        return "\n".join(["[controller]", compensator, *values]) + "\n"
+
 
 @kernel
 def _detect(settings: Settings, travels: Array, errors: Array, period: float, out: Array) -> None:
@@ -191,7 +198,7 @@ def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np
     return found, np.sign(velocity[np.minimum(found + 5, recording.ticks - 1)]), all_of_them[~alone]
 
 
-def calibrated(recording: Recording, settings: Settings, seed: int = 0) -> Calibration:
+def find_compensator(recording: Recording, settings: Settings, seed: int = 0) -> Calibration:
     """Finds the compensator's settings from a recording made without compensation. settings: those
     that it was made with.
 

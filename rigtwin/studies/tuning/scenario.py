@@ -14,7 +14,7 @@ from rigtwin.components import RigPlant
 from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.description.posterior import Changes, Posterior, shifted_within, value_of
-from rigtwin.recording.channels import SUSPENSION_RIG
+from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.studies.tuning.study import Study
 
 APART = 1_000_000
@@ -84,7 +84,7 @@ def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scena
     first : int
         The first one's seed; the others follow.
     """
-    tolerances = find(SUSPENSION_RIG).tolerances if study.variation.tolerances else ()
+    tolerances = find(DEFAULT_MACHINE).tolerances if study.variation.tolerances else ()
 
     def draw(seed: int) -> Scenario:
         random = np.random.default_rng([seed, 3])

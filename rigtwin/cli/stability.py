@@ -14,10 +14,11 @@ RIG_LAG = 0.01
 ROUNDING = 1e-12
 """Of a pole's distance from the origin: a real part within this is none."""
 TABLE_6_2 = "quarter-car"
+SUMMARY = "say whether a vehicle is stable on the rig with its delays, and how much delay it bears"
+MORE = "example:\n  rigtwin stability --vehicle car --tau 0.01"
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of the command."""
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vehicle",
         default=TABLE_6_2,
@@ -63,7 +64,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def stability(parsed: argparse.Namespace) -> int:
+def execute(parsed: argparse.Namespace) -> int:
     """Prints the poles and the critical lag and delay of every model of a vehicle."""
     from rigtwin.studies.stability.mapping import (
         around,

@@ -1,34 +1,23 @@
-"""What the commands about machines do: list them, check a description."""
+"""`rigtwin machine check`: every mistake of a description."""
 
 from __future__ import annotations
 
-from argparse import Namespace
+import argparse
 from pathlib import Path
 
 from rigtwin.console import table
 
-
-def machines(_parsed: Namespace) -> int:
-    from rigtwin.description.catalogue import find, shipped
-
-    rows = [("machine", "title", "components", "observed")]
-    for name in shipped():
-        machine = find(name)
-        rows.append(
-            (
-                name,
-                machine.title,
-                ", ".join(machine.components),
-                ", ".join(row.name for row in machine.rows),
-            )
-        )
-    print(table([(name, title) for name, title, *_ in rows]))
-    for name, _, components, observed in rows[1:]:
-        print(f"\n{name}\n  components  {components}\n  observed    {observed}")
-    return 0
+SUMMARY = "check a machine's description"
+MORE = """\
+rigtwin machine check F.toml explains every mistake in one line each; without any, what will be looked for."""
 
 
-def machine(parsed: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("action", choices=["check"])
+    parser.add_argument("description", type=Path, metavar="F.toml")
+
+
+def execute(parsed: argparse.Namespace) -> int:
     from rigtwin.description.catalogue import shipped
     from rigtwin.description.document import examined
 

@@ -2,31 +2,67 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
-from argparse import Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
+from rigtwin.cli.options import add_workers
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, Workers, open_workers
+
+if TYPE_CHECKING:
+    from rigtwin.studies.sweep import Workers
 
 RIGS = 8
 """Of a check of tuning, unless said."""
 CASES = 200
+SUMMARY = "check the diagnosis on recordings of another rig, whose defects are withheld from it"
+MORE = """\
+A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees
+the files alone; then the key is opened, checked against its digest, and every answer is scored."""
 
 
-def blindcheck(parsed: Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--cases", type=int, help="how many (default 200; of rigs to tune for 8)")
+    parser.add_argument(
+        "--tune",
+        metavar="STUDY",
+        help="instead: is a controller tuned on the diagnosed twin better on the rig itself?",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=2026, help="of the referee's draws (default 2026)"
+    )
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        default=Path("blindcheck"),
+        help="of recordings and answers; a second run goes on",
+    )
+    parser.add_argument(
+        "--baselines", action="store_true", help="also score what cruder methods would have said"
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="F.json", help="also write the scores to a file"
+    )
+    add_workers(parser)
+
+
+def execute(parsed: argparse.Namespace) -> int:
     """Runs the check that was asked for and prints its score."""
     if (parsed.cases is not None and parsed.cases < 1) or parsed.seed < 0:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
+    from rigtwin.studies.sweep import open_workers
+
     if parsed.json is not None:
         writable(parsed.json)
     with open_workers(parsed.workers, parsed.cluster) as workers:
         return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
 
 
-def _diagnoses(parsed: Namespace, workers: Workers) -> int:
+def _diagnoses(parsed: argparse.Namespace, workers: Workers) -> int:
+    from tqdm import tqdm
+
     from referee.check import check
     from referee.score import document, table
 
@@ -40,9 +76,12 @@ def _diagnoses(parsed: Namespace, workers: Workers) -> int:
     return 0
 
 
-def _tuning(parsed: Namespace, workers: Workers) -> int:
+def _tuning(parsed: argparse.Namespace, workers: Workers) -> int:
+    from tqdm import tqdm
+
     from experiments.tuning import find_study
     from referee.tuning import Case, check, document, text
+    from rigtwin.studies.sweep import Store
     from rigtwin.studies.tuning.bench import Bench
 
     study = find_study(parsed.tune)

@@ -1,1 +1,0 @@
-"""What each command takes. Parsing only, so that help is instant."""

@@ -1,0 +1,48 @@
+"""`rigtwin calibrate`: the friction compensator's settings from a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.console import apart, writable, write_text
+
+SUMMARY = "find the friction compensator's settings from a recording"
+MORE = """\
+The recording must be made without compensation and reverse often, such as friction-road.
+
+example:
+  rigtwin calibrate friction.mcap -o compensator.toml
+  rigtwin run friction-road --config compensator.toml"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path)
+    parser.add_argument(
+        "--out", "-o", type=Path, metavar="F.toml", help="where to write them (default: print)"
+    )
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    import rigtwin
+
+    recording = rigtwin.load(parsed.recording)
+    if parsed.out is not None:
+        writable(apart(parsed.out, parsed.recording))
+    for note in recording.notes:
+        print(f"note: {note}")
+    found = rigtwin.calibrate(recording)
+    print(
+        f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, "
+        f"from {found.reversals} reversals"
+    )
+    print(
+        f"tried on the recording: {found.detected} of {found.reversals} reversals detected, "
+        f"{found.false} false steps, {1e3 * found.delay:.0f} ms after the reversal"
+    )
+    if parsed.out is None:
+        print(found.toml(), end="")
+    else:
+        write_text(parsed.out, found.toml())
+        print(f"settings in {parsed.out}, for --config")
+    return 0

@@ -1,0 +1,94 @@
+"""`rigtwin diagnose`: why recordings and the twin disagree."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.cli.options import add_json, add_machine, add_settings, settings_of
+from rigtwin.console import apart, writable, write_json
+
+SUMMARY = "say why recordings of one machine and the twin disagree"
+MORE = """\
+Checks the data, fits every effect that the twin knows, and says which explains the gap, how sure
+that is, where it lies, and how far the gap shrinks on data that were not fitted; or that there is
+no gap, or none that it knows.
+
+examples:
+  rigtwin diagnose rig.mcap --html report.html --save-twin calibrated.toml
+  rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap
+  rigtwin compare rig.mcap --config calibrated.toml"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recordings",
+        type=Path,
+        nargs="+",
+        metavar="recording",
+        help="of one rig, explained together",
+    )
+    add_json(parser, "the answer for other programs")
+    parser.add_argument(
+        "--html", type=Path, metavar="F.html", help="also write a report to look at, one file"
+    )
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="take this out of the twin first, e.g. coulomb@rail",
+    )
+    parser.add_argument(
+        "--held-out",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="recording",
+        help="of the same rig, to judge on",
+    )
+    parser.add_argument(
+        "--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config"
+    )
+    add_machine(parser)
+    add_settings(parser)
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    import rigtwin
+
+    inputs = [*parsed.recordings, *parsed.held_out]
+    for out in (parsed.json, parsed.html, parsed.save_twin):
+        if out is not None:
+            apart(out, *inputs)
+            writable(out)
+    recordings = [rigtwin.load(path, parsed.machine) for path in parsed.recordings]
+    held_out = [rigtwin.load(path, parsed.machine) for path in parsed.held_out]
+    with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
+
+        def progress(stage: str, steps: int) -> None:
+            bar.set_description(stage, refresh=False)
+            bar.update(steps)
+
+        diagnosis = rigtwin.diagnose(
+            recordings,
+            held_out=held_out,
+            settings=settings_of(parsed),
+            without=parsed.without,
+            progress=progress,
+        )
+    # Files first: whoever reads the terminal may stop reading.
+    said = [str(diagnosis)]
+    if parsed.json is not None:
+        write_json(parsed.json, diagnosis.document())
+    if parsed.html is not None:
+        said.append(f"report in {diagnosis.report(parsed.html)}")
+    if parsed.save_twin is not None and diagnosis.verdict != "unusable":
+        twin = diagnosis.save_twin(parsed.save_twin)
+        said.append(f"corrected twin in {twin}; use it with --config")
+    elif parsed.save_twin is not None:
+        said.append(f"{parsed.save_twin} not written: the data cannot be diagnosed")
+    print("\n".join(said))
+    return 1 if diagnosis.verdict == "unusable" else 0

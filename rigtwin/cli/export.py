@@ -1,0 +1,24 @@
+"""`rigtwin export`: a recording for other programs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.console import apart
+
+SUMMARY = "write a recording as CSV or MAT for other programs"
+MORE = ""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path)
+    parser.add_argument("--out", "-o", type=Path, required=True, metavar="F.csv|F.mat")
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    import rigtwin
+
+    recording = rigtwin.load(parsed.recording)
+    print(f"written to {recording.export(apart(parsed.out, parsed.recording))}")
+    return 0

@@ -1,0 +1,32 @@
+"""`rigtwin import`: other programs' data as a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.console import apart, writable
+
+SUMMARY = "make a recording of other programs' data"
+MORE = """\
+A map says which column is which channel, in what unit, and what the time base is;
+docs/tutorial.md explains it.
+
+example:
+  rigtwin import bench.csv --map bench-map.toml -o bench.mcap"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("data", type=Path, metavar="DATA.{csv,mat,parquet}")
+    parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml")
+    parser.add_argument("--out", "-o", type=Path, required=True, metavar="F.mcap")
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    import rigtwin
+
+    apart(parsed.out, parsed.data, parsed.map)
+    writable(parsed.out)
+    for line in rigtwin.import_data(parsed.data, parsed.map, parsed.out).report:
+        print(line)
+    return 0

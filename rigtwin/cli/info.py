@@ -1,0 +1,53 @@
+"""`rigtwin info`: what is in a recording."""
+
+from __future__ import annotations
+
+import argparse
+import textwrap
+from pathlib import Path
+
+from rigtwin.console import late, table
+
+SUMMARY = "say what is in a recording"
+MORE = ""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path)
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    import numpy as np
+
+    import rigtwin
+    from rigtwin.recording.channels import channels_of
+
+    recording = rigtwin.load(parsed.recording)
+    print(f"{recording.path}: {recording.experiment} on {recording.machine}")
+    print(
+        f"{recording.ticks} ticks of {recording.period:g} s, {recording.time[0]:g} to {recording.time[-1]:.3f} s"
+    )
+    print(f"ended: {recording.end or 'not said'}")
+    if recording.twin:
+        print(
+            f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}"
+        )
+    for note in recording.notes:
+        print(f"note: {note}")
+    for step in recording.transitions:
+        print(
+            f"{step.get('time', '?'):>12s} s  {step.get('from')} → {step.get('to')}: {step.get('reason')}"
+        )
+    if recording.lateness:
+        print(late(recording.lateness))
+    rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
+    for channel in channels_of(recording.columns):
+        values = recording.column(channel.topic, channel.name)
+        with np.errstate(over="ignore"):
+            figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
+        rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
+    print(table(rows))
+    if recording.controller:
+        settings = ", ".join(f"{key} {value}" for key, value in recording.controller.items())
+        print(textwrap.fill(f"controller: {settings}", 120, subsequent_indent="  "))
+    return 0

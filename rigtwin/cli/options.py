@@ -1,0 +1,77 @@
+"""Options and output that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rigtwin.console import assigned_settings
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="override one setting, e.g. rail.coulomb=60",
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="F.toml",
+        help="override settings from a TOML file, before --set",
+    )
+
+
+def settings_of(parsed: argparse.Namespace) -> list[Path | Mapping[str, Any]]:
+    """What --config and --set change, in that order."""
+    return [*([parsed.config] if parsed.config else []), *assigned_settings(parsed.set)]
+
+
+def add_effect(parser: argparse.ArgumentParser, summary: str) -> None:
+    parser.add_argument(
+        "--effect", action="append", default=[], metavar="KIND@COMPONENT=VALUE", help=summary
+    )
+
+
+def add_machine(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--machine",
+        metavar="F.toml",
+        help="the machine, by name or description (default: the one that the recording names)",
+    )
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes that work side by side (default: one a core)",
+    )
+    parser.add_argument(
+        "--cluster",
+        metavar="ADDRESS",
+        help="work on a dask cluster instead, e.g. tcp://host:8786",
+    )
+
+
+def add_stretch(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="start at this time (default 0)",
+    )
+    parser.add_argument(
+        "--until", type=float, metavar="S", help="stop at this time (default: the end)"
+    )
+
+
+def add_json(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument("--json", type=Path, metavar="F.json", help=f"also write {what}")

@@ -1,0 +1,112 @@
+"""`rigtwin run`: an experiment on the twin or the rig, into a recording."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.cli.options import add_effect, add_settings, settings_of
+from rigtwin.cli.rig_options import add_supervised
+from rigtwin.console import apart, writable
+from rigtwin.errors import RigtwinError
+from rigtwin.recording.channels import DEFAULT_MACHINE
+
+SUMMARY = "run an experiment on the twin and record it"
+MORE = """\
+examples:
+  rigtwin run drop --out drop.mcap
+  rigtwin run road10 --seed 3 --set controller.kp=0.5 --set timing.duration=10
+  rigtwin run positioning --machine emps --effect coulomb@guide=20
+
+exit code 3: a limit tripped; the recording is kept."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", help="an experiment of rigtwin list")
+    parser.add_argument(
+        "--machine",
+        default=DEFAULT_MACHINE,
+        metavar="F.toml",
+        help=f"whose twin is run, by name or description (default {DEFAULT_MACHINE})",
+    )
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=0,
+        help="of noise and road (default 0); the same seed gives the same bytes",
+    )
+    parser.add_argument(
+        "--out",
+        "-o",
+        type=Path,
+        metavar="F.mcap",
+        help="where to record; replaced if there (default NAME-SEED.mcap, numbered if there)",
+    )
+    add_effect(parser, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
+    add_settings(parser)
+    add_supervised(parser)
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    import rigtwin
+    from rigtwin.description.configuration import with_changes
+    from rigtwin.simulation.experiment import find_experiment
+
+    machine = rigtwin.machine(parsed.machine)
+    experiment = find_experiment(machine, parsed.name)
+    path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
+    if parsed.seed < 0:
+        raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
+    if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
+        return _run_supervised(parsed, path)
+    for option in ("dry_run", "arm", "without_dry_run", "stop_file", "live"):
+        if getattr(parsed, option):
+            needs = "--card or --real-time" if option in ("stop_file", "live") else "--target daq"
+            raise RigtwinError(f"--{option.replace('_', '-')} goes with {needs}")
+    settings = settings_of(parsed)
+    ticks = with_changes(experiment.configuration, settings).ticks
+    shown = {"unit": "tick", "unit_scale": True, "desc": experiment.name, "leave": False}
+    with tqdm(total=ticks, disable=None, **shown) as bar:
+        recording = rigtwin.run(
+            machine,
+            experiment,
+            seed=parsed.seed,
+            effects=parsed.effect,
+            settings=settings,
+            path=path,
+            progress=bar.update,
+        )
+    seconds = recording.ticks * recording.period
+    print(f"{experiment.name}: {seconds:.3f} s recorded in {path}; {recording.end}")
+    return 3 if recording.tripped else 0
+
+
+def _fresh(stem: str) -> Path:
+    """A file name that is not taken."""
+    path, number = Path(f"{stem}.mcap"), 1
+    while path.exists():
+        number += 1
+        path = Path(f"{stem}-{number}.mcap")
+    return path
+
+
+def _run_supervised(parsed: argparse.Namespace, path: Path) -> int:
+    from rigtwin.cli.session_commands import run as work
+    from rigtwin.cli.session_commands import test_of
+
+    if parsed.machine != DEFAULT_MACHINE:
+        raise RigtwinError(f"--card, --real-time and --target daq are of {DEFAULT_MACHINE} alone")
+    if parsed.target == "daq" and parsed.card is None:
+        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
+    if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
+        raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
+    if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
+        raise RigtwinError(
+            "--live goes with a session in real time: --real-time, "
+            "or --target daq without --dry-run"
+        )
+    given = [path for path in (parsed.card, parsed.config) if path is not None]
+    writable(apart(path, *given))
+    return work(parsed, test_of(parsed, parsed.name), path)
