@@ -38,13 +38,14 @@ class Inertia(NamedTuple):
 
 class Loop(NamedTuple):
     """What commands the force actuator: the recording (closed 0), or a controller whose inputs are recorded signals, shape
-    (ticks, inputs), or sensors: sensor[i] is −1 or the number of the sensor that input i comes from."""
+    (ticks, inputs), or sensors with `noise` added, of that shape too: sensor[i] is −1 or the number of the sensor that input i comes from."""
 
     closed: bool
     program: Program
     registers: Array
     memory: Array
     recorded: Array
+    noise: Array
     sensor: np.ndarray
 
 
@@ -118,9 +119,9 @@ def pushed(
                 loop.registers[number] = loop.recorded[tick, number]
                 for each in range(len(sensors)):
                     if each == which:
-                        loop.registers[number] = transduced(
-                            sensors[each], states[each], x if kinds[each] == 0 else v
-                        )
+                        true = x if kinds[each] == 0 else v
+                        sensed = transduced(sensors[each], states[each], true)
+                        loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
             earlier = force

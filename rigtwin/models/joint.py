@@ -199,7 +199,11 @@ class JointModel:
         carried(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
         return out
 
-    def _pushed(self, plant: Plant, mover: ForceActuator, besides: Array) -> Array:
+    def _pushed(
+        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
+    ) -> Array:
+        """The joint under its force actuator. besides: another force on it, N, shape (ticks,); noise: of what a controller reads,
+        shape (ticks, inputs)."""
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * max(inertia.mass, 1e-12) / h**2
@@ -225,7 +229,7 @@ class JointModel:
             models,
             states,
             kinds,
-            self._loop(),
+            self._loop(noise),
             command,
             np.ascontiguousarray(besides),
             self._period,
@@ -235,7 +239,7 @@ class JointModel:
         out[3] = command
         return out
 
-    def _loop(self) -> Loop:
+    def _loop(self, noise: Array | None) -> Loop:
         control = self._control
         if control is None:
             program = NO_COMMAND.program
@@ -244,6 +248,7 @@ class JointModel:
                 program,
                 program.registers.copy(),
                 NO_COMMAND.memory(),
+                np.zeros((1, 1)),
                 np.zeros((1, 1)),
                 np.zeros(0, np.int64),
             )
@@ -260,8 +265,10 @@ class JointModel:
             ]
         )
         recorded = np.ascontiguousarray(recorded[:, 1:])
+        if noise is None:
+            noise = np.zeros_like(recorded)
         return Loop(
-            True, program, program.registers.copy(), control.formula.memory(), recorded, which
+            True, program, program.registers.copy(), control.formula.memory(), recorded, noise, which
         )
 
     def true(self, plant: Plant) -> Array:
@@ -344,20 +351,14 @@ class JointModel:
         if control is None or not self._sensors:
             return None
         sensed = [self._machine.components[name].channel for name in self._sensors]
-        noisy, quiet = [], []
-        for name in control.formula.inputs:
-            channel = control.inputs[name]
-            column = self._recording.column(*channel)
-            quiet.append(column)
-            noisy.append(
-                column + white_noise(column) * random.standard_normal(ticks)
-                if channel in sensed
-                else column
-            )
-        settings = self._configuration.controller
-        difference = control.replay(settings, noisy, self._period) - control.replay(
-            settings, quiet, self._period
-        )
+        columns = [self._recording.column(*channel) for channel in control.channels]
+        noise = np.zeros((ticks, len(columns)))
+        for number, (channel, column) in enumerate(zip(control.channels, columns, strict=True)):
+            if channel in sensed:
+                noise[:, number] = white_noise(column) * random.standard_normal(ticks)
+        mover = getattr(plant, self._mover.name)
+        disturbed = self._pushed(plant, mover, np.zeros(ticks), noise)
         found = np.zeros((len(self.rows), ticks))
-        found[[row.kind == "command" for row in self.rows]] = difference
+        commands = [row.kind == "command" for row in self.rows]
+        found[commands] = disturbed[3] - self.moved(plant)[3]
         return found

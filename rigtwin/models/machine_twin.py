@@ -175,7 +175,7 @@ def _simulate(
     time = np.arange(ticks) * period
     recording = Recording(Path("test"), machine.name, "", period, time, made, {})
     model = MujocoModel(machine, replay, recording, configuration, configuration.substeps)
-    model.noise = {name: _noise(plant, name, ticks, period, random) for name, _ in sensors}
+    model.sensor_noise = {name: _noise(plant, name, ticks, period, random) for name, _ in sensors}
     model.controller = controller
     if mover.element == "sensor":
         moved = model.carry(plant, columns[mover.channel[0]][mover.channel[1]])
@@ -192,7 +192,7 @@ def _simulate(
             reading = model.read[name]
         else:
             row = {PositionSensor: 0, VelocitySensor: 1, ForceSensor: 2}[type(getattr(plant, name))]
-            reading = seen(getattr(plant, name), moved[row], period) + model.noise[name]
+            reading = seen(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
             bit = getattr(plant, name).resolution
             reading = np.round(reading / bit) * bit if bit > 0.0 else reading
         columns.setdefault(topic, {})[field] = reading

@@ -41,7 +41,7 @@ class MujocoModel(JointModel):
 
     read: dict[str, Array]
     """Sensor → what the controller read, after `moved`."""
-    noise: Mapping[str, Array] = {}
+    sensor_noise: Mapping[str, Array] = {}
     """Sensor → what is added to its reading, shape (ticks,)."""
     controller: Tick | None = None
     """What commands the actuator instead of the description's controller."""
@@ -111,7 +111,9 @@ class MujocoModel(JointModel):
             out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
         return out
 
-    def _pushed(self, plant: Plant, mover: ForceActuator, besides: Array) -> Array:
+    def _pushed(
+        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
+    ) -> Array:
         """The joint under its force actuator."""
         h = self._period / self._steps
         model, data, place, at = self._mechanics(plant, h)
@@ -149,8 +151,8 @@ class MujocoModel(JointModel):
             for name, part, each, state in zip(names, parts, models, states, strict=True):
                 true = velocity if isinstance(part, VelocitySensor) else position
                 value = transduced(each, state, true)
-                if name in self.noise:
-                    value += float(self.noise[name][tick])
+                if name in self.sensor_noise:
+                    value += float(self.sensor_noise[name][tick])
                 if part.resolution > 0.0:
                     value = round(value / part.resolution) * part.resolution
                 found[name] = self.read[name][tick] = value
