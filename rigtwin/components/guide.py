@@ -99,6 +99,11 @@ def friction(of: Rail | Motor | Guide) -> Friction:
     return Friction(changing, **values)
 
 
+def friction_size(dry: Friction, load: float) -> float:  # noqa: ARG001
+    """How large dry friction may be, N, under a typical load, N."""
+    return dry.coulomb + abs(dry.stribeck) + 0.5 * abs(dry.asymmetry)
+
+
 def gap_at(position: float) -> Array:
     """State of the backlash: where its element is, m; shape (1,)."""
     return np.array([position])

@@ -15,7 +15,7 @@ from rigtwin.components import (
 )
 from rigtwin.components.conditioning import actuator, holding
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import friction
+from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import fresh, seen, transducer
 from rigtwin.description.configuration import Configuration
@@ -188,16 +188,21 @@ class JointModel:
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
         motion = np.ascontiguousarray(np.stack([position, velocity, acceleration]))
-        size = max(guide.coulomb + abs(guide.stribeck) + 0.5 * abs(guide.asymmetry), 1e-300)
-        softest = max(
-            guide.compliance,
-            ELASTIC * error / size,
-            1e-9 * max(float(np.ptp(position)), 1e-12) / size,
-        )
+        softest = self._softest(guide, inertia, position, acceleration, error)
         out = np.zeros((4, len(position)))
         out[:2] = motion[:2]
         carried(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
         return out
+
+    def _softest(
+        self, guide: Guide, inertia: Inertia, position: Array, acceleration: Array, error: float
+    ) -> float:
+        """Compliance, m/N, over which friction that reverses builds up: no less than what a measured motion's error hides."""
+        carried_load = inertia.mass * acceleration + guide.stiffness * (position - inertia.rest)
+        load = float(np.sqrt(np.mean(carried_load**2)))
+        size = max(friction_size(friction(guide), load), 1e-300)
+        stroke = max(float(np.ptp(position)), 1e-12)
+        return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None

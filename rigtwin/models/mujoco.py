@@ -89,9 +89,7 @@ class MujocoModel(JointModel):
         dry = friction(guide)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
-        size = max(guide.coulomb + abs(guide.stribeck) + 0.5 * abs(guide.asymmetry), 1e-300)
-        stroke = max(float(np.ptp(position)), 1e-12)
-        softest = max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
+        softest = self._softest(guide, inertia, position, acceleration, error)
         out = np.zeros((4, len(position)))
         out[0], out[1] = position, velocity
         slider, viscous = float(position[0]), 0.0

@@ -18,7 +18,7 @@ BODIES = {
 MJCF = """<mujoco model="bench"><option integrator="RK4"/>
 <worldbody><body name="arm">{body}</body></worldbody>
 <actuator><motor name="drive" joint="axis"/></actuator>
-<sensor><jointpos name="encoder" joint="axis"/></sensor></mujoco>
+<sensor><jointpos name="encoder" joint="axis"/><jointactuatorfrc name="cell" joint="axis"/></sensor></mujoco>
 """
 TOML = """
 [machine]
