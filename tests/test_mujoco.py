@@ -36,6 +36,7 @@ SIZES = {
     "drag": 8.0,
     "relaxation": 0.03,
     "cogging": 3.0,
+    "load_friction": 0.3,
     "mass": 3.0,
     "gain": 1.3,
     "lag": 0.03,

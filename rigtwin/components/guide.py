@@ -54,9 +54,11 @@ class Rail(NamedTuple):
 class Guide(NamedTuple):
     """Whatever acts between the moving part and the frame: a guide's friction, a damper, a spring.
 
-    force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v| + stiffness·x + offset
-    + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction. Dry friction acts through a play of `backlash` and a
-    spring of `compliance` in series with it.
+    force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v|
+    + stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
+    is coulomb + load_coefficient·|force transmitted| + stribeck·exp(−(v/stribeck_velocity)²), in
+    positive direction ½·asymmetry more and in negative less, and acts through a play of `backlash`
+    and a spring of `compliance` in series with it.
     """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
@@ -67,6 +69,7 @@ class Guide(NamedTuple):
         float, Quantity("m/s", 1e-6, 100.0, "of the order seen in guides, assumed")
     ] = 0.01
     asymmetry: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
+    load_coefficient: Annotated[float, Quantity("1", 0.0, 2.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 10.0, NONE)] = 0.0
     compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
     offset: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
@@ -89,6 +92,7 @@ class Friction(NamedTuple):
     stribeck: float
     stribeck_velocity: float
     asymmetry: float
+    load_coefficient: float
     backlash: float
 
 
@@ -99,9 +103,10 @@ def friction(of: Rail | Motor | Guide) -> Friction:
     return Friction(changing, **values)
 
 
-def friction_size(dry: Friction, load: float) -> float:  # noqa: ARG001
+def friction_size(dry: Friction, load: float) -> float:
     """How large dry friction may be, N, under a typical load, N."""
-    return dry.coulomb + abs(dry.stribeck) + 0.5 * abs(dry.asymmetry)
+    size = dry.coulomb + abs(dry.stribeck) + 0.5 * abs(dry.asymmetry)
+    return size + dry.load_coefficient * abs(load)
 
 
 def gap_at(position: float) -> Array:
@@ -110,7 +115,7 @@ def gap_at(position: float) -> Array:
 
 
 @compilable
-def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, float]:  # noqa: ARG001
+def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, float]:
     """What dry friction can bear.
 
     Parameters
@@ -126,7 +131,7 @@ def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, floa
     -------
     Greatest forces against positive and against negative motion, N.
     """
-    size = dry.coulomb
+    size = dry.coulomb + dry.load_coefficient * abs(load)
     if dry.stribeck != 0.0:
         ratio = velocity / dry.stribeck_velocity
         size += dry.stribeck * math.exp(-ratio * ratio)
@@ -306,6 +311,13 @@ KINDS = (
             Motor: _rig_asymmetry,
             Guide: around_nominal(_force, (-0.5, -0.1, 0.1, 0.5), 0.005),
         },
+    ),
+    Kind(
+        "load_friction",
+        "load-dependent friction",
+        ("load_coefficient",),
+        "dry friction in proportion to the force that is transmitted",
+        dict.fromkeys((Motor, Guide), fixed_starts((0.01, 0.04, 0.15, 0.4), 0.002)),
     ),
     Kind(
         "backlash",

@@ -24,6 +24,7 @@ class Motor(NamedTuple):
         float, Quantity("m/s", 1e-4, 0.1, "of the order seen in rail guides, assumed")
     ] = 0.01
     asymmetry: Annotated[float, Quantity("N", -500.0, 500.0, NONE)] = 0.0
+    load_coefficient: Annotated[float, Quantity("1", 0.0, 1.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
     gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: the amplifier as specified")] = 1.0
     lag: Annotated[float, Quantity("s", 0.0, 0.1, NONE)] = 0.0
