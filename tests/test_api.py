@@ -1,0 +1,175 @@
+"""What `import rigtwin` offers: the same lines for every machine."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+import rigtwin
+from controllers import Commands, Demand, Measurements
+from tests.helpers.described import TOML, described
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+SHORT = {"timing": {"duration": 3.0}}
+EXPERIMENT = """
+[experiments.shake]
+summary = "to and fro"
+duration = 4.0
+period = 1e-3
+[experiments.shake.demands]
+force = "30 * sin(7 * time) + 12 * sin(17 * time)"
+"""
+NOISY = TOML.replace('channel = "position"', 'channel = "position"\nwhite = 2e-5') + EXPERIMENT
+
+
+def folder_machine(folder: Path) -> rigtwin.Machine:
+    described(folder, "slide", NOISY)
+    return rigtwin.machine(folder / "bench.toml")
+
+
+@pytest.mark.parametrize(
+    ("sort", "experiment", "effect", "magnitude", "channel"),
+    [
+        ("suspension-rig", "imposed", "viscous@motor", 50.0, "/sensor.load_cell"),
+        ("emps", "positioning", "coulomb@guide", 20.0, "/sensor.position"),
+        ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
+    ],
+)
+def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, magnitude, channel):
+    machine = folder_machine(tmp_path) if sort == "folder" else rigtwin.machine(sort)
+    settings = {"timing": {"duration": 6.0}}
+    recording = rigtwin.run(machine, experiment, seed=1, effects={effect: magnitude}, settings=settings)
+    assert recording[channel].shape == recording.time.shape
+    assert recording.units[channel] in ("N", "m")
+    answer = rigtwin.diagnose(recording)
+    assert answer.verdict == "explained"
+    assert [str(each.name) for each in answer.effects] == [effect]
+    found = next(iter(answer.effects[0].parameters.values()))
+    assert found.value == pytest.approx(magnitude, rel=0.03)
+    page = answer.report(tmp_path / "why.html").read_text()
+    assert effect.partition("@")[2] in page
+    assert answer._repr_html_() == page
+    before, after = rigtwin.compare(recording), rigtwin.compare(recording, machine=answer.machine)
+    assert after.gap < 1.1 < before.gap
+    again = rigtwin.run(answer.machine, experiment, settings=SHORT)
+    assert again.video(tmp_path / "again.mp4", until=0.3).stat().st_size > 1000
+
+
+def test_the_corrected_machine_survives_its_file(tmp_path):
+    machine = folder_machine(tmp_path)
+    recording = rigtwin.run(machine, "shake", effects={"coulomb@guide": 6.0})
+    answer = rigtwin.diagnose(recording, held_out=rigtwin.run(machine, "shake", seed=2, effects=["coulomb@guide=6"]))
+    twin = answer.save_twin(tmp_path / "twin.toml")
+    read = rigtwin.compare(recording, settings=twin)
+    assert read.gap == rigtwin.compare(recording, machine=answer.machine).gap
+
+
+def test_a_run_is_the_same_with_and_without_a_file(tmp_path):
+    rig = rigtwin.machine("suspension-rig")
+    kept = rigtwin.run(rig, "road10", seed=3, settings=SHORT, path=tmp_path / "a.mcap")
+    rigtwin.run(rig, "road10", seed=3, settings=SHORT, path=tmp_path / "b.mcap")
+    memory = rigtwin.run(rig, "road10", seed=3, settings=SHORT)
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+    for channel in kept.channels:
+        np.testing.assert_array_equal(kept[channel], memory[channel])
+    table = memory.to_pandas()
+    assert list(table.columns) == list(memory.channels)
+    assert len(table) == memory.ticks
+
+
+class Spring:
+    def tick(self, measured: Measurements, demand: Demand) -> Commands:
+        force = 200.0 - 1000.0 * measured.suspension_lvdt
+        return Commands(demand.ground, -0.004, force, force / 186.0)
+
+
+@numba.njit
+def compiled_spring(measured, demand):
+    force = 200.0 - 1000.0 * measured.suspension_lvdt
+    return (demand.ground, -0.004, force, force / 186.0)
+
+
+def still(configuration: rigtwin.Configuration, seed: int) -> np.ndarray:
+    return np.zeros((configuration.ticks, 3))
+
+
+def test_a_controller_of_ones_own_runs_the_rig_and_is_not_called_a_fault():
+    rig = rigtwin.machine("suspension-rig")
+    own = rigtwin.run(rig, "drop", controller=Spring(), settings=SHORT)
+    again = rigtwin.run(rig, "drop", controller=compiled_spring, settings=SHORT)
+    np.testing.assert_array_equal(own["/command.voltage"], again["/command.voltage"])
+    travel = own["/sensor.suspension_lvdt"]
+    np.testing.assert_allclose(own["/command.force"], 200.0 - 1000.0 * travel, atol=1e-9)
+    comparison = rigtwin.compare(own)
+    assert comparison.replays["carriage"].ratio < 1.2
+    assert "controller" in comparison.left_out
+
+
+@pytest.mark.parametrize("given", [(1.0, 2.0), None, (0.0, 0.0, float("nan"), 0.0)])
+def test_a_controller_that_gives_no_commands_is_said_in_one_line(given):
+    rig = rigtwin.machine("suspension-rig")
+    with pytest.raises(rigtwin.RigtwinError, match="the controller gave .*expected finite ground"):
+        rigtwin.run(rig, still, controller=lambda _measured, _demand: given, settings=SHORT)
+
+
+def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_path):
+    machine = folder_machine(tmp_path)
+
+    def steps(configuration: rigtwin.Configuration, seed: int) -> dict[str, np.ndarray]:
+        time = np.arange(configuration.ticks) * configuration.timing.period
+        return {"goal": 0.02 * np.sign(np.sin(5.0 * time))}
+
+    def spring(sensed: dict[str, float], demanded: dict[str, float]) -> float:
+        return 500.0 * (demanded["goal"] - sensed["encoder"])
+
+    recording = rigtwin.run(machine, steps, controller=spring, settings=SHORT)
+    asked = 500.0 * (recording["/command.goal"] - recording["/sensor.position"])
+    np.testing.assert_allclose(recording["/command.force"], asked, atol=1e-9)
+    with pytest.raises(rigtwin.RigtwinError, match="no demand for /command.force; a test gives force"):
+        rigtwin.run(machine, lambda _configuration, _seed: {}, settings=SHORT)
+    with pytest.raises(rigtwin.RigtwinError, match="nothing takes the demand 'torque'"):
+        rigtwin.run(machine, lambda c, _: {"torque": np.zeros(c.ticks), "force": np.zeros(c.ticks)})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda rig: rigtwin.run(rig, "nope"), "unknown experiment 'nope'; suspension-rig has drop"),
+        (lambda rig: rigtwin.run(rig, "drop", seed=-1), "seed -1: expected 0 or more"),
+        (lambda rig: rigtwin.run(rig, "drop", effects={"coulomb@wing": 1}), "unknown effect"),
+        (lambda rig: rigtwin.run(rig, "drop", settings={"rail": {"coulomb": -1}}), "rail.coulomb = -1"),
+        (lambda rig: rigtwin.machine("lathe"), "unknown machine 'lathe'; there are"),
+        (lambda rig: rigtwin.load("nowhere.mcap"), "cannot read nowhere.mcap"),
+        (lambda rig: rigtwin.diagnose([]), "no recording to diagnose"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(call, said):
+    with pytest.raises(rigtwin.RigtwinError) as error:
+        call(rigtwin.machine("suspension-rig"))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_importing_costs_nothing_and_every_name_is_there():
+    heavy = "import sys, rigtwin; print([m for m in ('numpy', 'mujoco', 'scipy') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+    for name in rigtwin.__all__:
+        assert (getattr(rigtwin, name).__doc__ or "").strip(), name
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        rigtwin.nonsense  # noqa: B018
+
+
+def test_the_notebook_runs(tmp_path):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    notebook = nbformat.read(EXAMPLES / "quickstart.ipynb", as_version=4)
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    assert (tmp_path / "why.html").stat().st_size > 10_000
+    assert (tmp_path / "drop.mp4").stat().st_size > 10_000
+    shown = [o for cell in notebook.cells for o in cell.get("outputs", []) if "text/html" in o.get("data", {})]
+    assert any("viscous" in "".join(o["data"]["text/html"]) for o in shown)
