@@ -1,4 +1,4 @@
-.PHONY: setup demo test test-slow check benchmark gallery docs contract system browser clean
+.PHONY: setup demo test test-slow check benchmark gallery docs system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -11,10 +11,9 @@ help:
 	@echo "make test       set up, run all tests but the slow ones"
 	@echo "make test-slow  the slow ones: longer recordings, more of a sort"
 	@echo "make setup      make $(VENV) with everything in it"
-	@echo "make check      ruff and pyright"
+	@echo "make check      ruff, pyright and the contract of imports"
 	@echo "make benchmark  speeds, side by side"
 	@echo "make docs       the pages of docs and a reference of the API: $(OUT)/docs/index.html"
-	@echo "make contract   which package may import which"
 	@echo "make gallery    the thesis reproduced: docs/gallery.md, its pictures and videos"
 
 setup: $(VENV)/.done
@@ -52,6 +51,7 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+	$(BIN)/lint-imports --no-cache
 
 benchmark: setup
 	$(BIN)/python -m benchmarks
@@ -73,9 +73,6 @@ docs: setup $(VENV)/.docs
 $(VENV)/.docs: $(VENV)/.done
 	$(BIN)/pip install --quiet --editable '.[docs]'
 	@touch $@
-
-contract: setup
-	$(BIN)/lint-imports --no-cache
 
 clean:
 	rm -rf $(VENV) $(OUT) build *.egg-info

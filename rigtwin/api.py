@@ -47,8 +47,6 @@ Effects = Mapping[str, float | Mapping[str, float]] | Sequence[str]
 """Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect` takes."""
 Demanding = Callable[[Configuration, int], Demands]
 """An experiment of one's own: what is demanded of the machine for (settings, seed)."""
-NEXT_TESTS = ("imposed", "imposed-fast", "road10", "road1.6", "drop")
-"""Experiments of the suspension rig that a diagnosis may propose."""
 
 
 @dataclass(frozen=True)
@@ -340,8 +338,7 @@ def diagnose(
         )
     found = _described(several[0], machine)
     base = twin_of(found, settings, without)
-    known = experiments_of(found) if isinstance(found.experiments, str) else {}
-    tests = [known[name] for name in NEXT_TESTS if name in known]
+    tests = [find_experiment(found, name) for name in found.next_tests]
     return find_reasons(found, several, base, apart, tests, progress)
 
 

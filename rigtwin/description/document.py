@@ -122,7 +122,12 @@ class _Reader:
             sources=components.sources,
             told=components.told,
             experiments=experiments,
+            next_tests=self._next_tests(),
         )
+
+    def _next_tests(self) -> tuple[str, ...]:
+        given = self._document.get("experiments", {})
+        return tuple(map(str, given.get("propose", ()))) if "python" in given else ()
 
     def _experiments(self) -> str | Mapping[str, Any]:
         given = self._document.get("experiments", {})

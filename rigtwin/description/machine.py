@@ -99,7 +99,7 @@ class Machine:
 
     plant: a NamedTuple of components with their nominal values; structure: what they make up; rough: whether nominal values are
     only a start; form: share of a signal that no model is held to, None for the usual one; told: `component.parameter` → setting
-    of the recording's controller that says its value; experiments: Python module that has them, or tables of the description.
+    of the recording's controller that says its value; experiments: Python module that has them, or tables of the description; next_tests: those that a diagnosis may propose.
     """
 
     name: str
@@ -117,6 +117,7 @@ class Machine:
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
     told: Mapping[str, str] = field(default_factory=dict, repr=False)
     experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
+    next_tests: tuple[str, ...] = ()
 
     @property
     def configuration(self) -> Configuration:
