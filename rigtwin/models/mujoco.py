@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from controllers.formula import run as run_formula
-from rigtwin.components import UNLIMITED, ForceActuator, Guide, PositionSensor, VelocitySensor
+from rigtwin.components import UNLIMITED, ForceActuator, Guide, measures
 from rigtwin.components.conditioning import actuator, conditioned, holding
 from rigtwin.components.guide import damping, dry_limits, friction, resting, slid
 from rigtwin.components.plant import Plant
@@ -72,7 +72,9 @@ class MujocoModel(JointModel):
     def carry(self, plant: Plant, signal: Array) -> Array:
         """The joint under a prescribed motion, shape (4, ticks) as `moved`. signal: what an ideal sensor that moves it would
         read, shape (ticks,)."""
-        position = np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        position = (
+            np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        )
         self.read = {}
         return self._carried(plant, position, 0.0)
 
@@ -145,7 +147,7 @@ class MujocoModel(JointModel):
         def sense(tick: int, position: float, velocity: float) -> dict[str, float]:
             found = {}
             for name, part, each, state in zip(names, parts, models, states, strict=True):
-                true = velocity if isinstance(part, VelocitySensor) else position
+                true = velocity if measures(part) == "velocity" else position
                 value = transduced(each, state, true)
                 if name in self.noise:
                     value += float(self.noise[name][tick])
@@ -188,7 +190,7 @@ class MujocoModel(JointModel):
             name
             for name, component in self._machine.components.items()
             if component.joint == joint
-            and isinstance(getattr(self._machine.plant, name), PositionSensor | VelocitySensor)
+            and measures(getattr(self._machine.plant, name)) in ("position", "velocity")
         ]
 
 
