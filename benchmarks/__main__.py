@@ -1,4 +1,5 @@
-"""`python -m benchmarks`: every speed that the project promises, beside what it is measured against."""
+"""`python -m benchmarks`: every speed that the project promises, beside what it is measured
+against."""
 
 from __future__ import annotations
 
@@ -18,11 +19,10 @@ import numpy as np
 from controllers import Compensator, Structure
 from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
-from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.next_test import tried
-from rigtwin.description.configuration import Configuration, Safety, Timing
-from rigtwin.description.configuration import applied
 from rigtwin.description.catalogue import find
+from rigtwin.description.configuration import Safety, Timing, applied
+from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.numerics.compiling import kernel, step
 from rigtwin.simulation.loop import BLOCK, run_compiled
 from rigtwin.simulation.plant import Simulation
@@ -41,10 +41,15 @@ def _steps(model: int, data: int, count: int) -> None:
 
 
 def _bare() -> None:
-    """As many mj_step of the same model, from the same start, as a drop test takes; plates at rest."""
+    """As many mj_step of the same model, from the same start, as a drop test takes; plates at
+    rest."""
     settings = CONFIGURATION.controller
-    simulation = Simulation(CONFIGURATION.plant, CONFIGURATION.timing.timestep, 4, 0.0, settings.start, settings.preload)
-    _steps(simulation.model._address, simulation.data._address, len(DEMANDS) * CONFIGURATION.substeps)
+    simulation = Simulation(
+        CONFIGURATION.plant, CONFIGURATION.timing.timestep, 4, 0.0, settings.start, settings.preload
+    )
+    _steps(
+        simulation.model._address, simulation.data._address, len(DEMANDS) * CONFIGURATION.substeps
+    )
 
 
 def _closed_loop(block: int = BLOCK) -> None:
@@ -83,20 +88,27 @@ def _beams() -> None:
     """One tick of the reduced structure, compiled."""
     model, ticks = modes(CONFIGURATION.controller, 1e-3), 200_000
     _beam_ticks(model, AT_REST, 10)
-    took = statistics.median(_seconds(lambda: _beam_ticks(model, AT_REST, ticks)) for _ in range(5)) / ticks
+    took = (
+        statistics.median(_seconds(lambda: _beam_ticks(model, AT_REST, ticks)) for _ in range(5))
+        / ticks
+    )
     print(f"one tick of the cross of beams {1e6 * took:.3f} us; goal < 5 us", flush=True)
 
 
 def _loaded_loop() -> None:
     """The closed loop with every optional part of the controller at work."""
-    settings = CONFIGURATION.controller._replace(structure=Structure.BEAM, compensator=Compensator.TWO_STEP, beam_sag=1.0)
+    settings = CONFIGURATION.controller._replace(
+        structure=Structure.BEAM, compensator=Compensator.TWO_STEP, beam_sag=1.0
+    )
     configuration = CONFIGURATION._replace(controller=settings, safety=Safety(1e9, 1e9, 1e9))
     for _ in run_compiled(Twin(configuration, 0.0, 0), configuration, DEMANDS):
         pass
 
 
 def _help() -> None:
-    subprocess.run([sys.executable, "-m", "rigtwin.cli", "--help"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, "-m", "rigtwin.cli", "--help"], check=True, stdout=subprocess.DEVNULL
+    )
 
 
 def _python() -> None:
@@ -109,7 +121,13 @@ def _seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def _side_by_side(title: str, goal: str, ours: Callable[[], object], against: Callable[[], object], rounds: int = 7) -> None:
+def _side_by_side(
+    title: str,
+    goal: str,
+    ours: Callable[[], object],
+    against: Callable[[], object],
+    rounds: int = 7,
+) -> None:
     """Medians of alternating rounds, and the ratio's spread over the rounds."""
     ours()
     against()
@@ -117,15 +135,22 @@ def _side_by_side(title: str, goal: str, ours: Callable[[], object], against: Ca
     mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
     ratios = sorted(one / other for one, other in pairs)
     spread = f"{ratios[0]:.2f} to {ratios[-1]:.2f}"
-    print(f"{title:58s} {mine:7.3f} s / {theirs:7.3f} s = {statistics.median(ratios):5.2f} ({spread}); goal {goal}", flush=True)
+    print(
+        f"{title:58s} {mine:7.3f} s / {theirs:7.3f} s = {statistics.median(ratios):5.2f} "
+        f"({spread}); goal {goal}",
+        flush=True,
+    )
 
 
 def _diagnosed(seconds: float) -> Callable[[], object]:
-    """The whole library on an imposed test of that length with one effect, and its report's figures."""
+    """The whole library on an imposed test of that length with one effect, and its report's
+    figures."""
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
-    recording = tried("imposed", applied(configuration, ["coulomb@motor=20"]), imposed.demands(configuration, 0))
-    return lambda: diagnose(find("suspension-rig"), [recording], Configuration())
+    rig, demands = find("suspension-rig"), imposed.demands(configuration, 0)
+    configuration = applied(configuration, ["coulomb@motor=20"])
+    recording = record_on_twin(rig, "imposed", configuration, demands)
+    return lambda: diagnose(rig, [recording])
 
 
 def _twenty_runs() -> None:
@@ -138,15 +163,20 @@ def _twenty_runs() -> None:
 
 
 def _diagnosis() -> None:
-    """A diagnosis of 30 s beside a thousand bare runs of the twin of that length, of which twenty are timed."""
+    """A diagnosis of 30 s beside a thousand bare runs of the twin of that length, of which twenty
+    are timed."""
     once, _ = _diagnosed(30.0), _diagnosed(30.0)()
     pairs = [(_seconds(once), _seconds(_twenty_runs)) for _ in range(3)]
     mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
     print(
-        f"diagnosis of 30 s {mine:.1f} s / 1000 runs of the twin {50 * theirs:.0f} s = {mine / (50 * theirs):.3f}; goal <= 15 s"
+        f"diagnosis of 30 s {mine:.1f} s / 1000 runs of the twin {50 * theirs:.0f} s = "
+        f"{mine / (50 * theirs):.3f}; goal <= 15 s"
     )
     short = statistics.median(_seconds(_diagnosed(15.0)) for _ in range(3))
-    print(f"diagnosis of 30 s / of 15 s {mine:.1f} s / {short:.1f} s = {mine / short:.2f}; goal <= 2, linear")
+    print(
+        f"diagnosis of 30 s / of 15 s {mine:.1f} s / {short:.1f} s = {mine / short:.2f}; "
+        "goal <= 2, linear"
+    )
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"most memory of all this {peak:.0f} MiB; goal <= 1024 MiB", flush=True)
 
@@ -154,10 +184,16 @@ def _diagnosis() -> None:
 def main() -> None:
     print(f"mujoco {mujoco.__version__}, numpy {np.__version__}, alternating rounds")
     _side_by_side("closed loop with all controllers / bare mj_step", "<= 1.5", _closed_loop, _bare)
-    _side_by_side("closed loop with beams and compensator / without", "<= 1.2", _loaded_loop, _closed_loop)
+    _side_by_side(
+        "closed loop with beams and compensator / without", "<= 1.2", _loaded_loop, _closed_loop
+    )
     _beams()
-    _side_by_side("16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3)
-    _side_by_side("45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False))
+    _side_by_side(
+        "16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3
+    )
+    _side_by_side(
+        "45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False)
+    )
     _side_by_side("rigtwin --help / starting Python", "< 0.5 s", _help, _python)
     _diagnosis()
 

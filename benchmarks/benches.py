@@ -1,4 +1,5 @@
-"""How often the diagnosis is right on benches that it never saw: `python -m benchmarks.benches --cases 80 --seed 2027`."""
+"""How often the diagnosis is right on benches that it never saw: `python -m benchmarks.benches
+--cases 80 --seed 2027`."""
 
 from __future__ import annotations
 
@@ -11,9 +12,8 @@ import numpy as np
 from tqdm import tqdm
 
 from referee.bench_cases import Case, drawn, recorded
-from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.description.catalogue import find
-from rigtwin.description.setting import nominal
+from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording
 
 
@@ -33,10 +33,10 @@ def answered(number: int, seed: int) -> tuple[Case, str, frozenset[str], frozens
     case = drawn(number, seed)
     recording = recording_of(case)
     machine = find(recording.machine)
-    answer = diagnose(machine, [recording], nominal(machine), [recording_of(case, 1)]).diagnosis
-    named = frozenset(effect.name.kind for effect in answer.effects)
-    member = frozenset(name.kind for effect in answer.effects for name in effect.alternatives)
-    return case, answer.verdict, named, member, answer.seconds
+    found = diagnose(machine, [recording], held_out=[recording_of(case, 1)])
+    named = frozenset(effect.name.kind for effect in found.effects)
+    member = frozenset(name.kind for effect in found.effects for name in effect.alternatives)
+    return case, found.verdict, named, member, found.answer.seconds
 
 
 def main() -> None:
@@ -56,7 +56,10 @@ def main() -> None:
             count["nulls"] += 1
             count["false alarms"] += verdict != "no gap"
         if named != case.names:
-            print(f"  {case.machine} {case.seed}: {verdict}; in it {sorted(case.names)}, named {sorted(named)}; {case.truth}")
+            print(
+                f"  {case.machine} {case.seed}: {verdict}; in it {sorted(case.names)}, "
+                f"named {sorted(named)}; {case.truth}"
+            )
     for name, value in count.items():
         print(f"{name:28s} {value} of {len(answers)}")
     print(f"median time {np.median([seconds for *_, seconds in answers]):.1f} s")

@@ -3,7 +3,16 @@
 They know nothing of the twin. `update` is one tick of the whole controller.
 """
 
-from controllers.mil import SIZE, Controller, State, controller, initial_state, packed, unpacked, update
+from controllers.mil import (
+    SIZE,
+    Controller,
+    State,
+    controller,
+    initial_state,
+    packed,
+    unpacked,
+    update,
+)
 from controllers.settings import Compensator, Mode, Settings, Skyhook, Structure, Travel
 from controllers.signals import Commands, Demand, Measurements
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from controllers import Measurements
 from rigtwin.components import RigPlant, Scales, Swing, candidates
+from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.description.catalogue import find
 from rigtwin.recording import load
 from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.signals.noise import white_noise

@@ -110,10 +110,9 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     str, str
         What the diagnosis says, and the corrected twin's file.
     """
+    from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.calibrated import toml
     from rigtwin.diagnosis.diagnose import diagnose
-    from rigtwin.description.configuration import Configuration
-    from rigtwin.description.catalogue import find
     from rigtwin.recording import load
     from rigtwin.recording.channels import DEFAULT_MACHINE
 
@@ -122,8 +121,8 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "recording.mcap"
         write(path, law, *run(truth, law, demands, random))
-        outcome = diagnose(find(DEFAULT_MACHINE), [load(path)], Configuration())
-    return outcome.diagnosis.sentence, toml(outcome)
+        found = diagnose(find(DEFAULT_MACHINE), [load(path)])
+    return found.sentence, toml(found)
 
 
 def run_on_rig(job: RigRun) -> dict[str, float]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigtwin.description.setting import nominal
 
 from referee.bench_cases import ACTUATORS, DAMPERS, Case, drawn
 from referee.benches import (
@@ -19,8 +18,9 @@ from referee.benches import (
     wander,
 )
 from rigtwin.description.catalogue import SHIPPED, find
-from rigtwin.diagnosis.diagnose import Outcome, diagnose
+from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.localisation import travelled
+from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.importing.convert import convert
 from rigtwin.recording import Recording, load
 from tests.helpers.benches import recording_of
@@ -29,11 +29,20 @@ EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"
 SINGLE = {
     "lag": (ActuatorTruth(lags=(0.02,)), {"lag@actuator": 0.02}),
     "two lags": (ActuatorTruth(lags=(0.03, 0.009)), {"two_lags@actuator": 0.03}),
-    "lag and delay": (ActuatorTruth(lags=(0.025,), late=0.012), {"lag@actuator": 0.025, "delay@actuator": 0.012}),
+    "lag and delay": (
+        ActuatorTruth(lags=(0.025,), late=0.012),
+        {"lag@actuator": 0.025, "delay@actuator": 0.012},
+    ),
     "resonance": (ActuatorTruth(own=(6.0, 0.4)), {"resonance@actuator": 6.0}),
     "friction": (DamperTruth(slip=80.0), {"coulomb@damper": 80.0}),
-    "spring": (DamperTruth(slip=80.0, spring=4e4), {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5}),
-    "play": (DamperTruth(slip=80.0, lost=0.003), {"coulomb@damper": 80.0, "backlash@damper": 0.003}),
+    "spring": (
+        DamperTruth(slip=80.0, spring=4e4),
+        {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5},
+    ),
+    "play": (
+        DamperTruth(slip=80.0, lost=0.003),
+        {"coulomb@damper": 80.0, "backlash@damper": 0.003},
+    ),
     "spring and play": (
         DamperTruth(slip=80.0, spring=4e4, lost=0.003),
         {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5, "backlash@damper": 0.003},
@@ -47,17 +56,16 @@ SINGLE = {
 
 
 @cache
-def answered(truth: ActuatorTruth | DamperTruth) -> Outcome:
+def answered(truth: ActuatorTruth | DamperTruth) -> Diagnosis:
     machine = "actuator" if isinstance(truth, ActuatorTruth) else "damper"
     recording = recording_of(Case(machine, frozenset(), truth, 1e-3, 5))
-    described = find(recording.machine)
-    return diagnose(described, [recording], nominal(described))
+    return diagnose(find(recording.machine), [recording])
 
 
 @pytest.mark.parametrize("name", SINGLE)
 def test_what_is_in_a_bench_is_named_with_its_size(name: str):
     truth, effects = SINGLE[name]
-    found = answered(truth).diagnosis
+    found = answered(truth)
     assert {str(effect.name) for effect in found.effects} == set(effects)
     for effect in found.effects:
         value = next(iter(effect.parameters.values())).value
@@ -69,7 +77,8 @@ def test_what_is_in_a_bench_is_named_with_its_size(name: str):
 
 
 def test_a_slow_logger_and_a_stepping_command():
-    """50 Hz, steps, half a millimetre a bit: a lag and a delay are not taken for one effect of second order."""
+    """50 Hz, steps, half a millimetre a bit: a lag and a delay are not taken for one effect of
+    second order."""
     random, period = np.random.default_rng(4), 0.02
     command = np.repeat(random.uniform(-0.05, 0.05, 50), 60)
     truth = ActuatorTruth(lags=(0.06,), late=0.08, fastest=0.15)
@@ -78,7 +87,7 @@ def test_a_slow_logger_and_a_stepping_command():
     columns = {"/command": {"position": command}, "/sensor": {"position": position}}
     machine = find("position-actuator")
     recording = Recording(Path("slow"), machine.name, "", period, time, columns, {})
-    found = diagnose(machine, [recording], nominal(machine)).diagnosis
+    found = diagnose(machine, [recording])
     values = {str(effect.name): next(iter(effect.parameters.values())) for effect in found.effects}
     assert set(values) == {"lag@actuator", "delay@actuator", "rate_limit@actuator"}
     assert values["rate_limit@actuator"].value == pytest.approx(0.15, rel=0.03)
@@ -88,22 +97,22 @@ def test_a_slow_logger_and_a_stepping_command():
 
 @pytest.mark.parametrize("truth", [ActuatorTruth(), DamperTruth()], ids=["actuator", "damper"])
 def test_a_bench_without_anything_has_no_gap(truth):
-    found = answered(truth).diagnosis
+    found = answered(truth)
     assert found.verdict == "no gap"
     assert not found.effects
 
 
 def test_play_lies_within_a_few_millimetres_after_a_reversal():
-    found = answered(SINGLE["spring and play"][0]).diagnosis
+    found = answered(SINGLE["spring and play"][0])
     (place,) = [place for place in found.where if place.evidence.startswith("backlash")]
     assert place.region.endswith("mm after a reversal")
     assert 2.0 < float(place.region.split()[1]) < 8.0
 
 
 def test_what_was_found_one_after_another_is_told():
-    found = answered(SINGLE["spring and play"][0]).diagnosis
-    left = [step.left["load_cell"] for step in found.steps]
-    assert found.steps[0].added == "nominal"
+    found = answered(SINGLE["spring and play"][0])
+    left = [step.left["load_cell"] for step in found.answer.steps]
+    assert found.answer.steps[0].added == "nominal"
     assert left[-1] < 0.05 * left[0]
     document = found.document()
     assert document["steps"][1]["added"].startswith("with ")
@@ -111,7 +120,9 @@ def test_what_was_found_one_after_another_is_told():
 
 
 def test_distance_since_a_reversal():
-    there = np.concatenate([np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.linspace(0.4, 0.9, 51)[1:]])
+    there = np.concatenate(
+        [np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.linspace(0.4, 0.9, 51)[1:]]
+    )
     found = travelled(there)
     assert found[99] == pytest.approx(0.99)
     assert found[100] == 0.0
@@ -135,12 +146,15 @@ def test_the_bench_actuator_has_its_frequency_response():
 
 
 def test_the_bench_damper_loses_what_its_friction_eats():
-    """Work over a cycle: 4·F·(a − F/k − b/2) of a stop behind a spring and a play, and π·c·w·a² of the viscous part."""
+    """Work over a cycle: 4·F·(a − F/k − b/2) of a stop behind a spring and a play, and π·c·w·a² of
+    the viscous part."""
     time = np.arange(100_001) * 1e-5
     motion = 0.02 * np.cos(2 * np.pi * time)
     speed = np.gradient(motion, 1e-5)
     truth = DamperTruth(slip=80.0, spring=4e4, lost=0.003, viscous=(200.0, 200.0))
-    force = damper_force(truth, np.concatenate([motion, motion]), np.concatenate([speed, speed]))[100_001:]
+    force = damper_force(truth, np.concatenate([motion, motion]), np.concatenate([speed, speed]))[
+        100_001:
+    ]
     work = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(motion)))
     expected = 4 * 80.0 * (0.02 - 80.0 / 4e4 - 0.0015) + np.pi * 200.0 * 2 * np.pi * 0.02**2
     assert work == pytest.approx(expected, rel=0.002)
@@ -168,11 +182,11 @@ def test_emps_on_its_held_out_recording(tmp_path: Path):
         convert(EMPS / f"{data}.mat", SHIPPED / "maps" / f"{name}.toml", tmp_path / f"{name}.mcap")
     machine = find("emps")
     fitted, held_out = (load(tmp_path / f"{name}.mcap") for name in ("emps", "emps_pulses"))
-    found = diagnose(machine, [fitted], nominal(machine), [held_out]).diagnosis
+    found = diagnose(machine, [fitted], held_out=[held_out])
     assert str(found.effects[0].name) == "coulomb@guide"
     # Janot, Gautier and Brunot give 20.4 N.
     assert found.effects[0].parameters["coulomb"].value == pytest.approx(20.4, abs=1.5)
-    left = [step.left["force"] for step in found.steps]
+    left = [step.left["force"] for step in found.answer.steps]
     assert left[0] == pytest.approx(21.9, abs=0.2)
     assert left[1] < 5.0
     # A least-squares fit of mass, viscous, Coulomb and offset leaves 2.9 N.
@@ -180,4 +194,4 @@ def test_emps_on_its_held_out_recording(tmp_path: Path):
     assert found.gap is not None
     assert found.gap.shrinkage_held_out.low > 0.85
     assert found.verdict == "partly explained"
-    assert found.leftovers
+    assert found.answer.leftovers

@@ -1,4 +1,5 @@
-"""Component replays: noise alone where twin and recording agree, and the guilty component where they do not."""
+"""Component replays: noise alone where twin and recording agree, and the guilty component where
+they do not."""
 
 from __future__ import annotations
 
@@ -6,18 +7,19 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 
 from controllers import Measurements
 from experiments import EXPERIMENTS
-from rigtwin.components import candidates, find
+from rigtwin.components import RigPlant, candidates
 from rigtwin.description.configuration import Configuration, Timing, applied, from_assignments
-from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
+from rigtwin.diagnosis.compare import compare, compare_recordings
+from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import text
-from tests.helpers.recordings import SHIPPED, beside, shipped
+from tests.helpers.recordings import SHIPPED, beside, replace_sensors, shipped
+from tests.helpers.twin import RIG, rig_effect
 
 LIMITS = {
     "motor": 3.0,
@@ -31,10 +33,10 @@ COMPONENTS = tuple(LIMITS)
 
 
 def ratios(recording: Recording) -> dict[str, float]:
-    return {name: result.ratio for name, result in compare(recording, configuration_of(recording)).replays.items()}
+    return {name: result.ratio for name, result in compare(RIG, recording).replays.items()}
 
 
-def ratio(replays: Replays, component: str) -> float:
+def ratio(replays: ComponentReplays, component: str) -> float:
     """Of one replay to noise; 0 where it cannot be made."""
     try:
         return REPLAYS[component](replays).ratio
@@ -54,7 +56,9 @@ def test_the_shipped_rig_recording_leaves_noise_alone(nominal):
     assert nominal["closed_loop"] < 1.1
 
 
-@pytest.mark.parametrize("name", ["nominal-road10", pytest.param("nominal-drop", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["nominal-road10", pytest.param("nominal-drop", marks=pytest.mark.slow)]
+)
 def test_nominal_recordings_leave_noise_alone(name):
     found = ratios(beside(name))
     for component, limit in LIMITS.items():
@@ -69,7 +73,9 @@ TOUCHED = {
 }
 
 
-def assert_stands_out(name: str, found: dict[str, float], nominal: dict[str, float], elsewhere: float) -> None:
+def assert_stands_out(
+    name: str, found: dict[str, float], nominal: dict[str, float], elsewhere: float
+) -> None:
     """Asserts that the components touched are off, and that no other is by so many times."""
     for component in COMPONENTS:
         times = found[component] / nominal[component]
@@ -105,59 +111,68 @@ OWN_FAULTS = {
 @pytest.mark.parametrize("name", ["imposed"])
 def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, name, fault):
     experiment = EXPERIMENTS[name]
-    faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=10.0)), [fault])
+    faulty = from_assignments(
+        experiment.configuration._replace(timing=Timing(duration=10.0)), [fault]
+    )
     path = tmp_path / "f.mcap"
     record(path, name, faulty, experiment.demands(faulty, 11), 11)
     recording = load(path)
-    replays = Replays(recording, configuration_of(recording))
+    replays = ComponentReplays(recording, RIG.configuration_of(recording))
     found = {component: ratio(replays, component) for component in COMPONENTS}
     for component in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder"):
         if component in OWN_FAULTS[fault]:
             assert found[component] > 1.5, component
         else:
-            # With another tyre the plate starts elsewhere, which its cylinder's replay sees for half a second.
-            assert found[component] < (1.35 if component == "structure_cylinder" else 1.2), component
+            # With another tyre the plate starts elsewhere, which its cylinder's replay sees for
+            # half a second.
+            assert found[component] < (1.35 if component == "structure_cylinder" else 1.2), (
+                component
+            )
     assert found["controller"] < 1e-3
     # With the fault in the twin too, noise is left.
-    known = configuration_of(recording, from_assignments(Configuration(), [fault]))
-    assert all(result.ratio < 1.2 for result in compare(recording, known).replays.values())
+    known = RIG.configuration_of(recording, from_assignments(Configuration(), [fault]))
+    assert all(result.ratio < 1.2 for result in compare(RIG, recording, known).replays.values())
 
 
 def without(recording: Recording, topic: str, name: str) -> Recording:
-    columns = {t: {n: v for n, v in fields.items() if (t, n) != (topic, name)} for t, fields in recording.columns.items()}
+    columns = {
+        t: {n: v for n, v in fields.items() if (t, n) != (topic, name)}
+        for t, fields in recording.columns.items()
+    }
     return dataclasses.replace(recording, columns=columns)
 
 
 @pytest.mark.parametrize("name", Measurements._fields)
 def test_a_missing_sensor_is_named(example, name):
     with pytest.raises(RigtwinError, match=f"/sensor.{name} is missing"):
-        compare(without(example, "/sensor", name), Configuration())
+        compare(RIG, without(example, "/sensor", name))
 
 
 def test_a_value_that_is_no_number_is_named_with_its_time(example):
     broken = example.column("/sensor", "load_cell").copy()
     broken[1234] = np.nan
-    columns = {**example.columns, "/sensor": {**example.columns["/sensor"], "load_cell": broken}}
     with pytest.raises(RigtwinError, match=r"/sensor.load_cell is not a number at 1.234 s"):
-        compare(dataclasses.replace(example, columns=columns), Configuration())
+        compare(RIG, replace_sensors(example, load_cell=broken))
 
 
 def test_without_the_operators_settings_the_controller_is_left_out(example):
     silent = dataclasses.replace(example, controller={})
-    comparison = compare(silent, configuration_of(silent))
+    comparison = compare(RIG, silent)
     assert set(comparison.left_out) == {"controller", "closed_loop"}
     assert comparison.replays["carriage"].ratio < 1.1
 
 
 def test_settings_unknown_here_are_refused(example):
     with pytest.raises(RigtwinError, match=r"unknown setting controller\.kd"):
-        configuration_of(dataclasses.replace(example, controller={**example.controller, "kd": 1.0}))
+        RIG.configuration_of(
+            dataclasses.replace(example, controller={**example.controller, "kd": 1.0})
+        )
 
 
 def test_too_short_a_recording_is_refused(example):
     columns = {t: {n: v[:100] for n, v in fields.items()} for t, fields in example.columns.items()}
     with pytest.raises(RigtwinError, match="at least 200"):
-        compare(dataclasses.replace(example, columns=columns, time=example.time[:100]), Configuration())
+        compare(RIG, dataclasses.replace(example, columns=columns, time=example.time[:100]))
 
 
 def test_two_recordings_of_one_test(example, tmp_path):
@@ -168,19 +183,19 @@ def test_two_recordings_of_one_test(example, tmp_path):
     for seed in (1, 2):
         record(tmp_path / f"{seed}.mcap", "imposed", configuration, demands, seed)
         recordings.append(load(tmp_path / f"{seed}.mcap"))
-    same = compare_recordings(*recordings)
+    same = compare_recordings(RIG, *recordings)
     assert all(0.8 < result.ratio < 1.3 for result in same.values())
-    different = compare_recordings(recordings[0], example)
+    different = compare_recordings(RIG, recordings[0], example)
     assert different["load_cell"].ratio > 5
     with pytest.raises(RigtwinError, match="periods differ"):
-        compare_recordings(example, dataclasses.replace(example, period=2e-3))
+        compare_recordings(RIG, example, dataclasses.replace(example, period=2e-3))
 
 
 LEFT_OVER = {
     "missed_ticks@controller": "which ticks were missed is not known",
-    "compliance@structure_cylinder": "the load that bends it is measured with noise, which shakes the plate",
-    "saturation@structure_cylinder": "while the plate stands still, the motor's friction is not determined",
-    "deadband@structure_cylinder": "while the plate stands still, the motor's friction is not determined",
+    "compliance@structure_cylinder": "the load that bends it is measured; noise shakes the plate",
+    "saturation@structure_cylinder": "while the plate stands, the motor's friction is not known",
+    "deadband@structure_cylinder": "while the plate stands, the motor's friction is not known",
 }
 """Effects that a twin which has them explains only in part, and why."""
 
@@ -193,22 +208,34 @@ ALIKE = ("structure_lvdt", "ground_lvdt")
     "name",
     [
         pytest.param(effect.name, marks=pytest.mark.slow if effect.component in ALIKE else ())
-        for effect in candidates(Plant())
+        for effect in candidates(RigPlant())
         if effect.kind.name != "quantisation"
     ],
 )
 def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
-    """The law behind every diagnosis: record with an effect, replay with the same effect, and noise is left."""
+    """The law behind every diagnosis: record with an effect, replay with the same effect, and noise
+    is left."""
     experiment = EXPERIMENTS["imposed"]
     configuration = experiment.configuration._replace(timing=Timing(duration=6.0))
     path = tmp_path / "e.mcap"
-    record(path, "imposed", configuration, experiment.demands(configuration, 5), 5, effects=[text(name)])
+    record(
+        path,
+        "imposed",
+        configuration,
+        experiment.demands(configuration, 5),
+        5,
+        effects=[text(name)],
+    )
     recording = load(path)
-    nominal = Replays(recording, configuration_of(recording))
-    known = Replays(recording, configuration_of(recording, applied(Configuration(), [text(name)])))
+    nominal = ComponentReplays(recording, RIG.configuration_of(recording))
+    known = ComponentReplays(
+        recording, RIG.configuration_of(recording, applied(Configuration(), [text(name)]))
+    )
     if name not in LEFT_OVER:
         for component in COMPONENTS:
             left = ratio(known, component)
             assert left < 1.3 or left < 0.25 * ratio(nominal, component), component
     loud = any(ratio(nominal, component) > 1.5 for component in reversed(COMPONENTS))
-    assert loud or find(name).kind.name in ("hum", "noise"), "the nominal twin does not explain it"
+    assert loud or rig_effect(name).kind.name in ("hum", "noise"), (
+        "the nominal twin does not explain it"
+    )

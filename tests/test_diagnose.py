@@ -7,36 +7,34 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigtwin.models.predictor import Motion
 
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
-from rigtwin.components import RigPlant, find
-from rigtwin.description.configuration import Configuration, overridden, without
-from rigtwin.diagnosis.controller import ControllerReplay
+from rigtwin.components import Motion, RigPlant
+from rigtwin.description.configuration import Configuration, without
+from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
-from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.fit import Fitter
 from rigtwin.diagnosis.localisation import region
 from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import outstanding
 from rigtwin.diagnosis.unknown_input import located
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from tests.helpers.recordings import SHIPPED, beside, shipped
-from tests.helpers.twin import RIG, answer, evidence_of, recorded
+from tests.helpers.twin import RIG, answer, evidence_of, recorded, rig_effect
 
 SLOW = pytest.mark.slow
 """Of every sort of answer one is always tried."""
 
 
-def names(outcome: Outcome) -> set[str]:
-    return {str(effect.name) for effect in outcome.diagnosis.effects}
+def names(outcome: Diagnosis) -> set[str]:
+    return {str(effect.name) for effect in outcome.effects}
 
 
-def explains_nothing(outcome: Outcome) -> bool:
-    found = outcome.diagnosis
-    return found.verdict == "no gap" and not found.effects and not found.where
+def explains_nothing(outcome: Diagnosis) -> bool:
+    return outcome.verdict == "no gap" and not outcome.effects and not outcome.where
 
 
 def test_a_rig_without_defects_has_no_gap(example):
@@ -57,17 +55,18 @@ KNOWN = {
 }
 
 
-def assert_named(outcome: Outcome, name: str) -> None:
-    """Asserts that the answer is this one alone, with its magnitude, and closes the gap as it says."""
+def assert_named(outcome: Diagnosis, name: str) -> None:
+    """Asserts that the answer is this one alone, with its magnitude, and closes the gap as it
+    says."""
     effect, parameter, value, nominal = KNOWN[name]
-    assert outcome.diagnosis.verdict == "explained"
+    assert outcome.verdict == "explained"
     assert names(outcome) == {effect}
-    found = outcome.diagnosis.effects[0]
+    found = outcome.effects[0]
     assert found.confidence > 0.9
     assert found.parameters[parameter].value - nominal == pytest.approx(value - nominal, rel=0.05)
     assert found.parameters[parameter].nominal == nominal
-    assert outcome.diagnosis.where[0].component == effect.partition("@")[2]
-    gap = outcome.diagnosis.gap
+    assert outcome.where[0].component == effect.partition("@")[2]
+    gap = outcome.gap
     assert gap is not None
     assert gap.after < 1.1 < gap.before
     assert gap.shrinkage_held_out.value == pytest.approx(gap.shrinkage_predicted, abs=0.05)
@@ -89,7 +88,7 @@ def test_a_friction_taken_out_of_the_twin_is_found():
     assert base.plant.rail.coulomb == 0.0
     outcome = answer(recorded("imposed", seconds=4.0), base=base)
     assert names(outcome) == {"coulomb@rail"}
-    estimate = outcome.diagnosis.effects[0].parameters["coulomb"]
+    estimate = outcome.effects[0].parameters["coulomb"]
     assert estimate.value == pytest.approx(50.0, rel=0.05)
     assert estimate.nominal == 0.0
 
@@ -111,7 +110,7 @@ def test_three_seconds_are_enough_for_a_large_effect_and_the_same_data_give_the_
     recording = recorded("imposed", ("gain@load_cell=1.08",), 3.0)
     outcome, again = answer(recording), answer(recording)
     assert names(outcome) == {"gain@load_cell"}
-    assert replace(again.diagnosis, seconds=0.0) == replace(outcome.diagnosis, seconds=0.0)
+    assert replace(again.answer, seconds=0.0) == replace(outcome.answer, seconds=0.0)
 
 
 @SLOW
@@ -119,13 +118,15 @@ def test_several_recordings_are_explained_together():
     effects = ("viscous@rail=150",)
     outcome = answer(recorded("imposed", effects, 6.0), recorded("road10", effects, 6.0, 8))
     assert names(outcome) == {"viscous@rail"}
-    assert len(outcome.diagnosis.recordings) == 2
+    assert len(outcome.answer.recordings) == 2
 
 
 def test_held_out_recordings_judge_the_correction():
     effects = ("coulomb@rail=75",)
-    outcome = answer(recorded("imposed", effects, 4.0), held_out=(recorded("imposed", effects, 4.0, 9),))
-    gap = outcome.diagnosis.gap
+    outcome = answer(
+        recorded("imposed", effects, 4.0), held_out=(recorded("imposed", effects, 4.0, 9),)
+    )
+    gap = outcome.gap
     assert gap is not None
     assert gap.held_out == "1 held-out recording"
     assert gap.shrinkage_held_out.value > 0.9
@@ -134,19 +135,33 @@ def test_held_out_recordings_judge_the_correction():
 
 @SLOW
 def test_a_correction_that_worsens_held_out_data_is_rejected():
-    outcome = answer(recorded("imposed", ("coulomb@rail=75",)), held_out=(recorded("imposed", (), 8.0, 9),))
-    assert not outcome.diagnosis.effects
-    assert outcome.diagnosis.verdict == "unknown"
-    assert any("rejected" in note for note in outcome.diagnosis.notes)
+    outcome = answer(
+        recorded("imposed", ("coulomb@rail=75",)), held_out=(recorded("imposed", (), 8.0, 9),)
+    )
+    assert not outcome.effects
+    assert outcome.verdict == "unknown"
+    assert any("rejected" in note for note in outcome.answer.notes)
 
 
 @pytest.mark.parametrize(
-    "effect", ["coulomb@rail=80", "gain@motor=1.06", "delay@structure_cylinder=0.008", "gain@ground_lvdt=0.95"]
+    "effect",
+    [
+        "coulomb@rail=80",
+        "gain@motor=1.06",
+        "delay@structure_cylinder=0.008",
+        "gain@ground_lvdt=0.95",
+    ],
 )
 def test_a_free_disturbance_finds_the_component_without_the_library(effect):
     evidence = evidence_of(recorded("imposed", (effect,)))
     name = effect.partition("=")[0].partition("@")[2]
     assert located(evidence, evidence.plant)[0].component == name
+
+
+def deviation_of(recording: Recording) -> Deviation | None:
+    assert RIG.control is not None
+    settings = RIG.configuration_of(recording).controller
+    return ControllerReplay(RIG.control, recording, settings).deviation()
 
 
 SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}
@@ -157,35 +172,35 @@ def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     recording = recorded("road1.6", (f"setting@controller={name}:{value}",), 3.0)
     told = EXPERIMENTS["road1.6"].configuration.controller
     recording = replace(recording, controller={**recording.controller, name: getattr(told, name)})
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
-    deviation = ControllerReplay(recording, settings).deviation()
+    deviation = deviation_of(recording)
     assert deviation is not None
     assert (deviation.kind, deviation.name) == ("setting", name)
     assert deviation.used == pytest.approx(value, rel=1e-3)
 
 
 def test_missed_ticks_are_counted():
-    recording = recorded("imposed", ("missed_ticks@controller=0.04",))
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
-    deviation = ControllerReplay(recording, settings).deviation()
+    deviation = deviation_of(recorded("imposed", ("missed_ticks@controller=0.04",)))
     assert deviation is not None
     assert deviation.kind == "missed_ticks"
     assert deviation.used == pytest.approx(0.04, rel=0.2)
 
 
 def test_a_controller_as_told_has_no_deviation():
-    recording = recorded("imposed")
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
-    assert ControllerReplay(recording, settings).deviation() is None
+    assert deviation_of(recorded("imposed")) is None
 
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [("noise@load_cell=9", 9.0), ("hum@structure_lvdt=0.0015", 0.0015), ("quantisation@suspension_lvdt=0.0006", 0.0006)],
+    [
+        ("noise@load_cell=9", 9.0),
+        ("hum@structure_lvdt=0.0015", 0.0015),
+        ("quantisation@suspension_lvdt=0.0006", 0.0006),
+    ],
 )
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
-    (found,) = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(RigPlant())], RigPlant())
+    predicted = evidence.predicted(RIG.plant)
+    (found,) = outstanding(RIG, evidence.recordings, predicted, RIG.plant)
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)
 
@@ -198,7 +213,7 @@ def test_noise_that_all_sensors_share_is_the_laboratorys():
         if hasattr(getattr(RigPlant(), name), "white")
     ]
     outcome = answer(recorded("imposed", tuple(louder)))
-    assert outcome.diagnosis.verdict == "no gap"
+    assert outcome.verdict == "no gap"
 
 
 def test_shrinkage_is_of_the_gap_above_the_floor():
@@ -219,7 +234,7 @@ def test_the_interval_covers_the_value_and_narrows_with_more_blocks():
 
 
 def test_the_gate_keeps_what_helps_and_drops_what_harms():
-    good, bad = find("coulomb@rail"), find("viscous@rail")
+    good, bad = rig_effect("coulomb@rail"), rig_effect("viscous@rail")
 
     def across(kept):
         left = 5.0 - 3.0 * (good in kept) + 1.0 * (bad in kept)
@@ -241,18 +256,24 @@ def test_regions_are_told_apart():
     speed = np.sin(2 * np.pi * time)
     force = np.cos(2 * np.pi * 0.7 * time)
     quiet = 1e-3 * np.ones_like(time)
-    assert region(quiet + (np.abs(speed) < 0.1), Motion(speed, speed, force), 1e-3) == "velocity reversal"
+    assert (
+        region(quiet + (np.abs(speed) < 0.1), Motion(speed, speed, force), 1e-3)
+        == "velocity reversal"
+    )
     assert region(quiet + speed**9, Motion(speed, speed, force), 1e-3) == "high speed"
     assert region(quiet, Motion(speed, speed, force), 1e-3) == "throughout"
     assert region(time**2, Motion(speed, speed, force), 1e-3) == "growing with time"
-    assert region(quiet + ((time > 3.0) & (time < 4.0)), Motion(speed, speed, force), 1e-3) == "3.0 to 4.0 s"
+    assert (
+        region(quiet + ((time > 3.0) & (time < 4.0)), Motion(speed, speed, force), 1e-3)
+        == "3.0 to 4.0 s"
+    )
 
 
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",)))
     fitter = Fitter(evidence)
-    fits = [fitter.single(find("delay@motor")), fitter.single(find("lag@motor"))]
-    tests = [(e.name, e.configuration, e.demands) for e in EXPERIMENTS.values() if e.name in ("imposed-fast", "drop")]
+    fits = [fitter.single(rig_effect("delay@motor")), fitter.single(rig_effect("lag@motor"))]
+    tests = [EXPERIMENTS["imposed-fast"], EXPERIMENTS["drop"]]
     found = proposed(RIG, fits, tests)
     assert found is not None
     assert found.experiment == "imposed-fast"
@@ -267,7 +288,10 @@ def spoilt(change: str) -> Recording:
         case "missing":
             del sensors["load_cell"]
         case "swapped":
-            sensors["ground_lvdt"], sensors["structure_lvdt"] = sensors["structure_lvdt"], sensors["ground_lvdt"]
+            sensors["ground_lvdt"], sensors["structure_lvdt"] = (
+                sensors["structure_lvdt"],
+                sensors["ground_lvdt"],
+            )
         case "unit":
             sensors["suspension_lvdt"] = 1e3 * sensors["suspension_lvdt"]
         case "dead":
@@ -276,7 +300,9 @@ def spoilt(change: str) -> Recording:
             time = time + 0.5 * (time > 4.0)
         case "machine":
             machine = "another"
-    return replace(recording, machine=machine, time=time, columns={**recording.columns, "/sensor": sensors})
+    return replace(
+        recording, machine=machine, time=time, columns={**recording.columns, "/sensor": sensors}
+    )
 
 
 FAULTS = {
@@ -292,9 +318,9 @@ FAULTS = {
 @pytest.mark.parametrize("change", FAULTS)
 def test_data_that_are_not_fit_are_named_and_not_diagnosed(change):
     outcome = answer(spoilt(change))
-    assert outcome.diagnosis.verdict == "unusable"
-    assert not outcome.diagnosis.effects
-    assert FAULTS[change] in outcome.diagnosis.faults[0]
+    assert outcome.verdict == "unusable"
+    assert not outcome.effects
+    assert FAULTS[change] in outcome.answer.faults[0]
 
 
 @SLOW
@@ -302,22 +328,67 @@ def test_a_sensor_cut_off_is_named_and_its_ticks_left_out():
     recording = recorded("imposed", ("coulomb@rail=75",))
     cell = recording.column("/sensor", "load_cell")
     clipped = np.minimum(cell, float(np.quantile(cell, 0.97)))
-    columns = {**recording.columns, "/sensor": {**recording.columns["/sensor"], "load_cell": clipped}}
+    columns = {
+        **recording.columns,
+        "/sensor": {**recording.columns["/sensor"], "load_cell": clipped},
+    }
     outcome = answer(replace(recording, columns=columns))
     assert names(outcome) == {"coulomb@rail"}
-    assert any("cut off" in note for note in outcome.diagnosis.notes)
+    assert any("cut off" in note for note in outcome.answer.notes)
 
 
 def test_the_command_writes_what_it_says(tmp_path, capsys):
     rig = tmp_path / "rig.mcap"
-    assert main(["run", "imposed", "--set", "timing.duration=4", "--effect", "viscous@rail=200", "--out", str(rig)]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "imposed",
+                "--set",
+                "timing.duration=4",
+                "--effect",
+                "viscous@rail=200",
+                "--out",
+                str(rig),
+            ]
+        )
+        == 0
+    )
     report, answer, twin = tmp_path / "r.html", tmp_path / "a.json", tmp_path / "t.toml"
-    assert main(["diagnose", str(rig), "--html", str(report), "--json", str(answer), "--save-twin", str(twin)]) == 0
+    assert (
+        main(
+            [
+                "diagnose",
+                str(rig),
+                "--html",
+                str(report),
+                "--json",
+                str(answer),
+                "--save-twin",
+                str(twin),
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "viscous@rail" in said
     assert json.loads(answer.read_text())["effects"][0]["kind"] == "viscous"
     assert main(["compare", str(rig), "--config", str(twin)]) == 0
-    assert main(["run", "drop", "--config", str(twin), "--set", "timing.duration=1", "--out", str(tmp_path / "d.mcap")]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "drop",
+                "--config",
+                str(twin),
+                "--set",
+                "timing.duration=1",
+                "--out",
+                str(tmp_path / "d.mcap"),
+            ]
+        )
+        == 0
+    )
 
 
 @pytest.mark.parametrize(

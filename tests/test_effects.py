@@ -1,4 +1,5 @@
-"""Effects: every one listed, bounded, felt where it is, absent at its nominal value, and right in closed form."""
+"""Effects: every one listed, bounded, felt where it is, absent at its nominal value, and right in
+closed form."""
 
 from __future__ import annotations
 
@@ -22,11 +23,10 @@ from rigtwin.components import (
     RigPlant,
     Tyre,
     candidates,
-    find,
 )
 from rigtwin.components.conditioning import actuator, conditioned, holding
 from rigtwin.components.guide import breakaway, friction, gap_at
-from rigtwin.description.configuration import Configuration, Timing, applied
+from rigtwin.description.configuration import Configuration, Timing, applied, at_effect
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.converters import sampled, sensing
@@ -80,7 +80,7 @@ def test_nominal_value_is_no_effect(name, nominal):
     values = effect.nominal(SHORT.plant)
     for parameter, quantity in effect.quantities().items():
         assert quantity.low <= values[parameter] <= quantity.high
-    assert np.array_equal(all_measurements(effect.at(SHORT, values)), nominal)
+    assert np.array_equal(all_measurements(at_effect(SHORT, effect, values)), nominal)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -88,20 +88,30 @@ def test_an_effect_is_felt_and_stays_finite(name, nominal):
     changed = all_measurements(applied(SHORT, [text(name)]))
     count = min(len(changed), len(nominal))
     assert np.isfinite(changed).all()
-    difference = np.std(changed[:count] - nominal[:count], axis=0) + np.abs(np.mean(changed[:count] - nominal[:count], axis=0))
+    difference = np.std(changed[:count] - nominal[:count], axis=0) + np.abs(
+        np.mean(changed[:count] - nominal[:count], axis=0)
+    )
     assert np.any(difference > [2e-5, 2e-5, 2e-5, 0.5])
-    if find(name).component.endswith(("lvdt", "load_cell")) and find(name).component != "load_cell":
-        column = Measurements._fields.index(find(name).component)
+    component = EFFECTS[name].component
+    if component.endswith("lvdt"):
+        column = Measurements._fields.index(component)
         others = [number for number in range(4) if number != column]
-        assert np.array_equal(changed[:, others], nominal[:, others]), "an imposed test does not feed back its LVDTs"
+        assert np.array_equal(changed[:, others], nominal[:, others]), (
+            "an imposed test does not feed back its LVDTs"
+        )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_stepwise_and_compiled_agree_with_effects(name):
     configuration = applied(SHORT._replace(timing=Timing(duration=0.3)), [text(name)])
     first = float(DEMANDS[0, 0])
-    compiled = [b.measurements for b in run_compiled(Twin(configuration, first, 4), configuration, DEMANDS[:300])]
-    stepwise = [b.measurements for b in run(Twin(configuration, first, 4), configuration, DEMANDS[:300])]
+    compiled = [
+        b.measurements
+        for b in run_compiled(Twin(configuration, first, 4), configuration, DEMANDS[:300])
+    ]
+    stepwise = [
+        b.measurements for b in run(Twin(configuration, first, 4), configuration, DEMANDS[:300])
+    ]
     assert np.max(np.abs(np.concatenate(compiled) - np.concatenate(stepwise))) < 1e-12 * 300
 
 
@@ -120,7 +130,10 @@ def test_a_recording_keeps_its_effects_but_not_among_the_operators_settings(tmp_
         ("coulomb=3", "a component of carriage, rail, tyre"),
         ("coulomb@tyre=3", "at tyre; there are stiffness, damping, hardening"),
         ("coulomb@rail=much", "rail.coulomb = much: expected a number from 0 to 1000 N"),
-        ("stribeck@rail=20,speed=0.1", "stribeck@rail has stribeck, stribeck_velocity, not 'speed'"),
+        (
+            "stribeck@rail=20,speed=0.1",
+            "stribeck@rail has stribeck, stribeck_velocity, not 'speed'",
+        ),
         ("setting@controller=kd:1", "unknown setting controller.kd"),
     ],
 )
@@ -133,7 +146,9 @@ STEP = 2.5e-4
 NEVER_LATE = Computer()
 
 
-def through(of: Motor | Cylinder, commands: np.ndarray, computer: Computer = NEVER_LATE) -> np.ndarray:
+def through(
+    of: Motor | Cylinder, commands: np.ndarray, computer: Computer = NEVER_LATE
+) -> np.ndarray:
     conditioning = actuator(of, computer, STEP)
     state = holding(conditioning, float(commands[0]))
     return np.array([conditioned(conditioning, state, float(command)) for command in commands])
@@ -143,7 +158,10 @@ def test_actuator_conditioning_in_closed_form():
     time = np.arange(2000) * STEP
     sine = 1.0 + 0.5 * np.sin(2 * np.pi * 4.0 * time) * (time > 0)
     late = through(Motor(delay=0.0101), sine)
-    assert np.max(np.abs(late[100:] - (1.0 + 0.5 * np.sin(2 * np.pi * 4.0 * (time[100:] - 0.0101))))) < 1e-4
+    assert (
+        np.max(np.abs(late[100:] - (1.0 + 0.5 * np.sin(2 * np.pi * 4.0 * (time[100:] - 0.0101)))))
+        < 1e-4
+    )
     assert np.array_equal(through(Cylinder(delay=0.0101), sine), late)
     assert np.array_equal(through(Motor(), sine, Computer(delay=0.0101)), late)
     step = np.where(time < 0.05, 0.0, 1.0)
@@ -152,7 +170,9 @@ def test_actuator_conditioning_in_closed_form():
     assert np.max(np.abs(lagged - exact)) < 1e-9
     assert np.max(through(Motor(gain=1.1), sine) - 1.1 * sine) == 0.0
     assert np.max(through(Motor(saturation=1.2), sine)) == 1.2
-    assert np.max(np.abs(np.diff(through(Motor(rate_limit=3.0), sine)))) == pytest.approx(3.0 * STEP)
+    assert np.max(np.abs(np.diff(through(Motor(rate_limit=3.0), sine)))) == pytest.approx(
+        3.0 * STEP
+    )
     assert np.max(np.abs(through(Motor(deadband=0.2), sine) - (sine - 0.2))) < 1e-12
     play = through(Cylinder(deadband=0.2), sine)
     assert np.max(np.abs(play - sine)) == pytest.approx(0.2)
@@ -160,35 +180,47 @@ def test_actuator_conditioning_in_closed_form():
 
 
 def test_sensor_in_closed_form():
-    plant = RigPlant(load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045), ground_lvdt=Lvdt(0, 0, 0, lag=0.02))
+    plant = RigPlant(
+        load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045),
+        ground_lvdt=Lvdt(0, 0, 0, lag=0.02),
+    )
     sensors = sensing(plant, 1e-3)
     time = np.arange(1000) * 1e-3
     wave = np.sin(2 * np.pi * 2.0 * time)
     step = np.where(time < 0.1, 0.0, 1.0)
     rows = [
-        sampled(sensors, Measurements(s, 0.0, 0.0, w), np.zeros(4)) for s, w in zip(step.tolist(), wave.tolist(), strict=True)
+        sampled(sensors, Measurements(s, 0.0, 0.0, w), np.zeros(4))
+        for s, w in zip(step.tolist(), wave.tolist(), strict=True)
     ]
     force = np.array([row.load_cell for row in rows])
-    assert np.max(np.abs(force[10:] - (3.0 + 1.1 * np.sin(2 * np.pi * 2.0 * (time[10:] - 0.0045))))) < 1e-4
+    assert (
+        np.max(np.abs(force[10:] - (3.0 + 1.1 * np.sin(2 * np.pi * 2.0 * (time[10:] - 0.0045)))))
+        < 1e-4
+    )
     ground = np.array([row.ground_lvdt for row in rows])
-    assert np.max(np.abs(ground - np.where(time < 0.0995, 0.0, 1 - np.exp(-(time + 1e-3 - 0.1) / 0.02)))) < 1e-9
+    assert (
+        np.max(
+            np.abs(ground - np.where(time < 0.0995, 0.0, 1 - np.exp(-(time + 1e-3 - 0.1) / 0.02)))
+        )
+        < 1e-9
+    )
 
 
 def test_friction_in_closed_form():
     dry = friction(Rail(coulomb=50.0, stribeck=20.0, stribeck_velocity=0.01))
     gap = gap_at(0.0)
-    assert breakaway(dry, gap, 0.0, 0.0) == (70.0, 70.0)
-    assert breakaway(dry, gap, 0.0, 0.01)[0] == pytest.approx(50 + 20 * math.exp(-1))
-    assert breakaway(dry, gap, 0.0, 1.0)[1] == pytest.approx(50.0)
+    assert breakaway(dry, gap, 0.0, 0.0, 0.0) == (70.0, 70.0)
+    assert breakaway(dry, gap, 0.0, 0.01, 0.0)[0] == pytest.approx(50 + 20 * math.exp(-1))
+    assert breakaway(dry, gap, 0.0, 1.0, 0.0)[1] == pytest.approx(50.0)
     uneven = friction(Rail(coulomb=50.0, asymmetry=12.0))
-    assert breakaway(uneven, gap, 0.0, 0.1) == (56.0, 44.0)
+    assert breakaway(uneven, gap, 0.0, 0.1, 0.0) == (56.0, 44.0)
 
 
 def test_backlash_is_felt_only_where_the_gap_is_taken_up():
     loose = friction(Rail(coulomb=50.0, backlash=0.004))
     gap = gap_at(0.0)
     path = np.concatenate([np.linspace(0, 0.01, 101), np.linspace(0.01, 0, 101)])
-    felt = np.array([breakaway(loose, gap, float(x), 0.1) for x in path])
+    felt = np.array([breakaway(loose, gap, float(x), 0.1, 0.0) for x in path])
     assert np.all(felt[21:101] == (50.0, 0.0)), "pushes its element on, and may come back freely"
     assert not np.any(felt[:20])
     after = path[101:][~felt[101:].any(axis=1)]
@@ -197,7 +229,8 @@ def test_backlash_is_felt_only_where_the_gap_is_taken_up():
 
 
 def steady_force(plant: RigPlant, velocity: float) -> float:
-    """Force of rail and tyre on the carriage when driven at a steady speed out of the tyre's reach, N."""
+    """Force of rail and tyre on the carriage when driven at a steady speed out of the tyre's reach,
+    N."""
     model = build(plant, STEP)
     data = mujoco.MjData(model)
     view = handles(model, data)
@@ -221,13 +254,27 @@ def test_rail_force_at_a_steady_speed(velocity):
 
 @pytest.mark.parametrize(("damping", "hardening"), [(0.0, 40.0), (800.0, 0.0), (300.0, 25.0)])
 def test_tyre_law(damping, hardening):
-    plant = RigPlant(rail=Rail(coulomb=0.0), motor=Motor(coulomb=0.0), tyre=Tyre(50_000.0, damping, hardening))
+    plant = RigPlant(
+        rail=Rail(coulomb=0.0), motor=Motor(coulomb=0.0), tyre=Tyre(50_000.0, damping, hardening)
+    )
     model = build(plant, STEP)
     data = mujoco.MjData(model)
     view = handles(model, data)
-    for deflection, rate in ((0.004, 0.0), (0.01, 0.05), (0.01, -0.05), (0.0005, -0.3), (-0.001, 0.1)):
+    for deflection, rate in (
+        (0.004, 0.0),
+        (0.01, 0.05),
+        (0.01, -0.05),
+        (0.0005, -0.3),
+        (-0.001, 0.1),
+    ):
         view.qpos[view.carriage], view.qvel[view.carriage] = -deflection, -rate
         touch(view, contacts(plant, -deflection, deflection))
         mujoco.mj_forward(model, data)
-        law = 50_000 * deflection * (1 + hardening * deflection) + damping * rate if deflection > 0 else 0.0
-        assert data.qfrc_constraint[view.carriage] == pytest.approx(max(law, 0.0), rel=1e-3, abs=1e-3)
+        law = (
+            50_000 * deflection * (1 + hardening * deflection) + damping * rate
+            if deflection > 0
+            else 0.0
+        )
+        assert data.qfrc_constraint[view.carriage] == pytest.approx(
+            max(law, 0.0), rel=1e-3, abs=1e-3
+        )

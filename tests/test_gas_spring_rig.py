@@ -1,4 +1,5 @@
-"""The gas spring as a part of the rig: twin, ideal, quick replay, and the diagnosis' component replays."""
+"""The gas spring as a part of the rig: twin, ideal, quick replay, and the diagnosis' component
+replays."""
 
 from __future__ import annotations
 
@@ -9,11 +10,12 @@ from scipy.integrate import solve_ivp
 from experiments import find
 from experiments.thesis.trial import trial
 from rigtwin.description.configuration import Configuration
-from rigtwin.diagnosis.compare import compare, configuration_of
-from rigtwin.models.quarter_car import Reduced
+from rigtwin.diagnosis.compare import compare
+from rigtwin.models.quarter_car import QuarterCarModel
 from rigtwin.recording import load
 from rigtwin.simulation.ideal import ideal
 from rigtwin.simulation.runner import record, simulated
+from tests.helpers.twin import RIG
 
 
 def settings_of_the_test() -> Configuration:
@@ -41,7 +43,10 @@ def test_at_rest_motor_and_gas_carry_the_body():
     run = trial("gas-spring", 0)
     late = run.time > 15
     spring = run.configuration.plant.gas_spring
-    gas = spring.force * (spring.length / (spring.length + np.mean(run.travel[late]))) ** spring.exponent
+    gas = (
+        spring.force
+        * (spring.length / (spring.length + np.mean(run.travel[late]))) ** spring.exponent
+    )
     assert np.mean(run.force[late]) + gas == pytest.approx(25 * 9.81, abs=3.0)
     assert gas > 100.0
     # It follows the ideal as the passive test without it does.
@@ -52,7 +57,9 @@ def test_the_quick_replay_is_the_twin():
     configuration = settings_of_the_test()
     configuration = configuration._replace(timing=configuration.timing._replace(duration=4.0))
     ran = simulated(configuration, np.zeros((4000, 3)), 2)
-    quick = Reduced(ran.commands[:, 0], ran.commands[:, 1], ran.commands[:, 3], configuration, 4)
+    quick = QuarterCarModel(
+        ran.commands[:, 0], ran.commands[:, 1], ran.commands[:, 3], configuration, 4
+    )
     true = quick.true(configuration.plant)
     assert np.max(np.abs(true[2] - ran.truth[:, 2])) < 2e-5
     assert np.std(true[3] - ran.truth[:, 3]) < 0.5
@@ -64,10 +71,12 @@ def test_component_replays_know_it(tmp_path):
     path = tmp_path / "gas.mcap"
     record(path, "gas-spring", configuration, np.zeros((6000, 3)), 1)
     # The operator's settings say that it is there.
-    assert configuration_of(load(path)).plant == configuration.plant
-    with_it = compare(load(path), configuration)
+    assert RIG.configuration_of(load(path)).plant == configuration.plant
+    with_it = compare(RIG, load(path), configuration)
     for name in ("carriage", "mechanics", "motor"):
         assert with_it.replays[name].ratio < 2.0, name
-    plant = configuration.plant._replace(gas_spring=configuration.plant.gas_spring._replace(force=1.0))
-    without = compare(load(path), configuration._replace(plant=plant))
+    plant = configuration.plant._replace(
+        gas_spring=configuration.plant.gas_spring._replace(force=1.0)
+    )
+    without = compare(RIG, load(path), configuration._replace(plant=plant))
     assert without.replays["carriage"].ratio > 5.0

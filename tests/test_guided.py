@@ -7,13 +7,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from rigtwin.models.replaying import Setup, predictor
 
 from rigtwin.components import Guide, PositionActuator
+from rigtwin.components.guide import dry_limits, friction, slid
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
+from rigtwin.models.choose import model_of
 from rigtwin.models.following import followed
-from rigtwin.models.guided import Inertia, carried, limits, slid
+from rigtwin.models.guided import Inertia, carried
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smoothed
 from tests.helpers.described import described, recording_of
@@ -25,7 +26,8 @@ def moved(guide: Guide, position: np.ndarray, mass: float = 0.0, spring: float =
     velocity = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, velocity, np.gradient(velocity, PERIOD)]))
     out = np.empty(len(position))
-    carried(guide, Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0), spring, PERIOD, motion, out)
+    inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0)
+    carried(guide, friction(guide), inertia, spring, PERIOD, motion, out)
     return out
 
 
@@ -41,7 +43,10 @@ SPEED = np.gradient(SINE, PERIOD)
         ({"stiffness": 2000.0, "offset": 5.0}, 2000.0 * SINE + 5.0),
         ({"drag": 800.0}, 800.0 * SPEED * np.abs(SPEED)),
         ({"viscous": 300.0, "viscous_asymmetry": 100.0}, 300.0 * SPEED + 50.0 * np.abs(SPEED)),
-        ({"cogging": 3.0, "cogging_pitch": 0.01, "cogging_phase": 0.4}, 3.0 * np.sin(200.0 * np.pi * SINE + 0.4)),
+        (
+            {"cogging": 3.0, "cogging_pitch": 0.01, "cogging_phase": 0.4},
+            3.0 * np.sin(200.0 * np.pi * SINE + 0.4),
+        ),
     ],
 )
 def test_each_force_is_its_closed_form(values, force):
@@ -60,18 +65,25 @@ def test_rigid_friction_opposes_motion():
 
 
 def test_friction_differs_by_direction_and_near_standstill():
-    assert limits(Guide(coulomb=20.0, asymmetry=6.0), 0.1) == (23.0, 17.0)
-    assert limits(Guide(coulomb=20.0, stribeck=8.0, stribeck_velocity=0.01), 0.0)[0] == 28.0
-    assert limits(Guide(coulomb=20.0, stribeck=8.0, stribeck_velocity=0.01), 1.0)[0] == pytest.approx(20.0)
+    uneven = friction(Guide(coulomb=20.0, asymmetry=6.0))
+    assert dry_limits(uneven, 0.1, 0.0) == (23.0, 17.0)
+    greater_at_rest = friction(Guide(coulomb=20.0, stribeck=8.0, stribeck_velocity=0.01))
+    assert dry_limits(greater_at_rest, 0.0, 0.0)[0] == 28.0
+    assert dry_limits(greater_at_rest, 1.0, 0.0)[0] == pytest.approx(20.0)
 
 
 def test_a_spring_and_a_play_in_series_with_friction():
-    """After a reversal: the spring lets go over 2·F/k with the play between, then the slider slides again."""
+    """After a reversal: the spring lets go over 2·F/k with the play between, then the slider slides
+    again."""
     fall = np.concatenate([np.linspace(0.0, 0.02, 1000), np.linspace(0.02, 0.0, 1000)])
     force = moved(Guide(coulomb=20.0, backlash=0.003), fall, spring=1e4)
     back = 0.02 - fall[1000:]
     assert force[999] == pytest.approx(20.0)
-    expected = np.where(back < 0.002, 20.0 - 1e4 * back, np.where(back < 0.005, 0.0, np.maximum(-1e4 * (back - 0.005), -20.0)))
+    expected = np.where(
+        back < 0.002,
+        20.0 - 1e4 * back,
+        np.where(back < 0.005, 0.0, np.maximum(-1e4 * (back - 0.005), -20.0)),
+    )
     np.testing.assert_allclose(force[1000:], expected, atol=1e-6)
 
 
@@ -84,7 +96,9 @@ def test_a_slider_slides_no_further_than_it_must():
 def test_viscous_friction_through_a_spring_lags():
     lagged = moved(Guide(viscous=300.0, relaxation=0.05), SINE)[1000:]
     w = 2 * np.pi
-    expected = 300.0 * 0.02 * w / np.hypot(1.0, 0.05 * w) * np.cos(w * TIME[1000:] - np.arctan(0.05 * w))
+    expected = (
+        300.0 * 0.02 * w / np.hypot(1.0, 0.05 * w) * np.cos(w * TIME[1000:] - np.arctan(0.05 * w))
+    )
     np.testing.assert_allclose(lagged, expected, atol=0.02 * np.max(expected))
 
 
@@ -93,7 +107,9 @@ def test_viscous_friction_through_a_spring_lags():
 
 def test_an_ideal_actuator_follows_half_a_tick_late():
     command = np.cumsum(np.ones(100)) * 1e-3
-    np.testing.assert_allclose(followed(PositionActuator(), command, 0.0, PERIOD, 4)[5:], command[5:] - 0.5e-3, atol=1e-12)
+    np.testing.assert_allclose(
+        followed(PositionActuator(), command, 0.0, PERIOD, 4)[5:], command[5:] - 0.5e-3, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -127,7 +143,9 @@ def test_a_play_is_its_width():
 
 
 def test_a_rate_limit_holds():
-    position = followed(PositionActuator(rate_limit=0.05), 0.02 * np.sign(np.sin(TIME)), 0.0, PERIOD, 4)
+    position = followed(
+        PositionActuator(rate_limit=0.05), 0.02 * np.sign(np.sin(TIME)), 0.0, PERIOD, 4
+    )
     assert np.max(np.abs(np.diff(position))) <= 0.05 * PERIOD * 1.0001
 
 
@@ -151,16 +169,18 @@ def test_a_pushed_joint_moves_as_mujoco_moves_it(tmp_path: Path, sort: str):
     machine = described(tmp_path, sort)
     command = 3.0 * np.sin(2 * np.pi * 0.7 * TIME) + 1.5 * np.sin(2 * np.pi * 2.1 * TIME)
     position = simulated(machine, command)
-    model = predictor(machine, recording_of(machine, command, position), Setup(machine.plant, {}), 20)
+    model = model_of(machine, recording_of(machine, command, position), machine.configuration, 20)
     assert np.ptp(position) > 0.01
-    np.testing.assert_allclose(model.sensed(machine.plant)[0], position, atol=0.004 * np.ptp(position))
+    np.testing.assert_allclose(
+        model.sensed(machine.plant)[0], position, atol=0.004 * np.ptp(position)
+    )
 
 
 def test_a_block_slows_down_by_its_friction_and_stays(tmp_path: Path):
     machine = described(tmp_path, "slide")
     plant = machine.plant._replace(guide=Guide(coulomb=4.0))
-    command = np.where(TIME < 0.5, 10.0, 0.0)
-    model = predictor(machine, recording_of(machine, command, np.zeros(len(TIME))), Setup(plant, {}), 4)
+    recording = recording_of(machine, np.where(TIME < 0.5, 10.0, 0.0), np.zeros(len(TIME)))
+    model = model_of(machine, recording, machine.configuration._replace(plant=plant), 4)
     position = model.sensed(plant)[0]
     # 2 kg: 3 m/s² for half a second, then −2 m/s² until it rests.
     assert position[-1] == pytest.approx(0.375 + 1.5**2 / 4.0, rel=0.003)
@@ -171,12 +191,15 @@ def test_a_loop_is_closed_by_the_controllers_formula():
     machine = find("emps")
     reference = 0.05 * (1 - np.cos(2 * np.pi * 0.5 * TIME))
     columns = {
-        "/command": {"reference": reference, "force": np.zeros(len(TIME)), "pulse_voltage": np.zeros(len(TIME))},
+        "/command": {
+            "reference": reference,
+            "force": np.zeros(len(TIME)),
+            "pulse_voltage": np.zeros(len(TIME)),
+        },
         "/sensor": {"position": reference},
     }
     recording = Recording(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
-    assert machine.control is not None
-    model = predictor(machine, recording, Setup(machine.plant, dict(machine.control.formula.settings)), 8)
+    model = model_of(machine, recording, machine.configuration, 8)
     force = model.sensed(machine.plant)[0]
     speed = np.gradient(reference, PERIOD)
     needed = 95.1 * np.gradient(speed, PERIOD) + 203.5 * speed

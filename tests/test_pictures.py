@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from rigtwin.errors import RigtwinError
 from rigtwin.render.plot import draw
 from rigtwin.render.video import FRAMES_PER_SECOND, SCENE_HEIGHT, film
+from tests.helpers.twin import RIG
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
@@ -22,7 +23,9 @@ def test_plot(example, tmp_path, ending):
 
 
 def test_plot_leaves_out_what_is_not_there(example, tmp_path):
-    only = dataclasses.replace(example, columns={"/sensor": {"load_cell": example.column("/sensor", "load_cell")}})
+    only = dataclasses.replace(
+        example, columns={"/sensor": {"load_cell": example.column("/sensor", "load_cell")}}
+    )
     draw(only, tmp_path / "p.png")
     assert imread(tmp_path / "p.png").shape[0] < 400
 
@@ -44,7 +47,15 @@ def frames(path) -> list[np.ndarray]:
 def test_film_shows_the_rig_moving(example, tmp_path):
     out = tmp_path / "f.mp4"
     counted: list[tuple[int, int]] = []
-    film(example, out, until=1.5, start=0.5, magnify=3.0, progress=lambda done, total: counted.append((done, total)))
+    film(
+        example,
+        out,
+        RIG,
+        until=1.5,
+        start=0.5,
+        magnify=3.0,
+        progress=lambda done, total: counted.append((done, total)),
+    )
     pictures = frames(out)
     assert len(pictures) == FRAMES_PER_SECOND
     assert counted[-1] == (FRAMES_PER_SECOND, FRAMES_PER_SECOND)
@@ -56,11 +67,15 @@ def test_film_shows_the_rig_moving(example, tmp_path):
 
 def test_film_refuses_what_it_cannot_do(example, tmp_path):
     with pytest.raises(RigtwinError, match=r"must end in \.mp4"):
-        film(example, tmp_path / "f.gif")
+        film(example, tmp_path / "f.gif", RIG)
     with pytest.raises(RigtwinError, match="unknown camera 'top'; there are overview, side, wheel"):
-        film(example, tmp_path / "f.mp4", camera="top")
+        film(example, tmp_path / "f.mp4", RIG, camera="top")
     with pytest.raises(RigtwinError, match="--magnify"):
-        film(example, tmp_path / "f.mp4", magnify=0.0)
+        film(example, tmp_path / "f.mp4", RIG, magnify=0.0)
     with pytest.raises(RigtwinError, match="suspension_lvdt is missing"):
-        film(dataclasses.replace(example, columns={"/sensor": {"structure_lvdt": example.time}}), tmp_path / "f.mp4")
+        film(
+            dataclasses.replace(example, columns={"/sensor": {"structure_lvdt": example.time}}),
+            tmp_path / "f.mp4",
+            RIG,
+        )
     assert list(tmp_path.iterdir()) == []

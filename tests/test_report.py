@@ -1,4 +1,5 @@
-"""What a diagnosis is told in: a document, a corrected twin, a page that a browser opens where there is one."""
+"""What a diagnosis is told in: a document, a corrected twin, a page that a browser opens where
+there is one."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ import pytest
 from rigtwin.description.configuration import Configuration, from_toml, overridden
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
-from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.report import bars, html, plots
+from rigtwin.diagnosis.result import Diagnosis
 from tests.helpers.browser import BROWSER, looked_at
 from tests.helpers.recordings import replace_sensors
 from tests.helpers.twin import answer, recorded
@@ -22,9 +23,9 @@ VERDICTS = ("explained", "unknown", "no gap", "unusable")
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> dict[str, Outcome]:
-    """Of a twin with more dry friction than told; of one whose load cell drifts, which is no effect of the library; of one as
-    told; of one with a sensor in mm."""
+def outcomes() -> dict[str, Diagnosis]:
+    """Of a twin with more dry friction than told; of one whose load cell drifts, which is no effect
+    of the library; of one as told; of one with a sensor in mm."""
     sound = recorded("imposed")
     load_cell = sound.column("/sensor", "load_cell") + 4.0 * sound.time
     travel = 1e3 * sound.column("/sensor", "suspension_lvdt")
@@ -37,19 +38,25 @@ def outcomes() -> dict[str, Outcome]:
 
 
 @pytest.fixture
-def explained(outcomes) -> Outcome:
+def explained(outcomes) -> Diagnosis:
     return outcomes["explained"]
 
 
 def test_the_document_has_every_field(explained):
-    document = json.loads(json.dumps(explained.diagnosis.document()))
+    document = json.loads(json.dumps(explained.document()))
     assert document["verdict"] == "explained"
     (effect,) = document["effects"]
     assert set(effect) == {"component", "kind", "parameters", "confidence", "class", "share"}
     assert set(effect["parameters"]["coulomb"]) == {"value", "low", "high", "nominal", "unit"}
     assert effect["class"][0] == {"component": "rail", "kind": "coulomb"}
     assert set(document["where"][0]) >= {"component", "share", "band_hz", "region"}
-    assert set(document["gap"]) >= {"before", "after", "floor", "shrinkage_predicted", "shrinkage_held_out"}
+    assert set(document["gap"]) >= {
+        "before",
+        "after",
+        "floor",
+        "shrinkage_predicted",
+        "shrinkage_held_out",
+    }
     assert set(document["gap"]["shrinkage_held_out"]) == {"value", "low", "high"}
     assert {"next_test", "not_observable", "seconds"} <= set(document)
 
@@ -65,7 +72,7 @@ def test_a_corrected_twin_says_how_sure_it_is(explained, tmp_path):
     path = tmp_path / "twin.toml"
     path.write_text(toml(explained))
     posterior = load_posterior(path)
-    (effect,) = explained.diagnosis.effects
+    (effect,) = explained.effects
     estimate = effect.parameters["coulomb"]
     assert posterior.intervals == {"rail.coulomb": (estimate.low, estimate.high)}
     assert posterior.probability == effect.confidence
@@ -77,7 +84,7 @@ def test_a_corrected_twin_says_how_sure_it_is(explained, tmp_path):
 
 
 def test_what_has_no_name_is_not_named_but_placed(outcomes):
-    found = outcomes["unknown"].diagnosis
+    found = outcomes["unknown"]
     assert found.verdict == "unknown"
     assert not found.effects
     place = found.where[0]
@@ -89,10 +96,14 @@ def test_what_has_no_name_is_not_named_but_placed(outcomes):
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_the_page_says_the_answer_first(outcomes, verdict):
     outcome = outcomes[verdict]
-    assert outcome.diagnosis.verdict == verdict
+    assert outcome.verdict == verdict
     page = html(outcome)
-    assert page.index(f">{verdict}<") < page.index("<h1>") < page.index("The rig from ground cylinder")
-    assert not re.search(r"(src|href)=\"(?!data:)", page.replace('xlink:href="#', "").replace('href="#', ""))
+    assert (
+        page.index(f">{verdict}<") < page.index("<h1>") < page.index("The rig from ground cylinder")
+    )
+    assert not re.search(
+        r"(src|href)=\"(?!data:)", page.replace('xlink:href="#', "").replace('href="#', "")
+    )
     assert "<script" not in page
 
 
@@ -104,11 +115,11 @@ def test_the_guilty_component_is_marked(outcomes):
 
 
 def test_bars_are_of_every_replay_and_on_one_scale(outcomes):
-    found = bars(outcomes["explained"].diagnosis)
+    found = bars(outcomes["explained"].answer)
     assert found[0].name == "all sensors"
     assert len(found) >= 5
     assert max(max(bar.before_width, bar.after_width) for bar in found) == pytest.approx(100.0)
-    assert not bars(outcomes["unusable"].diagnosis)
+    assert not bars(outcomes["unusable"].answer)
 
 
 def test_plots_are_by_velocity_frequency_and_time(outcomes):
@@ -118,14 +129,16 @@ def test_plots_are_by_velocity_frequency_and_time(outcomes):
 
 def test_names_from_files_cannot_write_the_page(outcomes):
     outcome = outcomes["no gap"]
-    hostile = replace(outcome, diagnosis=replace(outcome.diagnosis, notes=("<script>alert(1)</script>",)))
+    hostile = replace(outcome, answer=replace(outcome.answer, notes=("<script>alert(1)</script>",)))
     assert "<script>" not in html(hostile)
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no chromium")
 @pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(outcomes, verdict, width, tmp_path: Path):
+def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(
+    outcomes, verdict, width, tmp_path: Path
+):
     result = looked_at(html(outcomes[verdict]), width, tmp_path)
     assert result["wide"] <= width
     assert result["first"] < 500

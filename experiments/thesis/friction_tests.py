@@ -33,7 +33,13 @@ from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.runner import record, simulated
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.friction_spikes import BOUNDS, Calibration, find_compensator, detections, filter_lag
+from rigtwin.studies.friction_spikes import (
+    BOUNDS,
+    Calibration,
+    detections,
+    filter_lag,
+    find_compensator,
+)
 
 LOOPS: dict[str, dict[str, float]] = {"fitted": {"kp": 1.0, "ki": 190.0}, "nominal": {"kp": 0.3, "ki": 10.0}}
 """Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows Table 3.5, `fitted` those with

@@ -11,8 +11,8 @@ from scipy.signal import butter, sosfiltfilt
 from experiments import find
 from experiments.thesis.entry import Entry, digits
 from experiments.thesis.study import Job, Result
-from rigtwin.errors import RigtwinError
 from rigtwin.description.configuration import Configuration
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, ideal

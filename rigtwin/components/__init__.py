@@ -13,7 +13,14 @@ from rigtwin.components.motor import Motor
 from rigtwin.components.plant import Plant, with_parameters
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.rig import RigPlant
-from rigtwin.components.sensors import ForceSensor, LoadCell, Lvdt, PositionSensor, VelocitySensor
+from rigtwin.components.sensors import (
+    ForceSensor,
+    LoadCell,
+    Lvdt,
+    PositionSensor,
+    VelocitySensor,
+    measures,
+)
 from rigtwin.components.tyre import Tyre
 
 __all__ = [
@@ -46,6 +53,7 @@ __all__ = [
     "VelocitySensor",
     "candidates",
     "find",
+    "measures",
     "title",
     "with_parameters",
 ]

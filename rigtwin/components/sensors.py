@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -87,6 +88,19 @@ class ForceSensor(NamedTuple):
 DECLARED = (Lvdt, LoadCell)
 """Sensors whose noise, hum and bits are declared."""
 Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
+MEASURES: Mapping[type, str] = {
+    PositionSensor: "position",
+    VelocitySensor: "velocity",
+    ForceSensor: "force",
+    Lvdt: "position",
+    LoadCell: "force",
+}
+"""Type of sensor → what it measures of its joint."""
+
+
+def measures(component: object) -> str:
+    """What a component measures: position, velocity or force; "" if it is no sensor."""
+    return MEASURES.get(type(component), "")
 
 
 class Transducer(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any
 from rigtwin import components
 from rigtwin.components import KINDS, UNLIMITED, RigPlant
 from rigtwin.components.quantity import Quantity, fields
+from rigtwin.components.sensors import MEASURES
 from rigtwin.description.machine import Component, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
@@ -35,13 +36,8 @@ TYPES: dict[str, type] = {
 """Type of component as a description calls it."""
 ELEMENTS = ("body", "joint", "tendon", "contact", "actuator", "sensor")
 """Elements of an MJCF that can be components."""
-SENSED = {
-    "position sensor": "position",
-    "velocity sensor": "velocity",
-    "force sensor": "force",
-    "lvdt": "position",
-    "load cell": "force",
-}
+SENSED = {name: MEASURES[of] for name, of in TYPES.items() if of in MEASURES}
+"""Type of sensor → what it measures."""
 MOVING = ("force actuator", "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}

@@ -63,7 +63,7 @@ class Replays:
         known = [
             name
             for name, kind in self._components.types.items()
-            if kind in (*MOVING, "position sensor", "velocity sensor")
+            if kind in MOVING or SENSED.get(kind) in ("position", "velocity")
         ]
         if not isinstance(movers, list) or not movers:
             said = "is missing" if "moved_by" not in table else "is no name"

@@ -170,10 +170,7 @@ def _diagnose(
     )
     deviations = _deviations(evidence)
     sampled = outstanding(
-        evidence.names,
-        evidence.recordings,
-        [list(rows) for rows in evidence.predicted(plant)],
-        evidence.plant,
+        evidence.machine, evidence.recordings, evidence.predicted(plant), evidence.plant
     )
     attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
@@ -185,7 +182,7 @@ def _diagnose(
     )
     effects = [
         *(each for each in attributed if each not in traces),
-        *(_sampled(each, evidence.plant) for each in sampled),
+        *(_sampled(each, evidence) for each in sampled),
         *(_deviation(each) for each in deviations if each.kind != "unknown"),
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
@@ -347,9 +344,9 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     return tuple(dict.fromkeys(names))
 
 
-def _sampled(each: Sampled, plant: Plant) -> Finding:
-    effect = find(f"{each.kind}@{each.component}", plant)
-    unit = effect.quantities()[each.parameter].unit
+def _sampled(each: Sampled, evidence: Evidence) -> Finding:
+    effect = find(f"{each.kind}@{each.component}", evidence.plant)
+    unit = evidence.machine.unit(effect.group, effect.quantities()[each.parameter])
     spread = 0.05 * each.value
     estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
     name = Name(each.component, each.kind)

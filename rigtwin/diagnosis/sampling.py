@@ -1,4 +1,4 @@
-"""What the signals themselves say of their sensors: white noise, mains line, size of one bit. No model is needed."""
+"""What the signals themselves say of their sensors: white noise, mains line, size of one bit."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import LoadCell, Lvdt
+from rigtwin.components import measures
 from rigtwin.components.plant import Plant
+from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
 
 OUTSTANDING = 1.6
-"""Times its nominal value, and times what the other sensors have more than nominal, from which a sensor's noise, hum or bit
-is a finding. What all sensors have more is the laboratory's noise, which nobody declares exactly."""
-LEVELS = 64
-"""A signal with fewer values than these per swing is coarse enough for its bits to matter."""
+"""Times its nominal value, and times what the other sensors have more than nominal, from which a
+sensor's noise, hum or bit is a finding. What all sensors have more is the laboratory's noise, which
+nobody declares exactly."""
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value, nominal: in the sensor's
-    unit."""
+    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value,
+    nominal: in the sensor's unit."""
 
     component: str
     kind: str
@@ -33,11 +33,28 @@ class Sampled:
     nominal: float
 
 
-def properties(recording: Recording, name: str, predicted: Array, plant: Plant) -> dict[str, float]:
-    """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should read."""
-    signal = recording.column("/sensor", name)
+PROPERTIES = {"white": "noise", "hum": "hum", "resolution": "quantisation"}
+"""Parameter of a sensor → the kind of effect that it is the magnitude of."""
+
+
+def properties(signal: Array, predicted: Array, period: float, mains: float) -> dict[str, float]:
+    """What a sensor shows by itself.
+
+    Parameters
+    ----------
+    signal, predicted
+        What it read, and what a twin says that it should read, shape (ticks,), in its unit.
+    period
+        s, of a tick.
+    mains
+        Hz.
+
+    Returns
+    -------
+    White noise rms, amplitude of the mains line and size of a bit, in its unit.
+    """
     difference = signal - predicted
-    line = difference - without_mains(difference, recording.period, plant.mains.frequency)
+    line = difference - without_mains(difference, period, mains)
     bit = smallest_step(signal)
     # White noise as the bits leave it: a coarse bit adds a variance of its own.
     white = math.sqrt(max(white_noise(signal) ** 2 - bit**2 / 12.0, 0.0))
@@ -45,41 +62,53 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Plant) 
 
 
 def outstanding(
-    sensors: Sequence[str],
+    machine: Machine,
     recordings: Sequence[Recording],
-    predicted: Sequence[Sequence[Array]],
+    predicted: Sequence[Array],
     plant: Plant,
 ) -> tuple[Sampled, ...]:
-    """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
-    order of the rows of predicted: one list a recording, one array a sensor."""
-    declared = [name for name in sensors if getattr(getattr(plant, name, None), "white", 0.0) > 0.0]
-    if not declared:
-        return ()
-    names = {"white": "noise", "hum": "hum", "resolution": "quantisation"}
-    found: list[Sampled] = []
+    """What stands out of nominal, and of what the other sensors have, where noise is declared.
+
+    Parameters
+    ----------
+    machine
+        Whose sensors they are; what its description says a sensor cannot have is left out.
+    recordings
+        Of it.
+    predicted
+        What a twin says that its rows should be, shape (rows, ticks) for each recording.
+    plant
+        With the sensors' nominal properties.
+    """
     table: dict[str, dict[str, float]] = {}
-    for number, name in enumerate(sensors):
-        if name not in declared:
+    for number, row in enumerate(machine.rows):
+        sensor = getattr(plant, row.name, None)
+        if not measures(sensor) or sensor.white == 0.0:
             continue
         each = [
-            properties(r, name, p[number], plant)
-            for r, p in zip(recordings, predicted, strict=True)
+            properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
+            for r, rows in zip(recordings, predicted, strict=True)
         ]
-        table[name] = {key: float(np.median([one[key] for one in each])) for key in names}
-    for parameter, kind in names.items():
-        ratios: dict[str, float] = {}
-        for name in declared:
-            sensor: Lvdt | LoadCell = getattr(plant, name)
-            nominal = float(getattr(sensor, parameter))
-            # Hum is seen above what white noise alone would show of a line.
-            ratios[name] = table[name][parameter] / nominal if nominal > 0.0 else 0.0
+        table[row.name] = {key: float(np.median([one[key] for one in each])) for key in PROPERTIES}
+    possible = {effect.name for effect in machine.effects()}
+    found: list[Sampled] = []
+    for parameter, kind in PROPERTIES.items():
+        nominal = {name: float(getattr(getattr(plant, name), parameter)) for name in table}
+        # Hum is seen above what white noise alone would show of a line.
+        ratios = {
+            name: values[parameter] / nominal[name] if nominal[name] > 0.0 else 0.0
+            for name, values in table.items()
+        }
         for name, ratio in ratios.items():
-            others = [other for key, other in ratios.items() if key != name]
+            if f"{kind}@{name}" not in possible:
+                continue
             if kind == "quantisation" and table[name]["resolution"] < table[name]["white"]:
                 continue
             if kind == "noise" and table[name]["resolution"] > table[name]["white"]:
                 continue
-            if ratio > OUTSTANDING and ratio > OUTSTANDING * float(np.median(others)):
-                nominal = float(getattr(getattr(plant, name), parameter))
-                found.append(Sampled(name, kind, parameter, table[name][parameter], nominal))
+            # Without another sensor there is nothing that says what the laboratory has more.
+            others = [other for key, other in ratios.items() if key != name] or [1.0]
+            if ratio > OUTSTANDING * max(1.0, float(np.median(others))):
+                value = table[name][parameter]
+                found.append(Sampled(name, kind, parameter, value, nominal[name]))
     return tuple(found)

@@ -11,13 +11,13 @@ from rigtwin.components import (
     Guide,
     PositionActuator,
     PositionSensor,
-    VelocitySensor,
+    measures,
 )
 from rigtwin.components.conditioning import actuator, holding
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import fresh, seen, transducer
+from rigtwin.components.sensors import Sensor, fresh, seen, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import Machine, ReplayOf, Row
@@ -78,8 +78,8 @@ class JointModel:
         self._motion: Array | None = None
         self._error = 0.0
         kind = getattr(machine.plant, self._mover.name)
-        self._integrated = isinstance(kind, VelocitySensor)
-        if isinstance(kind, PositionSensor | VelocitySensor):
+        self._integrated = measures(kind) == "velocity"
+        if measures(kind) in ("position", "velocity"):
             self._motion, self._error = smoothed(recording.column(topic, name), self._period)
         elif not replay.closed:
             self._command = recording.column(topic, name)
@@ -93,7 +93,7 @@ class JointModel:
             for name, component in machine.components.items()
             if component.joint == replay.joint.name
             and component.channel in self._inputs.values()
-            and isinstance(getattr(machine.plant, name), PositionSensor | VelocitySensor)
+            and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
         self._last: dict[tuple[object, ...], Array] = {}
         self._start = self._started()
@@ -112,9 +112,8 @@ class JointModel:
         measured = [row.channel for row in self.rows if row.kind == "position"]
         for name in self._sensors:
             channel = self._machine.components[name].channel
-            if channel is not None and isinstance(
-                getattr(self._machine.plant, name), PositionSensor
-            ):
+            sensor = getattr(self._machine.plant, name)
+            if channel is not None and measures(sensor) == "position":
                 measured.append(channel)
         for channel in measured:
             ticks = min(max(8, round(BEGINNING / self._period)), self._recording.ticks)
@@ -170,7 +169,7 @@ class JointModel:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
-    def _unsensed(self, sensor: PositionSensor | VelocitySensor) -> Array:
+    def _unsensed(self, sensor: Sensor) -> Array:
         """The position behind a measured motion: the sensor's offset, gain, lag and delay undone. Of a velocity its mean is no
         motion, as what is tested does not move away."""
         assert self._motion is not None
@@ -218,7 +217,7 @@ class JointModel:
         parts = [getattr(plant, name) for name in self._sensors] or [PositionSensor()]
         models = tuple(transducer(part, self._period) for part in parts)
         states = tuple(fresh(model) for model in models)
-        kinds = np.array([int(isinstance(part, VelocitySensor)) for part in parts])
+        kinds = np.array([int(measures(part) == "velocity") for part in parts])
         command = self._command.copy()
         out = np.zeros((4, len(command)))
         pushed(

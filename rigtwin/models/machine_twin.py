@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin import __version__
-from rigtwin.components import ForceSensor, PositionSensor, VelocitySensor
+from rigtwin.components import measures
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import seen
 from rigtwin.description.configuration import Configuration, applied, flattened
@@ -191,7 +191,7 @@ def _simulate(
         if name in model.read:
             reading = model.read[name]
         else:
-            row = {PositionSensor: 0, VelocitySensor: 1, ForceSensor: 2}[type(getattr(plant, name))]
+            row = ("position", "velocity", "force").index(measures(getattr(plant, name)))
             reading = seen(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
             bit = getattr(plant, name).resolution
             reading = np.round(reading / bit) * bit if bit > 0.0 else reading

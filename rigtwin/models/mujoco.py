@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 
 from controllers.formula import run as run_formula
-from rigtwin.components import UNLIMITED, ForceActuator, Guide, PositionSensor, VelocitySensor
+from rigtwin.components import UNLIMITED, ForceActuator, Guide, measures
 from rigtwin.components.conditioning import actuator, conditioned, holding
 from rigtwin.components.guide import damping, dry_limits, friction, resting, slid
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import fresh, transduced, transducer
 from rigtwin.models.guided import Inertia
-from rigtwin.models.joint import ELASTIC, JointModel
+from rigtwin.models.joint import JointModel
 from rigtwin.numerics.arrays import Array
 
 FIXED = 1e12
@@ -147,7 +147,7 @@ class MujocoModel(JointModel):
         def sense(tick: int, position: float, velocity: float) -> dict[str, float]:
             found = {}
             for name, part, each, state in zip(names, parts, models, states, strict=True):
-                true = velocity if isinstance(part, VelocitySensor) else position
+                true = velocity if measures(part) == "velocity" else position
                 value = transduced(each, state, true)
                 if name in self.sensor_noise:
                     value += float(self.sensor_noise[name][tick])
@@ -190,7 +190,7 @@ class MujocoModel(JointModel):
             name
             for name, component in self._machine.components.items()
             if component.joint == joint
-            and isinstance(getattr(self._machine.plant, name), PositionSensor | VelocitySensor)
+            and measures(getattr(self._machine.plant, name)) in ("position", "velocity")
         ]
 
 

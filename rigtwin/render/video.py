@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from rigtwin.components import PositionActuator, PositionSensor, VelocitySensor
+from rigtwin.components import PositionActuator, measures
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -108,15 +108,17 @@ def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
             ground = _smooth(recording.column("/sensor", "ground_lvdt"), recording.period)
         return {"ground": ground, "carriage": structure - travel, "structure": structure}
     found: dict[str, Array] = {}
-    for of in (PositionSensor, PositionActuator, VelocitySensor):
+    for wanted in ("position", "command", "velocity"):
         # A position as measured, else as commanded, else as its velocity adds up to.
         for name, component in machine.components.items():
             channel = component.channel
-            fits = type(getattr(machine.plant, name)) is of and component.joint not in found
+            part = getattr(machine.plant, name)
+            says = "command" if isinstance(part, PositionActuator) else measures(part)
+            fits = says == wanted and component.joint not in found
             if fits and channel is not None and recording.has(*channel):
                 signal = recording.column(*channel)
                 summed = np.cumsum(signal - np.mean(signal)) * recording.period
-                found[component.joint] = summed if of is VelocitySensor else signal
+                found[component.joint] = summed if wanted == "velocity" else signal
     if not found:
         raise RigtwinError(f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it")
     return found

@@ -5,30 +5,42 @@ from __future__ import annotations
 from functools import cache
 
 from experiments import EXPERIMENTS
+from rigtwin.components import Effect, find
 from rigtwin.description.catalogue import find as machine_of
 from rigtwin.description.configuration import Configuration, applied
-from rigtwin.diagnosis.compare import configuration_of
-from rigtwin.diagnosis.diagnose import Outcome, diagnose
+from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.next_test import tried
+from rigtwin.diagnosis.next_test import record_on_twin
+from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.recording import Recording
 
 RIG = machine_of("suspension-rig")
 
 
+def rig_effect(name: str) -> Effect:
+    """An effect of the suspension rig."""
+    return find(name, RIG.plant)
+
+
 @cache
-def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5) -> Recording:
+def recorded(
+    name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5
+) -> Recording:
     """A test on the twin with effects."""
     configuration = EXPERIMENTS[name].configuration
     configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
     demands = EXPERIMENTS[name].demands(configuration, seed)
-    return tried(name, applied(configuration, list(effects)), demands)
+    return record_on_twin(RIG, name, applied(configuration, list(effects)), demands)
 
 
 def evidence_of(*recordings: Recording) -> Evidence:
-    return Evidence(RIG, recordings, [configuration_of(recording) for recording in recordings])
+    return Evidence(RIG, recordings, [RIG.configuration_of(recording) for recording in recordings])
 
 
-def answer(*recordings: Recording, base: Configuration | None = None, held_out: tuple[Recording, ...] = ()) -> Outcome:
+def answer(
+    *recordings: Recording,
+    base: Configuration | None = None,
+    held_out: tuple[Recording, ...] = (),
+) -> Diagnosis:
     """What the diagnosis of the suspension rig says of them."""
-    return diagnose(RIG, recordings, base or Configuration(), held_out)
+    return diagnose(RIG, recordings, base, held_out)

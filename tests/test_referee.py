@@ -1,4 +1,5 @@
-"""The withheld-effect check: a referee that knows nothing of the twin, a key that cannot be changed, scores that are right."""
+"""The withheld-effect check: a referee that knows nothing of the twin, a key that cannot be
+changed, scores that are right."""
 
 from __future__ import annotations
 
@@ -19,10 +20,9 @@ from referee.reference_rig import Law, quiet, run
 from referee.score import misses, rows, table, wilson
 from referee.test_signals import TESTS, asked
 from rigtwin.components import RigPlant, candidates
-from rigtwin.description.catalogue import find as machine_of
-from rigtwin.diagnosis.compare import configuration_of
-from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.recording import load
+from tests.helpers.twin import RIG, evidence_of
 
 KNOWN = {effect.name for effect in candidates(RigPlant())} | {"setting@controller"}
 
@@ -42,19 +42,19 @@ def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
         path = tmp_path / f"{test}.mcap"
         write(path, law, *run(Truth(), law, demands[:8000], np.random.default_rng(4)))
         recording = load(path)
-        evidence = Evidence(machine_of("suspension-rig"), [recording], [configuration_of(recording)])
+        evidence = evidence_of(recording)
         residual = evidence.residual(evidence.plant)
         assert 0.85 < float(residual @ residual) / evidence.expected < 1.1
 
 
 def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
-    from rigtwin.diagnosis.controller import ControllerReplay
-
     law, demands = asked("road10", np.random.default_rng(4))
     path = tmp_path / "road.mcap"
     write(path, law, *run(Truth(), law, demands[:3000], np.random.default_rng(4)))
     recording = load(path)
-    assert ControllerReplay(recording, configuration_of(recording).controller).deviation() is None
+    assert RIG.control is not None
+    settings = RIG.configuration_of(recording).controller
+    assert ControllerReplay(RIG.control, recording, settings).deviation() is None
 
 
 def test_its_two_frictions_agree_where_they_should():
@@ -110,8 +110,16 @@ def test_a_size_is_the_change_in_units_of_noise():
     law, demands = asked("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:4000], np.random.default_rng(2))
     groups = library(commands, np.random.default_rng(2))
-    defect = next(d for group in groups for make in group for d in [make()] if (d.kind, d.component) == ("offset", "load_cell"))
-    assert effect_size(Truth(), law, defect, commands) == pytest.approx(abs(defect.value) / Truth().load_cell.white, rel=0.01)
+    defect = next(
+        d
+        for group in groups
+        for make in group
+        for d in [make()]
+        if (d.kind, d.component) == ("offset", "load_cell")
+    )
+    assert effect_size(Truth(), law, defect, commands) == pytest.approx(
+        abs(defect.value) / Truth().load_cell.white, rel=0.01
+    )
     assert MATERIAL == 1.0
 
 
@@ -157,7 +165,15 @@ def entry(sort: str, *effects: tuple[str, str, float, float]) -> dict:
         "sort": sort,
         "test": "imposed",
         "effects": [
-            {"kind": k, "component": c, "value": v, "nominal": n, "inside": inside, "size": 9.0, "material": True}
+            {
+                "kind": k,
+                "component": c,
+                "value": v,
+                "nominal": n,
+                "inside": inside,
+                "size": 9.0,
+                "material": True,
+            }
             for k, c, v, n in effects
         ],
     }
@@ -167,7 +183,14 @@ def said(verdict: str, *effects: tuple[str, str, float], where: str = "") -> dic
     return {
         "verdict": verdict,
         "effects": [
-            {"kind": k, "component": c, "parameters": {k: {"value": v}}, "confidence": 0.95, "class": [], "share": 1.0}
+            {
+                "kind": k,
+                "component": c,
+                "parameters": {k: {"value": v}},
+                "confidence": 0.95,
+                "class": [],
+                "share": 1.0,
+            }
             for k, c, v in effects
         ],
         "where": [{"component": where}] if where else [],
@@ -206,4 +229,6 @@ def test_scores_count_what_they_say():
     assert len(misses(result)) == 2
     assert "viscous@rail" in table(result)
     worse = replace(result, answers=[said("no gap")] * 6)
-    assert {row.measure: row.value for row in rows(worse)}["top-1 right, material single effects"].startswith("0 of 2")
+    assert {row.measure: row.value for row in rows(worse)}[
+        "top-1 right, material single effects"
+    ].startswith("0 of 2")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigtwin.description.setting import from_assignments, nominal, overridden, without
-from rigtwin.diagnosis.trials import searched, trials
 
 from rigtwin.cli import main
-from rigtwin.components import RigPlant
+from rigtwin.components import RigPlant, Scales, Swing
 from rigtwin.components import find as effect_of
+from rigtwin.components.effect import SHARES
 from rigtwin.description.catalogue import find, shipped
+from rigtwin.description.configuration import from_assignments, overridden, without
 from rigtwin.description.document import examined, load
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import possible
@@ -33,7 +33,12 @@ def test_a_shipped_machine_has_no_mistakes(name):
 def test_the_suspension_rig_is_described_like_any_other():
     machine = find("suspension-rig")
     assert machine.plant == RigPlant()
-    assert [row.name for row in machine.rows] == ["ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell"]
+    assert [row.name for row in machine.rows] == [
+        "ground_lvdt",
+        "structure_lvdt",
+        "suspension_lvdt",
+        "load_cell",
+    ]
     assert len(machine.tolerances) == 20
     tolerance = machine.tolerance_of("motor", "gain")
     assert tolerance is not None
@@ -44,7 +49,9 @@ def test_nominal_values_come_from_the_mjcf_and_then_the_description(tmp_path: Pa
     machine = described(tmp_path)
     assert machine.plant.mass.mass == 2.0
     assert (machine.plant.guide.stiffness, machine.plant.guide.viscous) == (150.0, 6.0)
-    text = TOML.replace('joint = "axis"', 'joint = "axis"\nviscous = { value = 9.0, tolerance = "5 %" }')
+    text = TOML.replace(
+        'joint = "axis"', 'joint = "axis"\nviscous = { value = 9.0, tolerance = "5 %" }'
+    )
     machine = described(tmp_path, toml=text)
     assert machine.plant.guide.viscous == 9.0
     tolerance = machine.tolerance_of("guide", "viscous")
@@ -63,29 +70,34 @@ def test_units_follow_the_joint(tmp_path: Path):
 def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
     machine = described(tmp_path, "pendulum")
     joint = machine.replays[0].joint
-    # A capsule of 1.5 kg hangs at 0.2 m; its inertia about the end is that of a rod and a little more.
+    # A capsule of 1.5 kg hangs at 0.2 m; its inertia about the end is that of a rod and a little
+    # more.
     assert joint.inertia == pytest.approx(1.5 * 0.4**2 / 3, rel=0.06)
     load = np.interp(0.5, joint.positions, joint.gravity)
     assert load == pytest.approx(1.5 * 9.81 * 0.2 * np.sin(0.5), rel=1e-3)
 
 
+READ_OFF = {"hum", "noise", "quantisation"}
+"""Kinds at a sensor that are not searched for but read off its signal."""
+
+
 @pytest.mark.parametrize("name", [name for name in shipped() if name != "suspension-rig"])
 def test_every_effect_of_a_machine_can_be_searched_for(name):
-    from rigtwin.diagnosis.joint_trials import Scales
-
-    from rigtwin.diagnosis.swing import SHARES, Swing
-
     machine = find(name)
     scale = Scales(0.03, 0.1, 0.25, 0.8, 60.0, 1e-3)
+    swing = Swing((1.0,) * len(SHARES), (1.0,) * len(SHARES))
     for effect in machine.effects():
-        assert searched(effect), effect.name
-        swing = {effect.component: Swing((1.0,) * len(SHARES), (1.0,) * len(SHARES))}
-        found = trials(effect, machine.plant, swing, lambda _: scale)
+        if effect.kind.name in READ_OFF:
+            assert not effect.searched
+            continue
+        assert effect.searched, effect.name
+        found = effect.starts(machine.plant, swing, lambda: scale)
         quantities = list(effect.quantities().values())
         assert len(found.steps) == len(quantities)
         assert all(step > 0.0 for step in found.steps)
-        for start in found.starts:
-            assert all(q.low <= value <= q.high for q, value in zip(quantities, start, strict=True)), effect.name
+        for start in found.values:
+            for quantity, value in zip(quantities, start, strict=True):
+                assert quantity.low <= value <= quantity.high, effect.name
 
 
 def test_what_acts_through_friction_needs_some():
@@ -128,8 +140,16 @@ MISTAKES = [
     ('observe = ["encoder"]', "", "observe is missing"),
     ("[[replays]]", "[[replay]]", "did you mean 'replays'?"),
     ('[components.mass]\nbody = "arm"', "", "whose mass is no component"),
-    ("[[replays]]", '[controller]\noutput = "force"\nformula = "kp *"\n[[replays]]', "is no formula"),
-    ("[[replays]]", '[controller]\noutput = "farce"\nformula = "1"\n[[replays]]', "did you mean 'force'?"),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "kp *"\n[[replays]]',
+        "is no formula",
+    ),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "farce"\nformula = "1"\n[[replays]]',
+        "did you mean 'force'?",
+    ),
     (
         "[[replays]]",
         '[controller]\noutput = "force"\nformula = "1"\nsettings = { kp = 2 }\n[[replays]]',
@@ -141,7 +161,9 @@ MISTAKES = [
 
 @pytest.mark.parametrize(("old", "new", "said"), MISTAKES)
 def test_a_mistake_is_one_line(tmp_path: Path, capsys, old: str, new: str, said: str):
-    (tmp_path / "bench.xml").write_text(MJCF.format(body='<joint name="axis" type="slide"/><geom size="0.05" mass="2"/>'))
+    (tmp_path / "bench.xml").write_text(
+        MJCF.format(body='<joint name="axis" type="slide"/><geom size="0.05" mass="2"/>')
+    )
     path = tmp_path / "bench.toml"
     assert old in TOML
     path.write_text(TOML.replace(old, new, 1))
@@ -161,22 +183,24 @@ def test_a_missing_description_is_said(tmp_path: Path, capsys):
 
 
 def test_settings_are_checked():
-    setup = nominal(find("emps"))
-    assert from_assignments(setup, ["guide.viscous=210", "controller.kp=150"]).settings["kp"] == 150.0
-    assert without(setup, "viscous@guide").plant.guide.viscous == 0.0
+    base = find("emps").configuration
+    changed = from_assignments(base, ["guide.viscous=210", "controller.kp=150"])
+    assert (changed.plant.guide.viscous, changed.controller.kp) == (210.0, 150.0)
+    assert without(base, "viscous@guide").plant.guide.viscous == 0.0
     for changes, said in (
         ({"gide": {}}, "unknown component"),
-        ({"guide": {"viscuos": 1}}, "unknown parameter"),
+        ({"guide": {"viscuos": 1}}, "unknown setting guide.viscuos; guide has coulomb"),
         ({"guide": {"viscous": -1}}, "expected a number from 0"),
         ({"controller": {"ki": 1}}, "unknown setting"),
         ({"guide": 3}, "expected a table"),
     ):
         with pytest.raises(Exception, match=said):
-            overridden(setup, changes)
+            overridden(base, changes)
 
 
 def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:
-    """Position of 2 kg on a spring of 150 N/m with a friction that sets in over 0.2 mm/s, by Heun's rule in steps of 25 us."""
+    """Position of 2 kg on a spring of 150 N/m with a friction that sets in over 0.2 mm/s, by Heun's
+    rule in steps of 25 us."""
     fine, step = 40, 2.5e-5
 
     def acceleration(force: float, x: float, v: float) -> float:
@@ -193,15 +217,23 @@ def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize(("viscous", "slip", "kind"), [(6.0, 0.0, None), (14.0, 0.0, "viscous"), (6.0, 2.0, "coulomb")])
-def test_a_new_machine_takes_no_python(tmp_path: Path, viscous: float, slip: float, kind: str | None):
-    """A description and an MJCF in a folder, data of an independent integration, and the right answer."""
+@pytest.mark.parametrize(
+    ("viscous", "slip", "kind"), [(6.0, 0.0, None), (14.0, 0.0, "viscous"), (6.0, 2.0, "coulomb")]
+)
+def test_a_new_machine_takes_no_python(
+    tmp_path: Path, viscous: float, slip: float, kind: str | None
+):
+    """A description and an MJCF in a folder, data of an independent integration, and the right
+    answer."""
     machine = described(tmp_path)
     random = np.random.default_rng(3)
     time = np.arange(8000) * 1e-3
-    command = sum(8.0 * np.sin(2 * np.pi * f * time + random.uniform(0, 6)) for f in (0.23, 0.61, 1.13, 1.9, 3.1))
+    command = sum(
+        8.0 * np.sin(2 * np.pi * f * time + random.uniform(0, 6))
+        for f in (0.23, 0.61, 1.13, 1.9, 3.1)
+    )
     position = truth(np.asarray(command), viscous, slip) + 1e-5 * random.standard_normal(8000)
-    found = diagnose(machine, [recording_of(machine, np.asarray(command), position)], nominal(machine)).diagnosis
+    found = diagnose(machine, [recording_of(machine, np.asarray(command), position)])
     if kind is None:
         assert found.verdict == "no gap"
         return

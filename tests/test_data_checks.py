@@ -6,16 +6,17 @@ import dataclasses
 
 import numpy as np
 import pytest
-from rigtwin.diagnosis.checks import check, longest_run
 
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
 from rigtwin.description.configuration import Timing
-from rigtwin.diagnosis.compare import configuration_of
+from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.recording import Recording, load
+from rigtwin.signals.runs import longest_run
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import text
-from tests.helpers.recordings import BESIDE, SHIPPED, beside, shipped
+from tests.helpers.recordings import BESIDE, SHIPPED, beside, replace_sensors, shipped
+from tests.helpers.twin import RIG
 
 
 @pytest.fixture(scope="module")
@@ -24,18 +25,20 @@ def recordings(tmp_path_factory) -> dict[str, Recording]:
     for name in ("drop", "imposed", "road10", "single-mass", "semi-active"):
         experiment = EXPERIMENTS[name]
         configuration = experiment.configuration._replace(timing=Timing(duration=8.0))
-        record(folder / f"{name}.mcap", name, configuration, experiment.demands(configuration, 0), 0)
+        record(
+            folder / f"{name}.mcap", name, configuration, experiment.demands(configuration, 0), 0
+        )
         found[name] = load(folder / f"{name}.mcap")
     return found
 
 
-def changed(recording: Recording, **sensors: np.ndarray) -> Recording:
-    return dataclasses.replace(recording, columns={**recording.columns, "/sensor": {**recording.columns["/sensor"], **sensors}})
+def check(recording: Recording) -> tuple[Fault, ...]:
+    return find_faults(RIG, recording, RIG.configuration_of(recording))
 
 
 def faults(recording: Recording) -> dict[str, str]:
     """where → kind."""
-    return {fault.where: fault.kind for fault in check(recording, configuration_of(recording))}
+    return {fault.where: fault.kind for fault in check(recording)}
 
 
 def test_sound_recordings_have_no_fault(recordings, example):
@@ -58,7 +61,14 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
     configuration = experiment.configuration._replace(timing=Timing(duration=3.0))
-    record(tmp_path / "e.mcap", "imposed", configuration, experiment.demands(configuration, 2), 2, effects=[text(name)])
+    record(
+        tmp_path / "e.mcap",
+        "imposed",
+        configuration,
+        experiment.demands(configuration, 2),
+        2,
+        effects=[text(name)],
+    )
     found = faults(load(tmp_path / "e.mcap"))
     assert set(found.values()) <= {"clipped"}, "saturation looks like clipping, and is"
 
@@ -69,24 +79,33 @@ def test_units_and_signs(recordings, name, channel):
     recording = recordings[name]
     signal = recording.column("/sensor", channel)
     factor = 1e-3 if channel == "load_cell" else 1e3
-    assert faults(changed(recording, **{channel: factor * signal})) == {f"/sensor.{channel}": "unit"}
-    assert faults(changed(recording, **{channel: -signal})) == {f"/sensor.{channel}": "sign"}
+    assert faults(replace_sensors(recording, **{channel: factor * signal})) == {
+        f"/sensor.{channel}": "unit"
+    }
+    assert faults(replace_sensors(recording, **{channel: -signal})) == {
+        f"/sensor.{channel}": "sign"
+    }
 
 
 def test_all_lvdts_in_millimetres_are_named_as_such(recordings):
     recording = recordings["imposed"]
-    scaled = {name: 1e3 * recording.column("/sensor", name) for name in ("ground_lvdt", "structure_lvdt", "suspension_lvdt")}
-    found = check(changed(recording, **scaled), configuration_of(recording))
+    scaled = {
+        name: 1e3 * recording.column("/sensor", name)
+        for name in ("ground_lvdt", "structure_lvdt", "suspension_lvdt")
+    }
+    found = check(replace_sensors(recording, **scaled))
     assert {fault.kind for fault in found} == {"unit"}
     assert all("as if in mm; expected m" in fault.message for fault in found)
 
 
 @pytest.mark.parametrize("name", ["drop", "imposed", "road10"])
-@pytest.mark.parametrize("pair", [("ground_lvdt", "structure_lvdt"), ("ground_lvdt", "suspension_lvdt")])
+@pytest.mark.parametrize(
+    "pair", [("ground_lvdt", "structure_lvdt"), ("ground_lvdt", "suspension_lvdt")]
+)
 def test_swapped_channels(recordings, name, pair):
     recording = recordings[name]
     one, other = (recording.column("/sensor", channel) for channel in pair)
-    found = check(changed(recording, **{pair[0]: other, pair[1]: one}), configuration_of(recording))
+    found = check(replace_sensors(recording, **{pair[0]: other, pair[1]: one}))
     assert [fault.kind for fault in found] == ["swapped"]
     assert f"{pair[0]} holds {pair[1]}" in found[0].message
 
@@ -94,14 +113,18 @@ def test_swapped_channels(recordings, name, pair):
 def test_dead_stuck_and_clipped(recordings):
     recording = recordings["imposed"]
     force = recording.column("/sensor", "load_cell")
-    assert faults(changed(recording, load_cell=np.full_like(force, 3.0))) == {"/sensor.load_cell": "dead"}
+    assert faults(replace_sensors(recording, load_cell=np.full_like(force, 3.0))) == {
+        "/sensor.load_cell": "dead"
+    }
     stuck = force.copy()
     stuck[3000:3400] = stuck[3000]
-    found = check(changed(recording, load_cell=stuck), configuration_of(recording))
+    found = check(replace_sensors(recording, load_cell=stuck))
     assert [fault.kind for fault in found] == ["dead"]
     assert "for 0.4 s from 3.000 s" in found[0].message
     limit = np.quantile(force, 0.97)
-    assert faults(changed(recording, load_cell=np.minimum(force, limit))) == {"/sensor.load_cell": "clipped"}
+    assert faults(replace_sensors(recording, load_cell=np.minimum(force, limit))) == {
+        "/sensor.load_cell": "clipped"
+    }
 
 
 def test_gap_missing_short_and_other_machines(recordings):
@@ -109,14 +132,18 @@ def test_gap_missing_short_and_other_machines(recordings):
     time = recording.time.copy()
     time[4000:] += 0.25
     assert faults(dataclasses.replace(recording, time=time)) == {"recording": "gap"}
-    sensors = {name: values for name, values in recording.columns["/sensor"].items() if name != "load_cell"}
-    assert faults(dataclasses.replace(recording, columns={**recording.columns, "/sensor": sensors})) == {
-        "/sensor.load_cell": "missing"
+    sensors = {
+        name: values for name, values in recording.columns["/sensor"].items() if name != "load_cell"
     }
+    assert faults(
+        dataclasses.replace(recording, columns={**recording.columns, "/sensor": sensors})
+    ) == {"/sensor.load_cell": "missing"}
     assert faults(dataclasses.replace(recording, machine="lathe")) == {"recording": "wrong machine"}
     broken = recording.column("/sensor", "structure_lvdt").copy()
     broken[100] = np.inf
-    assert faults(changed(recording, structure_lvdt=broken)) == {"/sensor.structure_lvdt": "not a number"}
+    assert faults(replace_sensors(recording, structure_lvdt=broken)) == {
+        "/sensor.structure_lvdt": "not a number"
+    }
 
 
 def test_longest_run():

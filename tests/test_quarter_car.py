@@ -1,23 +1,22 @@
-"""The reduced plant against the twin in MuJoCo, under the same commands, with every effect that it can have."""
+"""The reduced plant against the twin in MuJoCo, under the same commands, with every effect that it
+can have."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from rigtwin.diagnosis.trials import TRIALS, trials
 
 from experiments import EXPERIMENTS
-from rigtwin.components import Effect, RigPlant, candidates
-from rigtwin.description.catalogue import find as machine_of
+from rigtwin.components import Effect, RigPlant, Swing, candidates
 from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
+from rigtwin.models.quarter_car import Disturbances, QuarterCarModel, motor_friction, sliding
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin
-from tests.helpers.twin import recorded
+from tests.helpers.twin import RIG, recorded
 
 SECONDS = 4.0
 QUIET = RigPlant()._replace(
@@ -26,11 +25,12 @@ QUIET = RigPlant()._replace(
         for name in ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
     }
 )
-SEARCHED = [effect for effect in candidates(RigPlant()) if effect.kind.name in TRIALS]
+SEARCHED = [effect for effect in candidates(RigPlant()) if effect.searched]
 
 
 def both(configuration: Configuration, name: str = "imposed") -> tuple[np.ndarray, np.ndarray]:
-    """Sensors of the twin and of the reduced plant under the twin's own commands, shape (4, ticks) each."""
+    """Sensors of the twin and of the reduced plant under the twin's own commands, shape (4, ticks)
+    each."""
     timing = configuration.timing._replace(duration=SECONDS)
     free = configuration._replace(safety=Safety(1e3, 1e9, 1e3), timing=timing)
     demands = EXPERIMENTS[name].demands(free, 3)
@@ -38,7 +38,8 @@ def both(configuration: Configuration, name: str = "imposed") -> tuple[np.ndarra
     commands = np.concatenate([block.commands for block in blocks])
     measured = np.concatenate([block.measurements for block in blocks]).T
     ground, structure, _, voltage = commands.T
-    return measured, Reduced(ground, structure, voltage, free, 8).sensed(free.plant)
+    model = QuarterCarModel(ground, structure, voltage, free, 8)
+    return measured, model.sensed(free.plant)
 
 
 def apart(configuration: Configuration, name: str = "imposed") -> tuple[float, float]:
@@ -50,9 +51,11 @@ def apart(configuration: Configuration, name: str = "imposed") -> tuple[float, f
     return float(max(rms[:3])), float(rms[3])
 
 
-def reduced_of(recording: Recording) -> Reduced:
-    ground, structure, voltage = (recording.column("/command", name) for name in ("ground", "structure", "voltage"))
-    return Reduced(ground, structure, voltage, EXPERIMENTS["imposed"].configuration, 4)
+def reduced_of(recording: Recording) -> QuarterCarModel:
+    ground, structure, voltage = (
+        recording.column("/command", name) for name in ("ground", "structure", "voltage")
+    )
+    return QuarterCarModel(ground, structure, voltage, EXPERIMENTS["imposed"].configuration, 4)
 
 
 @pytest.mark.parametrize("name", ["imposed", "drop", "road10"])
@@ -65,11 +68,12 @@ def test_the_nominal_plants_agree_far_below_the_sensors_noise(name):
 
 @pytest.fixture(scope="module")
 def swing():
-    return swings(machine_of("suspension-rig"), (recorded("imposed", seconds=SECONDS),))
+    return swings(RIG, (recorded("imposed", seconds=SECONDS),))
 
 
-def size_of(effect: Effect, swing) -> tuple[float, ...]:
-    starts = trials(effect, RigPlant(), swing).starts
+def size_of(effect: Effect, swing: dict[str, Swing]) -> tuple[float, ...]:
+    # No search on the suspension rig starts from the size of a motion.
+    starts = effect.starts(RIG.plant, swing.get(effect.component, Swing()), pytest.fail).values
     return starts[len(starts) // 2]
 
 
@@ -80,7 +84,9 @@ LOOSE = {"compliance", "backlash", "stribeck", "cogging", "deadband"}
 @pytest.mark.parametrize("effect", SEARCHED, ids=lambda effect: effect.name)
 def test_every_effect_does_the_same_to_both(effect, swing):
     values = size_of(effect, swing)
-    configuration = EXPERIMENTS["imposed"].configuration._replace(plant=with_values(QUIET, (effect,), (values,)))
+    configuration = EXPERIMENTS["imposed"].configuration._replace(
+        plant=with_values(QUIET, (effect,), (values,))
+    )
     motion, force = apart(configuration)
     loose = 4.0 if effect.kind.name in LOOSE else 1.0
     assert motion < loose * 0.5 * 6e-5
@@ -94,7 +100,8 @@ def test_the_inclusion_is_solved_exactly(rhs, plate):
     velocity = sliding(rhs, inertia, rail, motor, plate)
     dry = motor_friction(rhs, inertia, rail, motor, plate, velocity)
     assert -motor[1] <= dry <= motor[0]
-    # What is left is the rail's, which must lie within its bounds, and at one of them while it slides.
+    # What is left is the rail's, which must lie within its bounds, and at one of them while it
+    # slides.
     left = rhs + dry - inertia * velocity
     assert -rail[1] - 1e-12 <= left <= rail[0] + 1e-12
     if velocity != 0.0:
@@ -110,7 +117,9 @@ def test_a_disturbance_acts_where_it_enters():
     nothing = np.zeros(recording.ticks)
     shift = np.full(recording.ticks, 1e-3)
     before = reduced.true(plant)
-    assert np.array_equal(reduced.true(plant, Disturbances(nothing, nothing, nothing, nothing)), before)
+    assert np.array_equal(
+        reduced.true(plant, Disturbances(nothing, nothing, nothing, nothing)), before
+    )
     moved = reduced.true(plant, Disturbances(nothing, shift, nothing, nothing))
     assert np.allclose(moved[1] - before[1], 1e-3)
     assert np.array_equal(moved[0], before[0])
