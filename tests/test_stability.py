@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from rigtwin.cli.stability_commands import arguments, stability
+from rigtwin.cli.stability import arguments, stability
 from scipy.linalg import expm
 
 from experiments.vehicles import VEHICLES

@@ -83,7 +83,7 @@ def outstanding(
     table: dict[str, dict[str, float]] = {}
     for number, row in enumerate(machine.rows):
         sensor = getattr(plant, row.name, None)
-        if not measures(sensor) or sensor.white == 0.0:
+        if sensor is None or not measures(sensor) or sensor.white == 0.0:
             continue
         each = [
             properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
