@@ -100,15 +100,18 @@ OWN_FAULTS = {
     "ground_cylinder.a1=110000": {"ground_cylinder"},
     "structure_cylinder.a2=9000": {"structure_cylinder"},
 }
+ALSO_EFFECTS = ("rail.coulomb=80", "carriage.mass=40", "motor.constant=196")
+"""Faults that are tried as effects too, at components of which another fault is tried here."""
 
 
-@pytest.mark.parametrize("fault", OWN_FAULTS)
-@pytest.mark.parametrize("name", ["imposed"])
-def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, name, fault):
-    experiment = EXPERIMENTS[name]
+@pytest.mark.parametrize(
+    "fault", [pytest.param(fault, marks=pytest.mark.slow if fault in ALSO_EFFECTS else ()) for fault in OWN_FAULTS]
+)
+def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, fault):
+    experiment = EXPERIMENTS["imposed"]
     faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=10.0)), [fault])
     path = tmp_path / "f.mcap"
-    record(path, name, faulty, experiment.demands(faulty, 11), 11)
+    record(path, "imposed", faulty, experiment.demands(faulty, 11), 11)
     recording = load(path)
     replays = Replays(recording, configuration_of(recording))
     found = {component: ratio(replays, component) for component in COMPONENTS}
@@ -211,5 +214,6 @@ def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
         for component in COMPONENTS:
             left = ratio(known, component)
             assert left < 1.3 or left < 0.25 * ratio(nominal, component), component
-    loud = any(ratio(nominal, component) > 1.5 for component in reversed(COMPONENTS))
-    assert loud or find(name).kind.name in ("hum", "noise"), "the nominal twin does not explain it"
+    if find(name).kind.name not in ("hum", "noise"):
+        loud = any(ratio(nominal, component) > 1.5 for component in reversed(COMPONENTS))
+        assert loud, "the nominal twin does not explain it"
