@@ -15,7 +15,7 @@ from rigtwin.machine.configuration import Timing
 from rigtwin.machine.effects import candidates
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
-from tests.helpers.effects import text
+from tests.helpers.effects import once_a_sort, text
 from tests.helpers.recordings import BESIDE, SHIPPED, beside, shipped
 
 
@@ -55,7 +55,7 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
     assert faults(beside(name)) == {}
 
 
-@pytest.mark.parametrize("name", [e.name for e in candidates(Plant())])
+@pytest.mark.parametrize("name", once_a_sort([effect.name for effect in candidates(Plant())]))
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
     configuration = experiment.configuration._replace(timing=Timing(duration=3.0))

@@ -17,7 +17,7 @@ from rigtwin.machine.configuration import Configuration, Timing, from_assignment
 from rigtwin.machine.effects import applied, candidates, find
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
-from tests.helpers.effects import text
+from tests.helpers.effects import once_a_sort, text
 from tests.helpers.recordings import SHIPPED, beside, shipped
 
 LIMITS = {
@@ -189,17 +189,8 @@ LEFT_OVER = {
 """Effects that a twin which has them explains only in part, and why."""
 
 
-ALIKE = ("structure_lvdt", "ground_lvdt")
-"""Sensors that are what the suspension's LVDT is."""
-
-
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(effect.name, marks=pytest.mark.slow if effect.component in ALIKE else ())
-        for effect in candidates(Plant())
-        if effect.kind.name != "quantisation"
-    ],
+    "name", once_a_sort([effect.name for effect in candidates(Plant()) if effect.kind.name != "quantisation"])
 )
 def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise is left."""
