@@ -79,8 +79,9 @@ def test_motion_is_reached_and_left_through_every_state_between():
 # The same on the twin and on the card
 
 
-@pytest.mark.parametrize("name", ["road1.6", "imposed"])
-@pytest.mark.parametrize("seconds", [4, pytest.param(45, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "seconds"), [("road1.6", 4), ("imposed", 4), pytest.param("road1.6", 45, marks=pytest.mark.slow)]
+)
 def test_card_and_twin_give_the_same_recording(tmp_path, name, seconds):
     test = session(name, f"timing.duration={seconds}", seed=2)
     card, _ = on_virtual_card(test)
