@@ -130,8 +130,6 @@ def test_a_job_that_always_kills_its_worker_is_named_in_the_end():
         list(iterate_results(workers, always_deadly, ((str(n), n) for n in range(4))))
 
 
-MANY = 100_000
-
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_job_that_fails_ends_the_sweep_and_keeps_what_is_done(count, tmp_path):
