@@ -20,7 +20,10 @@ from rigtwin.numerics.arrays import Array
 SPIN = 200e-6
 """s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by tens of microseconds."""
 PRIORITY = 80
-EDGES = tuple(1e-6 * value for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000))
+EDGES = tuple(
+    1e-6 * value
+    for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
+)
 """Upper edges of the lateness histogram, s; the last class is what is beyond."""
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
@@ -78,16 +81,25 @@ class Lateness:
         """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum
         of both, ticks missed, and what the system granted."""
         figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
-        for name, values in (("late", self._late[: self._count]), ("work", self._work[: self._count])):
+        for name, values in (
+            ("late", self._late[: self._count]),
+            ("work", self._work[: self._count]),
+        ):
             if len(values):
-                figures |= {f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()}
+                figures |= {
+                    f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()
+                }
         counts, _ = np.histogram(self._late[: self._count], bins=[-np.inf, *EDGES, np.inf])
         figures["histogram"] = json.dumps({"edges": EDGES, "counts": counts.tolist()})
         return figures
 
 
 def _statistics(values: Array) -> dict[str, float]:
-    return {"median": float(np.median(values)), "999": float(np.percentile(values, 99.9)), "max": float(values.max())}
+    return {
+        "median": float(np.median(values)),
+        "999": float(np.percentile(values, 99.9)),
+        "max": float(values.max()),
+    }
 
 
 @dataclass(frozen=True)
@@ -131,7 +143,10 @@ def _memory() -> Grant:
     if not sys.platform.startswith("linux"):
         return Grant("locked memory", f"not known how on {sys.platform}")
     if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        return Grant("locked memory", f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited")
+        return Grant(
+            "locked memory",
+            f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited",
+        )
     return Grant("locked memory")
 
 
@@ -141,7 +156,10 @@ def _schedule() -> Grant:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:
-        return Grant("FIFO scheduling", f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE")
+        return Grant(
+            "FIFO scheduling",
+            f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE",
+        )
     return Grant("FIFO scheduling")
 
 
@@ -150,9 +168,13 @@ def machine_lacks() -> list[str]:
     lacks: list[str] = []
     with in_real_time() as grants:
         lacks += [f"{grant.name}: {grant.lacking}" for grant in grants if grant.lacking]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     if cores < 2:
-        lacks.append("a core of its own: this computer has one, the loop shares it with everything else")
+        lacks.append(
+            "a core of its own: this computer has one, the loop shares it with everything else"
+        )
     resolution = time.get_clock_info("monotonic").resolution
     if resolution > 1e-6:
         lacks.append(f"a fine clock: its resolution is {resolution:g} s; expected 1 us or better")

@@ -175,12 +175,19 @@ class _Session:
         finally:
             rig.stop()
             if self._supervisor.phase == Phase.STOPPING:
-                self._supervisor.go(Phase.FAULTED, Cause("rig", "cut short while it was coming to rest"), self._time)
+                self._supervisor.go(
+                    Phase.FAULTED, Cause("rig", "cut short while it was coming to rest"), self._time
+                )
             recorder.flush()
             self._progress(self._done - self._done_before)
         names = (*Measurements._fields, "voltage")
         transitions = tuple(self._supervisor.transitions)
-        return Ended(transitions[-1].cause, self._done, transitions, dict(zip(names, self._peaks, strict=True)))
+        return Ended(
+            transitions[-1].cause,
+            self._done,
+            transitions,
+            dict(zip(names, self._peaks, strict=True)),
+        )
 
     def _look(self) -> Commands:
         """Idle: whether every sensor lives and lies within its limit. Returns the commands at which nothing moves. Raises
@@ -194,9 +201,13 @@ class _Session:
         for _ in range(max(round(LOOKING / self._period), 1)):
             self._rig.write(rest)
             cause = self._faulty(measured)
-            number, column = commanded_wrong(self._limits, self._elapsed, self._watch, measured, rest)
+            number, column = commanded_wrong(
+                self._limits, self._elapsed, self._watch, measured, rest
+            )
             if number != Trip.NONE:
-                cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+                cause = Cause(
+                    Trip(number).name.lower(), explained(Trip(number), self._limits, column)
+                )
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
             self._row(measured, rest)
@@ -206,7 +217,9 @@ class _Session:
     def _move(self, rest: Commands) -> Cause:
         """Armed, ramping, running. Returns why it ended."""
         self._supervisor.go(
-            Phase.ARMED, Cause("operator", "every sensor lives and is within its limit", fault=False), self._time
+            Phase.ARMED,
+            Cause("operator", "every sensor lives and is within its limit", fault=False),
+            self._time,
         )
         self._pressure = True
         self._rig.pressure(True)
@@ -214,9 +227,13 @@ class _Session:
             cause = self._tick(lambda _: rest)
             if cause is not None:
                 return cause
-        self._supervisor.go(Phase.RAMPING, Cause("ramp", "ramping to the start", fault=False), self._time)
+        self._supervisor.go(
+            Phase.RAMPING, Cause("ramp", "ramping to the start", fault=False), self._time
+        )
         for share in _cosine(self._limits.ramp, self._period):
-            between = Commands(*(a + share * (b - a) for a, b in zip(rest, self._target, strict=True)))
+            between = Commands(
+                *(a + share * (b - a) for a, b in zip(rest, self._target, strict=True))
+            )
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
@@ -225,7 +242,9 @@ class _Session:
             if cause is not None:
                 return cause
         self._clock = 0
-        self._supervisor.go(Phase.RUNNING, Cause("test", "at the start; the test begins", fault=False), self._time)
+        self._supervisor.go(
+            Phase.RUNNING, Cause("test", "at the start; the test begins", fault=False), self._time
+        )
         while self._clock < len(self._demands):
             cause = self._tick(self._control)
             if cause is not None:
@@ -256,12 +275,18 @@ class _Session:
         if cause is None:
             try:
                 commands = command(measured)
-                number, column = commanded_wrong(self._limits, self._elapsed, self._watch, measured, commands)
+                number, column = commanded_wrong(
+                    self._limits, self._elapsed, self._watch, measured, commands
+                )
                 if number != Trip.NONE:
-                    cause = Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+                    cause = Cause(
+                        Trip(number).name.lower(), explained(Trip(number), self._limits, column)
+                    )
             except Exception as error:
                 commands = self._held
-                cause = Cause("controller", f"the controller failed: {type(error).__name__}: {_line(error)}")
+                cause = Cause(
+                    "controller", f"the controller failed: {type(error).__name__}: {_line(error)}"
+                )
         tick = float(self._clock) if running else math.nan
         if cause is not None:
             return self._halt(cause, measured, commands, tick)
@@ -281,10 +306,15 @@ class _Session:
         number, column = sensed_wrong(self._limits, self._elapsed, self._watch, measured)
         missed = self._rig.missed
         if missed > self._limits.missed:
-            return Cause("late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be")
+            return Cause(
+                "late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be"
+            )
         self._behind += OFTEN * (missed / (1.0 + missed) - self._behind)
         if self._behind > MOST_MISSED:
-            return Cause("late", f"of the last ticks {100 * self._behind:.0f} % were missed; the loop cannot keep the pace")
+            return Cause(
+                "late",
+                f"of the last ticks {100 * self._behind:.0f} % were missed; the loop cannot keep the pace",
+            )
         if number != Trip.NONE:
             return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
         fault = self._recorder.fault
@@ -354,7 +384,9 @@ class _Session:
         held, rig = self._held, self._rig
         written = (held.ground, held.structure, held.voltage, float(self._pressure))
         late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)
-        self._recorder.tick((self._time, phase, *written, *measured, late, float(rig.missed), *commands, tick))
+        self._recorder.tick(
+            (self._time, phase, *written, *measured, late, float(rig.missed), *commands, tick)
+        )
         for place, value in enumerate((*measured, commands.voltage)):
             if abs(value) > self._peaks[place]:
                 self._peaks[place] = abs(value)

@@ -80,7 +80,9 @@ class Supervisor:
         """Makes a transition. Raises RigtwinError for one that does not exist."""
         if phase not in NEXT[self.phase]:
             ways = " or ".join(after.name.lower() for after in NEXT[self.phase])
-            raise RigtwinError(f"no way from {self.phase.name.lower()} to {phase.name.lower()}; only to {ways}")
+            raise RigtwinError(
+                f"no way from {self.phase.name.lower()} to {phase.name.lower()}; only to {ways}"
+            )
         transition = Transition(time, self.phase, phase, cause)
         self.phase = phase
         self.transitions.append(transition)

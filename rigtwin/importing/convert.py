@@ -30,21 +30,36 @@ BLOCK = 10_000
 def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     """Writes the recording; what was found, a line each. Raises RigtwinError before anything is written."""
     wanted, columns = load(map_path), read(data)
-    report = [f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, columns {', '.join(columns.values)}"]
-    signals = {channel: _signal(data, columns, source) for channel, source in wanted.channels.items()}
-    report += [line for channel, source in wanted.channels.items() for line in _unit_notes(columns, channel, source)]
+    report = [
+        f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, columns {', '.join(columns.values)}"
+    ]
+    signals = {
+        channel: _signal(data, columns, source) for channel, source in wanted.channels.items()
+    }
+    report += [
+        line
+        for channel, source in wanted.channels.items()
+        for line in _unit_notes(columns, channel, source)
+    ]
     lengths = {len(values) for values in signals.values() if len(values) > 1}
     if len(lengths) > 1:
-        raise RigtwinError(f"{data}: the columns have different lengths: {', '.join(map(str, sorted(lengths)))}")
+        raise RigtwinError(
+            f"{data}: the columns have different lengths: {', '.join(map(str, sorted(lengths)))}"
+        )
     if not lengths:
         raise RigtwinError(f"{data}: no column of more than one value is mapped")
     (rows,) = lengths
-    signals = {channel: np.full(rows, values[0]) if len(values) == 1 else values for channel, values in signals.items()}
+    signals = {
+        channel: np.full(rows, values[0]) if len(values) == 1 else values
+        for channel, values in signals.items()
+    }
     time = _time(data, columns, wanted, rows)
     time, signals = _distinct(data, time, signals, report)
     taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
     if taken.sum() < 2:
-        raise RigtwinError(f"{data}: nothing lies between start = {wanted.start:g} s and until = {wanted.until:g} s")
+        raise RigtwinError(
+            f"{data}: nothing lies between start = {wanted.start:g} s and until = {wanted.until:g} s"
+        )
     time, signals = time[taken], {channel: values[taken] for channel, values in signals.items()}
     period = wanted.period or _period(time)
     _whole(data, time, signals)
@@ -61,7 +76,9 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     else:
         _even(data, time, period, report)
     for channel, values in signals.items():
-        report += [f"{channel[0]}.{channel[1]} {each}" for each in _oddities(values, time - time[0])]
+        report += [
+            f"{channel[0]}.{channel[1]} {each}" for each in _oddities(values, time - time[0])
+        ]
     ticks = _written(out, wanted, period, signals)
     report.append(f"{ticks} ticks of {period:g} s for machine {wanted.machine} in {out}")
     return report
@@ -71,7 +88,9 @@ def _column(data: Path, columns: Columns, name: str) -> Array:
     if name not in columns.values:
         close = difflib.get_close_matches(name, columns.values, 1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise RigtwinError(f"{data}: it has no column {name!r}; {hint}there are {', '.join(columns.values)}")
+        raise RigtwinError(
+            f"{data}: it has no column {name!r}; {hint}there are {', '.join(columns.values)}"
+        )
     return columns.values[name]
 
 
@@ -84,7 +103,9 @@ def _signal(data: Path, columns: Columns, source: Source) -> Array:
     try:
         _, factor = unit_of(said)
     except RigtwinError as error:
-        raise RigtwinError(f"{data}: column {source.column!r}: {error}; say the unit in the map") from None
+        raise RigtwinError(
+            f"{data}: column {source.column!r}: {error}; say the unit in the map"
+        ) from None
     return source.sign * source.scale * factor * values + source.offset
 
 
@@ -96,8 +117,15 @@ def _unit_notes(columns: Columns, channel: tuple[str, str], source: Source) -> l
     name = ".".join(channel)
     if source.unit is None and said is None:
         return [f"{name}: no unit is said of column {source.column!r}; taken as SI"]
-    if source.unit is not None and said is not None and is_unit(said) and unit_of(said) != unit_of(source.unit):
-        return [f"{name}: the file says {said} of column {source.column!r}, the map {source.unit}; taken as {source.unit}"]
+    if (
+        source.unit is not None
+        and said is not None
+        and is_unit(said)
+        and unit_of(said) != unit_of(source.unit)
+    ):
+        return [
+            f"{name}: the file says {said} of column {source.column!r}, the map {source.unit}; taken as {source.unit}"
+        ]
     return []
 
 
@@ -115,7 +143,9 @@ def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
             f"{data}: time column {wanted.time!r} is in {said!r}; expected a unit of time, say it in [time] unit"
         )
     if not np.isfinite(values).all():
-        raise RigtwinError(f"{data}: time is not a number in row {int(np.argmax(~np.isfinite(values))) + 1}")
+        raise RigtwinError(
+            f"{data}: time is not a number in row {int(np.argmax(~np.isfinite(values))) + 1}"
+        )
     return factor * values
 
 
@@ -126,7 +156,9 @@ def _distinct(
     steps = np.diff(time)
     if (steps < 0).any():
         row = int(np.argmax(steps < 0)) + 2
-        raise RigtwinError(f"{data}: time goes back in row {row}, from {time[row - 2]:g} s to {time[row - 1]:g} s")
+        raise RigtwinError(
+            f"{data}: time goes back in row {row}, from {time[row - 2]:g} s to {time[row - 1]:g} s"
+        )
     again = np.concatenate([[False], steps == 0])
     if not again.any():
         return time, signals
@@ -163,7 +195,10 @@ def _period(time: Array) -> float:
     period = float(np.mean(steps[regular]))
     for digits in range(1, 8):
         rounded = float(f"{period:.{digits}g}")
-        if abs(rounded - period) * len(time) < JITTER * period and abs(rounded / period - 1.0) < 1e-3:
+        if (
+            abs(rounded - period) * len(time) < JITTER * period
+            and abs(rounded / period - 1.0) < 1e-3
+        ):
             return rounded
     return period
 
@@ -209,15 +244,21 @@ def _oddities(values: Array, time: Array) -> list[str]:
     spread = float(np.subtract(*np.quantile(values, [0.999, 0.001])))
     far = np.abs(values - np.median(values))
     if spread > 0.0 and far.max() > OUTLIER * spread:
-        found.append(f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, far outside of all else")
+        found.append(
+            f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, far outside of all else"
+        )
     steps = np.abs(np.diff(values))
-    abrupt = max(ABRUPT * float(np.median(steps[steps > 0])), BITS * float(np.min(steps[steps > 0])))
+    abrupt = max(
+        ABRUPT * float(np.median(steps[steps > 0])), BITS * float(np.min(steps[steps > 0]))
+    )
     for end, extreme in (("above", values.max()), ("below", values.min())):
         flat = np.diff(np.concatenate([[0], (values == extreme).astype(np.int8), [0]]))
         for start, stop in zip(np.nonzero(flat == 1)[0], np.nonzero(flat == -1)[0], strict=True):
             if stop - start >= FLAT and start > 3 and np.max(steps[start - 3 : start]) > abrupt:
                 share = 100.0 * float(np.mean(values == extreme))
-                found.append(f"is cut off {end} {extreme:.6g} ({share:.2g} % of the ticks), first at {time[start]:.4g} s")
+                found.append(
+                    f"is cut off {end} {extreme:.6g} ({share:.2g} % of the ticks), first at {time[start]:.4g} s"
+                )
                 break
     return found
 

@@ -71,7 +71,9 @@ def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, An
 
 
 def _number(where: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
-    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    number = (
+        float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    )
     if not (low <= number <= high and math.isfinite(number)):
         limits = f" from {low:g} to {high:g}" if math.isfinite(low) else ""
         shown = repr(value) if isinstance(value, str) else str(value)
@@ -83,20 +85,32 @@ def _map(document: Mapping[str, Any]) -> Map:
     _known("the map", document, ("machine", "experiment", "time", "channels", "controller"))
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
-        raise RigtwinError('machine is missing; expected the name that its description has, such as machine = "emps"')
-    time = _known("[time]", document.get("time", {}), ("column", "unit", "period", "resample", "start", "until"))
+        raise RigtwinError(
+            'machine is missing; expected the name that its description has, such as machine = "emps"'
+        )
+    time = _known(
+        "[time]",
+        document.get("time", {}),
+        ("column", "unit", "period", "resample", "start", "until"),
+    )
     if ("column" in time) == ("period" in time):
         raise RigtwinError('[time]: expected either column = "NAME" or period = SECONDS')
     period = _number("[time] period", time["period"], 1e-6, 10.0) if "period" in time else None
-    resample = _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
+    resample = (
+        _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
+    )
     if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
         raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:
-        raise RigtwinError('[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", unit = "mm" }')
+        raise RigtwinError(
+            '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", unit = "mm" }'
+        )
     found = {_channel(name): _source(name, table) for name, table in channels.items()}
     controller = document.get("controller", {})
-    if not isinstance(controller, Mapping) or not all(isinstance(v, int | float | str) for v in controller.values()):
+    if not isinstance(controller, Mapping) or not all(
+        isinstance(v, int | float | str) for v in controller.values()
+    ):
         raise RigtwinError("[controller]: expected a table of settings")
     return Map(
         machine,

@@ -48,10 +48,20 @@ class Layout:
 
 def read(path: Path) -> Columns:
     """All columns of a file; its kind follows the name's ending. Raises RigtwinError saying what is wrong and where."""
-    readers = {".csv": _text, ".txt": _text, ".tsv": _text, ".dat": _text, ".asc": _text, ".mat": _matlab, ".parquet": _parquet}
+    readers = {
+        ".csv": _text,
+        ".txt": _text,
+        ".tsv": _text,
+        ".dat": _text,
+        ".asc": _text,
+        ".mat": _matlab,
+        ".parquet": _parquet,
+    }
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise RigtwinError(f"{path}: cannot tell its kind; the name must end in {', '.join(readers)}")
+        raise RigtwinError(
+            f"{path}: cannot tell its kind; the name must end in {', '.join(readers)}"
+        )
     try:
         columns = reader(path)
     except OSError as error:
@@ -66,7 +76,11 @@ def read(path: Path) -> Columns:
 
 def _decoded(path: Path) -> str:
     raw = path.read_bytes()
-    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+    for mark, name in (
+        (b"\xef\xbb\xbf", "utf-8-sig"),
+        (b"\xff\xfe", "utf-16"),
+        (b"\xfe\xff", "utf-16"),
+    ):
         if raw.startswith(mark):
             return raw.decode(name, errors="replace")
     try:
@@ -100,7 +114,9 @@ def _stamp(cell: str) -> float:
     """A date and time, or a time of day, in s. Raises ValueError."""
     text = cell.strip().replace(",", ".")
     if _CLOCK.fullmatch(text):
-        clock = time.fromisoformat(text.zfill(len(text) + (len(text.split(":")[0]) == 1)) if ":" in text else text)
+        clock = time.fromisoformat(
+            text.zfill(len(text) + (len(text.split(":")[0]) == 1)) if ":" in text else text
+        )
         return 3600.0 * clock.hour + 60.0 * clock.minute + clock.second + 1e-6 * clock.microsecond
     if not re.match(r"\d{4}-\d{2}-\d{2}[T ]\d", text):
         raise ValueError(cell)
@@ -144,10 +160,17 @@ def layout(lines: list[str]) -> Layout | None:
                 continue
             # The more columns the better; commas that are decimals would else part numbers.
             quality = (counts[first], -SEPARATORS.index(separator))
-            if separator == "," and all("." not in line for line in lines[first : first + SURE]) and counts[first] % 2 == 0:
+            if (
+                separator == ","
+                and all("." not in line for line in lines[first : first + SURE])
+                and counts[first] % 2 == 0
+            ):
                 quality = (counts[first] // 2, -SEPARATORS.index(separator))
             if best is None or quality > best[0]:
-                best = quality, _headed(lines, Layout(separator, decimal, first, (), ()), counts[first])
+                best = (
+                    quality,
+                    _headed(lines, Layout(separator, decimal, first, (), ()), counts[first]),
+                )
     return None if best is None else best[1]
 
 
@@ -180,7 +203,13 @@ def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
         else:
             names = nearest
     pairs = [_named(name, unit) for name, unit in zip(names, units, strict=True)]
-    return Layout(found.separator, found.decimal, found.first, tuple(n for n, _ in pairs), tuple(u for _, u in pairs))
+    return Layout(
+        found.separator,
+        found.decimal,
+        found.first,
+        tuple(n for n, _ in pairs),
+        tuple(u for _, u in pairs),
+    )
 
 
 def _named(name: str, unit: str) -> tuple[str, str]:
@@ -217,7 +246,9 @@ def _rows(path: Path, lines: list[str], found: Layout) -> Iterator[list[float]]:
         while len(cells) > len(found.names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(found.names):
-            raise RigtwinError(f"{path}: line {number} has {len(cells)} cells; expected {len(found.names)}")
+            raise RigtwinError(
+                f"{path}: line {number} has {len(cells)} cells; expected {len(found.names)}"
+            )
         try:
             yield [_value(cell, found.decimal) for cell in cells]
         except ValueError as error:
@@ -244,7 +275,11 @@ def _matlab(path: Path) -> Columns:
             found.update(_flat(name, value))
     longest = max((len(each) for each in found.values()), default=0)
     # Scalars are settings, not columns.
-    return Columns({name: value for name, value in found.items() if len(value) == longest or len(value) > 1}, {}, form)
+    return Columns(
+        {name: value for name, value in found.items() if len(value) == longest or len(value) > 1},
+        {},
+        form,
+    )
 
 
 def _flat(name: str, value: Any) -> dict[str, Array]:
@@ -268,7 +303,10 @@ def _flat(name: str, value: Any) -> dict[str, Array]:
     if array.ndim == 2:
         if array.shape[0] < array.shape[1]:
             array = array.T
-        return {f"{name}:{number + 1}": np.ascontiguousarray(array[:, number]) for number in range(array.shape[1])}
+        return {
+            f"{name}:{number + 1}": np.ascontiguousarray(array[:, number])
+            for number in range(array.shape[1])
+        }
     return {}
 
 
@@ -276,7 +314,9 @@ def _hdf(path: Path) -> dict[str, Any]:
     try:
         import h5py
     except ImportError:
-        raise RigtwinError(f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'") from None
+        raise RigtwinError(
+            f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'"
+        ) from None
 
     def content(group: Any) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -295,7 +335,9 @@ def _parquet(path: Path) -> Columns:
         import pyarrow
         import pyarrow.parquet as parquet
     except ImportError:
-        raise RigtwinError(f"{path}: parquet needs pyarrow: pip install 'rigtwin[import]'") from None
+        raise RigtwinError(
+            f"{path}: parquet needs pyarrow: pip install 'rigtwin[import]'"
+        ) from None
     if not path.is_file():
         raise RigtwinError(f"cannot read {path}: No such file or directory")
     try:
@@ -306,7 +348,10 @@ def _parquet(path: Path) -> Columns:
     for name in table.column_names:
         column = table[name]
         if pyarrow.types.is_timestamp(column.type):
-            found[name] = column.cast(pyarrow.timestamp("ns")).cast(pyarrow.int64()).to_numpy().astype(float) * 1e-9
+            found[name] = (
+                column.cast(pyarrow.timestamp("ns")).cast(pyarrow.int64()).to_numpy().astype(float)
+                * 1e-9
+            )
         elif pyarrow.types.is_integer(column.type) or pyarrow.types.is_floating(column.type):
             found[name] = column.to_numpy().astype(float)
     return Columns(found, {}, "parquet")

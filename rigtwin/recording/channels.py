@@ -37,7 +37,12 @@ CHANNELS = (
 
 SESSION = (
     Channel("/session", "time", "s", "since the start of the test; negative before it"),
-    Channel("/session", "phase", "1", "0 idle, 1 armed, 2 ramping, 3 running, 4 stopping, 5 stopped, 6 faulted"),
+    Channel(
+        "/session",
+        "phase",
+        "1",
+        "0 idle, 1 armed, 2 ramping, 3 running, 4 stopping, 5 stopped, 6 faulted",
+    ),
     Channel("/session", "ground", "m", "ground cylinder position written to the rig"),
     Channel("/session", "structure", "m", "structure cylinder position written to the rig"),
     Channel("/session", "voltage", "V", "written to the motor amplifier"),
@@ -54,7 +59,9 @@ def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
     there = [(topic, name) for topic, names in columns.items() for name in names]
     known = [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
     named = {(channel.topic, channel.name) for channel in known}
-    return known + [Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named]
+    return known + [
+        Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named
+    ]
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:

@@ -36,7 +36,9 @@ def type_name(topic: str) -> str:
 
 def descriptor(topic: str, names: Sequence[str]) -> bytes:
     """Serialized FileDescriptorSet of a topic's message type with fields of those names, as an MCAP schema holds it."""
-    file = descriptor_pb2.FileDescriptorProto(name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3")
+    file = descriptor_pb2.FileDescriptorProto(
+        name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3"
+    )
     message = file.message_type.add(name=type_name(topic).partition(".")[2])
     for number, name in enumerate(names, start=1):
         message.field.add(

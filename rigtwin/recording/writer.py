@@ -71,9 +71,16 @@ def _encoded(record: McapRecord) -> bytes:
     return builder.end()
 
 
-def twin_values(seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str) -> dict[str, str]:
+def twin_values(
+    seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str
+) -> dict[str, str]:
     """What a recording keeps of a twin that makes it, as metadata TWIN_RECORD."""
-    return {"seed": str(seed), "parameters": json.dumps(parameters), "effects": json.dumps(effects), "version": version}
+    return {
+        "seed": str(seed),
+        "parameters": json.dumps(parameters),
+        "effects": json.dumps(effects),
+        "version": version,
+    }
 
 
 class Writer:
@@ -123,7 +130,9 @@ class Writer:
             },
         )
 
-    def add_twin(self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str) -> None:
+    def add_twin(
+        self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str
+    ) -> None:
         """Says how a twin makes this recording, so that it can be made again."""
         self.add_metadata(TWIN_RECORD, twin_values(seed, parameters, effects, version))
 
@@ -158,7 +167,9 @@ class Writer:
             return
         self._next = int(sequence[-1]) + 1
         self._ticks += ticks
-        self._put_messages(columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence)
+        self._put_messages(
+            columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence
+        )
 
     def append_beside(self, topic: str, values: Array, times: Array) -> None:
         """Adds messages on a topic that has ticks of its own, such as those before the test begins. values: shape (messages,
@@ -167,13 +178,22 @@ class Writer:
             self._register(topic)
         if len(values):
             stamps = np.round(np.maximum(times, 0.0) * 1e9).astype(np.uint64)
-            self._put_messages({topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0))
+            self._put_messages(
+                {topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0)
+            )
 
-    def _put_messages(self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]) -> None:
+    def _put_messages(
+        self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]
+    ) -> None:
         ticks = len(times)
         for topic in columns:
             self._counts[topic] = self._counts.get(topic, 0) + ticks
-        layout = np.dtype([(topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])]) for topic, values in columns.items()])
+        layout = np.dtype(
+            [
+                (topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])])
+                for topic, values in columns.items()
+            ]
+        )
         messages = np.zeros(ticks, layout)
         for topic, values in columns.items():
             message = messages[topic]
@@ -208,9 +228,15 @@ class Writer:
         ]
         for opcode, records in groups:
             encoded = b"".join(_encoded(record) for record in records)
-            offsets += _encoded(SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(encoded)))
+            offsets += _encoded(
+                SummaryOffset(
+                    group_opcode=opcode, group_start=start + len(summary), group_length=len(encoded)
+                )
+            )
             summary += encoded
-        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
+        footer = Footer(
+            summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
+        )
         self._put(bytes(summary + offsets) + _encoded(footer) + MCAP0_MAGIC)
         self._file.close()
 
@@ -219,8 +245,12 @@ class Writer:
         self._topics[topic] = number
         names = self._fields.get(topic) or topic_fields(topic)
         assert names, f"no channels defined for {topic}"
-        schema = Schema(id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic, names))
-        channel = Channel(id=number, schema_id=number, topic=topic, message_encoding="protobuf", metadata={})
+        schema = Schema(
+            id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic, names)
+        )
+        channel = Channel(
+            id=number, schema_id=number, topic=topic, message_encoding="protobuf", metadata={}
+        )
         self._schemas.append(schema)
         self._channels.append(channel)
         self._put(_encoded(schema) + _encoded(channel))
@@ -268,7 +298,9 @@ class Writer:
         return Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
-            channel_message_counts={number: self._counts.get(topic, 0) for topic, number in self._topics.items()},
+            channel_message_counts={
+                number: self._counts.get(topic, 0) for topic, number in self._topics.items()
+            },
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
             message_start_time=0,
@@ -284,7 +316,9 @@ class Writer:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             self._give_up()
-            raise RigtwinError(f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks") from None
+            raise RigtwinError(
+                f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks"
+            ) from None
         self._offset += len(data)
 
     def _give_up(self) -> None:
@@ -312,7 +346,12 @@ class Writer:
     def __enter__(self) -> Writer:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.finish("completed" if kind is None else f"interrupted: {kind.__name__}")
 
 

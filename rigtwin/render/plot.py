@@ -67,10 +67,20 @@ PANELS = (
             Trace("commanded", ASKED, (("/command", "structure"),), _millimetres),
         ),
     ),
-    Panel("suspension travel, mm", (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),)),
+    Panel(
+        "suspension travel, mm",
+        (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),),
+    ),
     Panel(
         "wheel, mm",
-        (Trace("plate − travel", SENSED, (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")), _wheel),),
+        (
+            Trace(
+                "plate − travel",
+                SENSED,
+                (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")),
+                _wheel,
+            ),
+        ),
     ),
     Panel(
         "suspension force, N",
@@ -89,7 +99,13 @@ def _plainly(recording: Recording) -> tuple[Panel, ...]:
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
     return tuple(
-        Panel(name, tuple(Trace(label, colour, ((topic, name),), _plain) for topic, (label, colour) in labels.items()))
+        Panel(
+            name,
+            tuple(
+                Trace(label, colour, ((topic, name),), _plain)
+                for topic, (label, colour) in labels.items()
+            ),
+        )
         for name in names
     )
 
@@ -102,7 +118,9 @@ def stretch(recording: Recording, start: float, until: float | None) -> slice:
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:
         span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
-        raise RigtwinError(f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}")
+        raise RigtwinError(
+            f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}"
+        )
     return slice(int(first), int(last))
 
 
@@ -111,9 +129,20 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     checked_ending(out)
     ticks = stretch(recording, start, until)
     time = recording.time[ticks]
-    panels = PANELS if all(recording.has("/sensor", name) for name in RIG_SENSORS) else _plainly(recording)
+    panels = (
+        PANELS
+        if all(recording.has("/sensor", name) for name in RIG_SENSORS)
+        else _plainly(recording)
+    )
     there = [
-        (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
+        (
+            panel.title,
+            [
+                trace
+                for trace in panel.traces
+                if all(recording.has(*channel) for channel in trace.needs)
+            ],
+        )
         for panel in panels
     ]
     there = [(title, traces) for title, traces in there if traces]
@@ -126,7 +155,14 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
             axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
         axis.set_ylabel(title, fontsize=9)
         axis.grid(alpha=0.3)
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), fontsize=8, frameon=False, ncols=2, borderpad=0.1)
+        axis.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.97),
+            fontsize=8,
+            frameon=False,
+            ncols=2,
+            borderpad=0.1,
+        )
         axis.margins(x=0)
     axes[-1].set_xlabel("time, s")
     ending = f" · {recording.end}" if recording.end else ""

@@ -79,14 +79,27 @@ def film(
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
-        with _renderer(machine, camera) as render, av.open(str(temporary), "w", format="mp4") as container:
-            stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
-            stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
+        with (
+            _renderer(machine, camera) as render,
+            av.open(str(temporary), "w", format="mp4") as container,
+        ):
+            stream = container.add_stream(
+                "libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"}
+            )
+            stream.width, stream.height, stream.pix_fmt = (
+                WIDTH,
+                SCENE_HEIGHT + TRACE_HEIGHT,
+                "yuv420p",
+            )
             for number, tick in enumerate(frames):
                 at = {name: float(values[tick]) for name, values in motions.items()}
                 scene = render(at, None if bent is None else bent[tick])
                 picture = np.vstack([scene, traces.at(float(time[tick]))])
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")))
+                container.mux(
+                    stream.encode(
+                        av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+                    )
+                )
                 if progress is not None:
                     progress(number + 1, len(frames))
             container.mux(stream.encode())
@@ -118,7 +131,9 @@ def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
                 summed = np.cumsum(signal - np.mean(signal)) * recording.period
                 found[component.joint] = summed if of is VelocitySensor else signal
     if not found:
-        raise RigtwinError(f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it")
+        raise RigtwinError(
+            f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it"
+        )
     return found
 
 
@@ -169,7 +184,9 @@ def _smooth(signal: Array, period: float) -> Array:
 
 def _context() -> Any:
     """An offscreen GL context: of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere."""
-    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or ("egl" if sys.platform == "linux" else "glfw")
+    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or (
+        "egl" if sys.platform == "linux" else "glfw"
+    )
     try:
         context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
         context.make_current()
@@ -226,7 +243,10 @@ def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
     """Adds the cross of beams to a scene, its centre at the plate; its arms are drawn across the rig and far shorter than they
     are, what they do along it in full size."""
     for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
-        points = [plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm) for n, height in enumerate(bent)]
+        points = [
+            plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm)
+            for n, height in enumerate(bent)
+        ]
         for inner, outer in pairwise(points):
             geom = scene.geoms[scene.ngeom]
             kind = mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -246,10 +266,14 @@ class _Traces:
         axes = figure.subplots(max(len(titles), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, title in zip(axes, titles, strict=False):
             for curve in (each for each in curves if each.axis == title):
-                axis.plot(time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label)
+                axis.plot(
+                    time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label
+                )
             axis.set_ylabel(title, fontsize=8)
             if len(axis.lines) > 1:
-                axis.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
+                axis.legend(
+                    loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2
+                )
         upper, lower = axes[0], axes[-1]
         lower.set_xlabel("time, s", fontsize=8)
         for axis in axes:

@@ -48,7 +48,9 @@ def _repeats(column: Array) -> int:
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(column) - 1])))))
 
 
-def zeroed(table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]) -> ChannelTable:
+def zeroed(
+    table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
+) -> ChannelTable:
     """The table whose inputs read their references (zero where none is given) as the rig now stands."""
     lines = [
         _scaled(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
@@ -57,14 +59,19 @@ def zeroed(table: ChannelTable, still: tuple[Still, ...], references: Mapping[st
     return replace(table, inputs=tuple(lines))
 
 
-def spanned(table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]) -> ChannelTable:
+def spanned(
+    table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
+) -> ChannelTable:
     """The table whose named inputs, which read true at zero, read their references as the rig now stands. Raises RigtwinError
     for a reference too close to zero."""
     lines = []
     for line, signal in zip(table.inputs, still, strict=True):
         if line.name in references:
             # What an offset makes of the reading is no part of the span.
-            moved, wanted = signal.mean - line.scaling.offset, references[line.name] - line.scaling.offset
+            moved, wanted = (
+                signal.mean - line.scaling.offset,
+                references[line.name] - line.scaling.offset,
+            )
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, which is noise; place it at its reference"
@@ -92,7 +99,9 @@ def bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Ar
     for column, height in enumerate((stroke, stroke, force)):
         demands[column * ticks : (column + 1) * ticks, column] = height * bump
     settings = Settings(mode=Mode.IMPOSED, kp=0.0, ki=0.0, kff=1.0, preload=0.0, start=0.0)
-    return Configuration(controller=settings, timing=Timing(duration=3 * BUMP, period=period)), demands
+    return Configuration(
+        controller=settings, timing=Timing(duration=3 * BUMP, period=period)
+    ), demands
 
 
 def responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, float]]:
@@ -101,10 +110,14 @@ def responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, fl
     found: dict[str, tuple[str, float, float]] = {}
     for column, (output, sensor) in enumerate(FOLLOWS.items()):
         stretch = slice(column * ticks, (column + 1) * ticks)
-        gain, error = _gain(demands[stretch, column], measured[stretch, Measurements._fields.index(sensor)])
+        gain, error = _gain(
+            demands[stretch, column], measured[stretch, Measurements._fields.index(sensor)]
+        )
         found[output] = (sensor, gain, error)
     stretch = slice(ticks, 2 * ticks)
-    gain, error = _gain(demands[stretch, 1], measured[stretch, Measurements._fields.index("suspension_lvdt")])
+    gain, error = _gain(
+        demands[stretch, 1], measured[stretch, Measurements._fields.index("suspension_lvdt")]
+    )
     found["travel"] = ("suspension_lvdt", gain, error)
     return found
 

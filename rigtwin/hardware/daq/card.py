@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 TIMEOUT = 0.1
 """s that a sample may be awaited: a card that stays silent so long is not there."""
-DRIVER = "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
+DRIVER = (
+    "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
+)
 PACKAGE = "the nidaqmx package is missing; pip install 'rigtwin[daq]'"
 INPUTS, OUTPUTS, PRESSURE = "rigtwin-inputs", "rigtwin-outputs", "rigtwin-pressure"
 """Names of the tasks, by which a guardian finds the outputs when their owner is dead."""
@@ -67,7 +69,11 @@ def connected(address: str) -> grpc.Channel | None:
     import grpc
 
     # A server that is frozen, or a network that is gone, must be noticed: the client's calls have no end of their own.
-    alive = (("grpc.keepalive_time_ms", 1000), ("grpc.keepalive_timeout_ms", 1000), ("grpc.http2.max_pings_without_data", 0))
+    alive = (
+        ("grpc.keepalive_time_ms", 1000),
+        ("grpc.keepalive_timeout_ms", 1000),
+        ("grpc.http2.max_pings_without_data", 0),
+    )
     return grpc.insecure_channel(address, options=alive)
 
 
@@ -90,7 +96,10 @@ class Card:
         ticks of a card that has no clock of its own."""
         self._table, self._period, self._channel = table, period, channel
         # A tick converts seven numbers: handing them to compiled code would take longer.
-        self._inputs, self._outputs = rows(conversion(table.inputs)), rows(conversion(table.outputs))
+        self._inputs, self._outputs = (
+            rows(conversion(table.inputs)),
+            rows(conversion(table.outputs)),
+        )
         self._volts, self._asked = np.zeros(4), np.zeros(3)
         self._pacer, self._clock = pacer, clock
         self._start, self._count, self.missed, self.late = -1.0, 0, 0, 0.0
@@ -106,21 +115,29 @@ class Card:
             system = System.local() if options is None else System.remote(options)
             names = [device.name for device in system.devices]
             if table.device not in names:
-                raise CardFault(f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}")
+                raise CardFault(
+                    f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}"
+                )
             device = system.devices[table.device]
             there = {
                 "inputs": [channel.name for channel in device.ai_physical_chans],
                 "outputs": [channel.name for channel in device.ao_physical_chans],
             }
             if table.physical(table.pressure) not in [line.name for line in device.do_lines]:
-                raise CardFault(f"card.pressure: {device.product_type} has no line {table.pressure}")
+                raise CardFault(
+                    f"card.pressure: {device.product_type} has no line {table.pressure}"
+                )
             ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
             for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
                 for line in lines:
                     if table.physical(line.line) not in there[group]:
-                        raise CardFault(f"{group}.{line.name}: {device.product_type} has no line {line.line}")
+                        raise CardFault(
+                            f"{group}.{line.name}: {device.product_type} has no line {line.line}"
+                        )
                     if line.scaling.range not in ranges[group]:
-                        known = ", ".join(f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]}))
+                        known = ", ".join(
+                            f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]})
+                        )
                         raise CardFault(
                             f"{group}.{line.name}.range = {line.scaling.range:g} V: {device.product_type} has {known} V"
                         )
@@ -133,13 +150,19 @@ class Card:
 
         table = self._table
         with translated(f"card {table.device}"):
-            inputs, outputs, pressure = (self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE))
+            inputs, outputs, pressure = (
+                self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE)
+            )
             for line in table.inputs:
                 volts = line.scaling.range
-                inputs.ai_channels.add_ai_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+                inputs.ai_channels.add_ai_voltage_chan(
+                    table.physical(line.line), min_val=-volts, max_val=volts
+                )
             for line in table.outputs:
                 volts = line.scaling.range
-                outputs.ao_channels.add_ao_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+                outputs.ao_channels.add_ao_voltage_chan(
+                    table.physical(line.line), min_val=-volts, max_val=volts
+                )
             pressure.do_channels.add_do_chan(table.physical(table.pressure))
             if table.timing == "hardware":
                 inputs.timing.cfg_samp_clk_timing(
@@ -153,7 +176,10 @@ class Card:
             self._writer.auto_start = False
             for task in (outputs, pressure, inputs):
                 task.start()
-            self._stream, self._pressure = inputs.in_stream, DigitalSingleChannelWriter(pressure.out_stream)
+            self._stream, self._pressure = (
+                inputs.in_stream,
+                DigitalSingleChannelWriter(pressure.out_stream),
+            )
             self._pressure.auto_start = False
 
     def read(self) -> Measurements:
@@ -197,8 +223,13 @@ class Card:
                 raise error
 
     def _in_volts(self, commands: Commands) -> list[float]:
-        asked = zip(self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True)
-        return [min(max((value - offset) / factor, -reach), reach) for (factor, offset, reach), value in asked]
+        asked = zip(
+            self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True
+        )
+        return [
+            min(max((value - offset) / factor, -reach), reach)
+            for (factor, offset, reach), value in asked
+        ]
 
     def pressure(self, on: bool) -> None:
         with translated(f"card {self._table.device}: pressure line {self._table.pressure}"):
@@ -230,7 +261,9 @@ class Card:
         from nidaqmx.system import System
 
         options = self._options("")
-        return (System.local() if options is None else System.remote(options)).devices[self._table.device]
+        return (System.local() if options is None else System.remote(options)).devices[
+            self._table.device
+        ]
 
     def _options(self, name: str) -> Any:
         if self._channel is None:
@@ -242,9 +275,15 @@ class Card:
 
     def _task(self, kind: Any, name: str) -> Any:
         try:
-            task = kind(name, grpc_options=self._options(name)) if self._channel is not None else kind(name)
+            task = (
+                kind(name, grpc_options=self._options(name))
+                if self._channel is not None
+                else kind(name)
+            )
         except Exception as error:
-            with translated(f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"):
+            with translated(
+                f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"
+            ):
                 raise error
         self._tasks.append(task)
         return task

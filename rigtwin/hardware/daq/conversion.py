@@ -35,7 +35,9 @@ def conversion(lines: Sequence[Line]) -> Conversion:
 
 def rows(lines: Conversion) -> list[tuple[float, float, float]]:
     """Factor, offset and range of each line, as Python reads them fastest."""
-    return list(zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True))
+    return list(
+        zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True)
+    )
 
 
 @compilable

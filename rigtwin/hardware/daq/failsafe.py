@@ -64,7 +64,10 @@ class LastResort:
         from nidaqmx import Task
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
-        channel, attach = connected(self._table.address), SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
+        channel, attach = (
+            connected(self._table.address),
+            SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
+        )
         assert channel is not None
         for name in (OUTPUTS, PRESSURE, INPUTS):
             options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
@@ -82,11 +85,15 @@ class LastResort:
         else:
             from nidaqmx.grpc_session_options import GrpcSessionOptions
 
-            outputs, pressure = (Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names)
+            outputs, pressure = (
+                Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names
+            )
         self._tasks = [outputs, pressure]
         for line in self._table.outputs:
             volts = line.scaling.range
-            outputs.ao_channels.add_ao_voltage_chan(self._table.physical(line.line), min_val=-volts, max_val=volts)
+            outputs.ao_channels.add_ao_voltage_chan(
+                self._table.physical(line.line), min_val=-volts, max_val=volts
+            )
         pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
         self._writers(started=False)
 

@@ -32,11 +32,23 @@ AHEAD = 256
 def analogue(plant: RigPlant) -> RigPlant:
     """The plant with sensors that have no bits: those are the card's."""
     names = Measurements._fields
-    return plant._replace(**{name: sensor._replace(resolution=0.0) for name, sensor in zip(names, sensors(plant), strict=True)})
+    return plant._replace(
+        **{
+            name: sensor._replace(resolution=0.0)
+            for name, sensor in zip(names, sensors(plant), strict=True)
+        }
+    )
 
 
 @compilable
-def _sample(machine: Machine, sensing: Sensing, disturbance: Array, inputs: Conversion, truth: Array, volts: Array) -> None:
+def _sample(
+    machine: Machine,
+    sensing: Sensing,
+    disturbance: Array,
+    inputs: Conversion,
+    truth: Array,
+    volts: Array,
+) -> None:
     true = sense(machine)
     measured = sampled(sensing, true, disturbance)
     for column in range(4):
@@ -76,10 +88,13 @@ class Terminals:
 
     def __init__(self, configuration: Configuration, wiring: ChannelTable, seed: int) -> None:
         rest = configuration.controller._replace(start=0.0, preload=0.0)
-        twin = Twin(configuration._replace(plant=analogue(configuration.plant), controller=rest), 0.0, seed)
+        twin = Twin(
+            configuration._replace(plant=analogue(configuration.plant), controller=rest), 0.0, seed
+        )
         self._twin, self._live = twin, twin.simulation.machine
         self._dead = self._live._replace(
-            ground=self._live.ground._replace(step=0.0), structure=self._live.structure._replace(step=0.0)
+            ground=self._live.ground._replace(step=0.0),
+            structure=self._live.structure._replace(step=0.0),
         )
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         self.truth, self.volts, self.asked = np.zeros(4), np.empty(4), np.zeros(3)

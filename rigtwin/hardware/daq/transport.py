@@ -48,7 +48,9 @@ class InProcess(grpc.Channel):
     def __init__(self, card: VirtualCard) -> None:
         self._card = card
 
-    def unary_unary(self, method: str, *_: Any, response_deserializer: Any = None, **__: Any) -> Any:  # type: ignore[override]
+    def unary_unary(
+        self, method: str, *_: Any, response_deserializer: Any = None, **__: Any
+    ) -> Any:  # type: ignore[override]
         call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
 
         def invoke(request: Any, **_: Any) -> Any:
@@ -71,7 +73,9 @@ class InProcess(grpc.Channel):
 
     stream_unary = stream_stream = unary_stream
 
-    def subscribe(self, callback: Callable[..., Any], try_to_connect: bool | None = False) -> None: ...
+    def subscribe(
+        self, callback: Callable[..., Any], try_to_connect: bool | None = False
+    ) -> None: ...
 
     def unsubscribe(self, callback: Callable[..., Any]) -> None: ...
 
@@ -95,7 +99,9 @@ class _Calls(grpc.GenericRpcHandler):
 
     def service(self, handler_call_details: Any) -> Any:
         service, _, call = handler_call_details.method.strip("/").partition("/")
-        request, response = (getattr(self._messages, call + ending, None) for ending in ("Request", "Response"))
+        request, response = (
+            getattr(self._messages, call + ending, None) for ending in ("Request", "Response")
+        )
         if service != SERVICE or request is None or response is None:
             return None
 
@@ -109,14 +115,20 @@ class _Calls(grpc.GenericRpcHandler):
                 context.abort(grpc.StatusCode.UNIMPLEMENTED, str(error))
 
         return grpc.unary_unary_rpc_method_handler(
-            invoke, request_deserializer=request.FromString, response_serializer=response.SerializeToString
+            invoke,
+            request_deserializer=request.FromString,
+            response_serializer=response.SerializeToString,
         )
 
 
 def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     """Listens on this computer only; port 0 takes a free one. Returns the server and its port. Raises RigtwinError."""
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
-    server = grpc.server(ThreadPoolExecutor(max_workers=8), handlers=[_Calls(card)], options=(("grpc.so_reuseport", 0),))
+    server = grpc.server(
+        ThreadPoolExecutor(max_workers=8),
+        handlers=[_Calls(card)],
+        options=(("grpc.so_reuseport", 0),),
+    )
     try:
         bound = server.add_insecure_port(f"{LOCAL}:{port}")
     except RuntimeError:

@@ -90,7 +90,13 @@ class RealTime:
 
 class _Task:
     def __init__(self, name: str) -> None:
-        self.name, self.lines, self.clocked, self.running, self.next = name, list[str](), False, False, 0
+        self.name, self.lines, self.clocked, self.running, self.next = (
+            name,
+            list[str](),
+            False,
+            False,
+            0,
+        )
 
 
 class VirtualCard:
@@ -107,7 +113,10 @@ class VirtualCard:
         time: OnDemand | RealTime,
     ) -> None:
         self._terminals, self._time, self._device = terminals, time, wiring.device
-        self._inputs, self._outputs = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]
+        self._inputs, self._outputs = (
+            [line.line for line in wiring.inputs],
+            [line.line for line in wiring.outputs],
+        )
         self._pressure_line = wiring.pressure
         self.outputs, self.pressure, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
@@ -127,7 +136,8 @@ class VirtualCard:
         with self._lock:
             if not self.connected:
                 raise DriverError(
-                    GONE, f"The specified device is not present or is not active in the system. Device: {self._device}"
+                    GONE,
+                    f"The specified device is not present or is not active in the system. Device: {self._device}",
                 )
             self._catch_up()
             return handler(request, response)
@@ -185,7 +195,11 @@ class VirtualCard:
         }
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
-        return response(value=", ".join(f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])))
+        return response(
+            value=", ".join(
+                f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])
+            )
+        )
 
     def _GetDeviceAttributeBool(self, request: Any, response: type) -> Any:
         self._known_device(request.device_name)
@@ -235,7 +249,8 @@ class VirtualCard:
             number = re.fullmatch(rf"{kind}(\d+)", name)
             if number is None or int(number[1]) >= count:
                 raise DriverError(
-                    NO_CHANNEL, f"Physical channel specified does not exist on this device. Channel: {line.strip()}"
+                    NO_CHANNEL,
+                    f"Physical channel specified does not exist on this device. Channel: {line.strip()}",
                 )
             task.lines.append(name)
         return task
@@ -243,7 +258,8 @@ class VirtualCard:
     def _voltage(self, request: Any, allowed: tuple[float, ...]) -> None:
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
             raise DriverError(
-                BAD_VALUE, f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}"
+                BAD_VALUE,
+                f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}",
             )
 
     def _CreateAIVoltageChan(self, request: Any, response: type) -> Any:
@@ -262,7 +278,10 @@ class VirtualCard:
 
     def _CfgSampClkTiming(self, request: Any, response: type) -> Any:
         if not 0.0 < request.rate <= _SUPPORTED:
-            raise DriverError(BAD_VALUE, f"Requested value is not a supported value for this property. Rate: {request.rate}")
+            raise DriverError(
+                BAD_VALUE,
+                f"Requested value is not a supported value for this property. Rate: {request.rate}",
+            )
         self._task(request).clocked = True
         return response()
 
@@ -271,7 +290,10 @@ class VirtualCard:
         for other in self._tasks.values():
             both = set(other.lines) & set(task.lines)
             if other is not task and other.running and both:
-                raise DriverError(RESERVED, f"The specified resource is reserved. Task {other.name}, channel {min(both)}")
+                raise DriverError(
+                    RESERVED,
+                    f"The specified resource is reserved. Task {other.name}, channel {min(both)}",
+                )
         task.running, task.next = True, self.tick
         return response()
 
@@ -296,7 +318,9 @@ class VirtualCard:
                 self.run_until(task.next + count - 1)
             behind = self.tick - task.next
             if behind >= len(self._samples):
-                raise DriverError(OVERWRITTEN, "Attempted to read samples that are no longer available.")
+                raise DriverError(
+                    OVERWRITTEN, "Attempted to read samples that are no longer available."
+                )
             task.next += count
         else:
             if task.next > 0:
@@ -310,10 +334,16 @@ class VirtualCard:
     def _WriteAnalogF64(self, request: Any, response: type) -> Any:
         task = self._task(request)
         if len(request.write_array) != len(task.lines):
-            raise DriverError(BAD_VALUE, f"{len(request.write_array)} values written to {len(task.lines)} channels")
+            raise DriverError(
+                BAD_VALUE,
+                f"{len(request.write_array)} values written to {len(task.lines)} channels",
+            )
         for line, volts in zip(task.lines, request.write_array, strict=True):
             if not abs(volts) <= 10.0:
-                raise DriverError(BAD_VALUE, f"Requested value is not a supported value for this property. Value: {volts} V")
+                raise DriverError(
+                    BAD_VALUE,
+                    f"Requested value is not a supported value for this property. Value: {volts} V",
+                )
             self.outputs[int(line[2:])] = volts
         return response(samps_per_chan_written=1)
 

@@ -24,7 +24,14 @@ class FaultyBench:
     """
 
     def __init__(
-        self, terminals: Terminals, table: ChannelTable, kind: str, at: int, place: int, seed: int, ticks: int
+        self,
+        terminals: Terminals,
+        table: ChannelTable,
+        kind: str,
+        at: int,
+        place: int,
+        seed: int,
+        ticks: int,
     ) -> None:
         self._terminals, self._kind, self._at, self._place = terminals, kind, at, place
         self._random = np.random.default_rng(seed)
@@ -34,7 +41,11 @@ class FaultyBench:
         self._held: float | None = None
         self._direction = float(self._random.choice([-1.0, 1.0]))
         self.tick, self.shown = 0, -1
-        self.written, self.pressure, self.truth = np.zeros((ticks, 3)), np.zeros(ticks, bool), np.zeros((ticks, 4))
+        self.written, self.pressure, self.truth = (
+            np.zeros((ticks, 3)),
+            np.zeros(ticks, bool),
+            np.zeros((ticks, 4)),
+        )
         self._read, self._true = np.empty(4), np.empty(4)
 
     def advance(self, written: Array, pressure: bool) -> None:
@@ -91,7 +102,10 @@ class FaultyBench:
             volts[place] = self._random.uniform(-span, span)
         to_values(self._inputs, volts, self._read)
         to_values(self._inputs, self._terminals.volts, self._true)
-        self._show(not abs(self._read[place] - self._true[place]) <= (SEEN_FORCE if place == 3 else SEEN_LVDT))
+        self._show(
+            not abs(self._read[place] - self._true[place])
+            <= (SEEN_FORCE if place == 3 else SEEN_LVDT)
+        )
 
     def _show(self, there: bool) -> None:
         if there and self.shown < 0:
@@ -101,7 +115,9 @@ class FaultyBench:
         """First tick from which the motor's output is zero for good and the cylinders' are held or without pressure."""
         last = min(self.tick, len(self.written))
         motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
-        moving = np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
+        moving = (
+            np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
+        )
         changes = np.flatnonzero(moving) + 1
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 

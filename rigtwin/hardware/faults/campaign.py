@@ -71,7 +71,12 @@ class Outcome:
     @property
     def passed(self) -> bool:
         """Whether the session was stopped as it must be."""
-        return (self.late is None or self.late <= 5) and self.exceeded <= 1.1 and self.right and self.readable
+        return (
+            (self.late is None or self.late <= 5)
+            and self.exceeded <= 1.1
+            and self.right
+            and self.readable
+        )
 
 
 def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
@@ -83,7 +88,11 @@ def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
         kind = kinds[number % len(kinds)]
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]
-        first = BEFORE if kind.place in ("controller", "loop") or kind.name == "controller hangs" else moving
+        first = (
+            BEFORE
+            if kind.place in ("controller", "loop") or kind.name == "controller hangs"
+            else moving
+        )
         # A process on a slowed card takes its time: its faults come in the ramp or soon after.
         last = min(ending, BEFORE + SOON) if kind.place == "process" else ending
         at = int(random.uniform(first + 20.0, last - 50.0))
@@ -98,7 +107,13 @@ def test_of(fault: Fault, table: ChannelTable) -> Test:
     experiment = find(fault.experiment)
     changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
     configuration = overridden(experiment.configuration, changes)
-    return Test(fault.experiment, configuration, experiment.demands(configuration, fault.seed), fault.seed, table)
+    return Test(
+        fault.experiment,
+        configuration,
+        experiment.demands(configuration, fault.seed),
+        fault.seed,
+        table,
+    )
 
 
 def whole(test: Test) -> int:
@@ -126,7 +141,9 @@ def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
     """One fault in this process. Raises RigtwinError only if the session could not even begin."""
     test = test_of(fault, table)
     period, name = test.configuration.timing.period, fault.kind.name
-    bench = FaultyBench(test.terminals(), table, name, fault.at, fault.place, fault.seed, whole(test))
+    bench = FaultyBench(
+        test.terminals(), table, name, fault.at, fault.place, fault.seed, whole(test)
+    )
     virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
@@ -137,7 +154,9 @@ def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
         def stop() -> str | None:
             if virtual.tick >= fault.at:
                 if name == "operator's signal" and virtual.tick == fault.at:
-                    os.kill(os.getpid(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[fault.seed % 3])
+                    os.kill(
+                        os.getpid(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[fault.seed % 3]
+                    )
                 elif name == "operator's file":
                     stop_file.touch()
                 elif name == "full disk":
@@ -148,7 +167,9 @@ def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
             if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
                 bench.shown = virtual.tick
 
-        updating = _failing(fault, virtual) if fault.kind.place in ("controller", "loop") else healthy
+        updating = (
+            _failing(fault, virtual) if fault.kind.place in ("controller", "loop") else healthy
+        )
         record_at_leisure(card, test, path, stop, flushed, updating)
     stop_file.unlink(missing_ok=True)
     return judged(fault, test, bench, path)
@@ -166,7 +187,11 @@ def _failing(fault: Fault, card: VirtualCard) -> Any:
         if fault.kind.name == "command not a number":
             return state, commands._replace(**{("structure", "voltage")[fault.place]: float("nan")})
         if fault.kind.name == "command jumps":
-            step = {"structure": commands.structure + 0.05} if fault.place == 0 else {"voltage": commands.voltage - 11.0}
+            step = (
+                {"structure": commands.structure + 0.05}
+                if fault.place == 0
+                else {"voltage": commands.voltage - 11.0}
+            )
             return state, commands._replace(**step)
         card.run_until(card.tick + SLOW)
         return state, commands
@@ -196,7 +221,11 @@ def judged(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> Outcome:
     harmless = cause == "completed"
     shown = fault.at if fault.kind.everywhere else bench.shown
     late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
-    named = fault.kind.place != "sensor" or cause not in ("jump", "stuck", "not_a_number") or SIGNALS[fault.place] in reason
+    named = (
+        fault.kind.place != "sensor"
+        or cause not in ("jump", "stuck", "not_a_number")
+        or SIGNALS[fault.place] in reason
+    )
     right = named and (cause in fault.kind.causes or (harmless and shown < 0))
     exceeded = bench.exceeded(test.limited.safety, fault.at)
     return Outcome(fault, late, safe - fault.at, exceeded, cause, reason, right, readable(path))

@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SIGNALS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
-_IMPLAUSIBLE = ("jump", "wheel", "motor", "following", "structure", "travel", "ground", "force", "velocity")
+_IMPLAUSIBLE = (
+    "jump",
+    "wheel",
+    "motor",
+    "following",
+    "structure",
+    "travel",
+    "ground",
+    "force",
+    "velocity",
+)
 
 
 @dataclass(frozen=True)
@@ -25,12 +35,30 @@ KINDS = (
     Kind("stuck", "sensor", "repeats its last reading", ("stuck",), everywhere=False),
     Kind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump",)),
     Kind("not a number", "sensor", "the driver gives NaN", ("not_a_number",)),
-    Kind("wrong sign", "sensor", "cable turned round", ("jump", "wheel", "motor", "following"), everywhere=False),
+    Kind(
+        "wrong sign",
+        "sensor",
+        "cable turned round",
+        ("jump", "wheel", "motor", "following"),
+        everywhere=False,
+    ),
     Kind("gain x10", "sensor", "reads ten times as much", _IMPLAUSIBLE, everywhere=False),
     Kind("step", "sensor", "reads 20 % of its range too much", ("jump",)),
     Kind("open input", "sensor", "reads anything within its range", ("jump",)),
-    Kind("amplifier dead", "actuator", "the motor makes no force", ("motor", "following"), everywhere=False),
-    Kind("valve stuck", "actuator", "a cylinder stays where it is", ("following", "wheel"), everywhere=False),
+    Kind(
+        "amplifier dead",
+        "actuator",
+        "the motor makes no force",
+        ("motor", "following"),
+        everywhere=False,
+    ),
+    Kind(
+        "valve stuck",
+        "actuator",
+        "a cylinder stays where it is",
+        ("following", "wheel"),
+        everywhere=False,
+    ),
     Kind(
         "valve open",
         "actuator",
@@ -44,7 +72,13 @@ KINDS = (
     Kind("slow tick", "loop", "a tick takes 4 periods", ("late",)),
     Kind("output refused", "card", "a write fails once", ("card",)),
     Kind("card disconnected", "card", "its cable is pulled", ("card",)),
-    Kind("full disk", "recording", "no more can be written; seen at the next block", ("recording",), everywhere=False),
+    Kind(
+        "full disk",
+        "recording",
+        "no more can be written; seen at the next block",
+        ("recording",),
+        everywhere=False,
+    ),
     Kind("operator's signal", "operator", "SIGINT, SIGTERM or SIGHUP", ("operator",)),
     Kind("operator's file", "operator", "the stop file appears", ("operator",)),
     Kind("process killed", "process", "kill -9", ("process",)),

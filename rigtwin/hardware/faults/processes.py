@@ -45,7 +45,9 @@ class Stray(RigtwinError):
     """The guardian stopped the rig before the fault came: this computer kept the loop waiting for longer than it may wait."""
 
     def __init__(self) -> None:
-        super().__init__("this computer is too busy: the loop was kept waiting and the rig stopped before its fault came")
+        super().__init__(
+            "this computer is too busy: the loop was kept waiting and the rig stopped before its fault came"
+        )
 
 
 def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
@@ -85,14 +87,22 @@ def _once(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
 def _struck(controller: Any, virtual: VirtualCard, fault: Fault, hung: Any) -> float:
     """Strikes when the card's time has come; returns the moment. The card's time begins with the session."""
     if fault.kind.name == "controller hangs":
-        _until(lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang")
+        _until(
+            lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang"
+        )
         if hung.value == 0.0:
             raise Stray
         return float(hung.value)
-    _until(lambda: virtual.tick >= fault.at or controller.exitcode is not None, "the session to get there")
+    _until(
+        lambda: virtual.tick >= fault.at or controller.exitcode is not None,
+        "the session to get there",
+    )
     if controller.exitcode is not None:
         raise Stray
-    os.kill(controller.pid, {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}[fault.kind.name])
+    os.kill(
+        controller.pid,
+        {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}[fault.kind.name],
+    )
     return monotonic()
 
 
@@ -111,9 +121,13 @@ def _ended(path: Path) -> bool:
 def _control(test: Test, path: Path, fault: Fault, hung: Any) -> None:
     """The controller process: everything slowed as the card is. What it and its guardian have to say is in the recording."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    card = Card(test.table, test.configuration.timing.period, connected(test.table.address), clock=_slowed)
+    card = Card(
+        test.table, test.configuration.timing.period, connected(test.table.address), clock=_slowed
+    )
     patient = watched(test, path, True)
-    guardian = Guardian(replace(patient, patience=DILATION * patient.patience, hold=DILATION * patient.hold))
+    guardian = Guardian(
+        replace(patient, patience=DILATION * patient.patience, hold=DILATION * patient.hold)
+    )
     ticks = 0
 
     def hanging(controlling: Any, state: Any, measured: Any, demand: Any) -> Any:

@@ -21,11 +21,15 @@ from rigtwin.simulation.peaks import Peak, peaks
 def predicted(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
     """How near to every limit a session came that was recorded on the virtual card."""
     commands = np.column_stack([recording.column("/command", name) for name in Commands._fields])
-    measurements = np.column_stack([recording.column("/sensor", name) for name in Measurements._fields])
+    measurements = np.column_stack(
+        [recording.column("/sensor", name) for name in Measurements._fields]
+    )
     return peaks(commands, measurements, configuration)
 
 
-def digest(experiment: str, configuration: Configuration, demands: Array, table: ChannelTable) -> str:
+def digest(
+    experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
+) -> str:
     """What makes a session another one: experiment, every setting, what is demanded, and the channel table."""
     told = json.dumps([experiment, flattened(configuration), written(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
@@ -61,7 +65,9 @@ def _entries(path: Path) -> dict[str, dict[str, str]]:
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except ValueError:
-        raise RigtwinError(f"{path} is not a list of dry runs; remove it and do them again") from None
+        raise RigtwinError(
+            f"{path} is not a list of dry runs; remove it and do them again"
+        ) from None
     if not isinstance(entries, dict):
         raise RigtwinError(f"{path} is not a list of dry runs; remove it and do them again")
     return entries

@@ -98,14 +98,21 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
                 dead = os.getppid() != owner
             if dead:
                 return Cause("process", "the controller process died") if shared[WATCHED] else None
-            if watched.table is not None and shared[WATCHED] and monotonic() - shared[BEAT] > watched.patience:
+            if (
+                watched.table is not None
+                and shared[WATCHED]
+                and monotonic() - shared[BEAT] > watched.patience
+            ):
                 with suppress(ProcessLookupError):
                     os.kill(owner, signal.SIGKILL)
                 if handle is not None and not watched.table.address:
                     # A driver on this computer keeps the lines until the process is gone altogether.
                     select.select([handle], [], [], GONE)
                 waited = f"{1e3 * watched.patience:.3g} ms"
-                return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
+                return Cause(
+                    "process",
+                    f"the controller process died or hung: no tick for {waited}; it was killed",
+                )
         return None
     finally:
         if handle is not None:
@@ -125,7 +132,13 @@ class _Keeping:
         ring: Array,
     ) -> None:
         self._shared, self._ring = shared, ring
-        self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
+        self._writer, self._keeper, self._pipe, self._watched, self._view = (
+            writer,
+            Keeper(writer),
+            pipe,
+            watched,
+            view,
+        )
         self._last: Transition | None = None
         self._reason: str | None = None
         self._resort: Any = None
@@ -210,7 +223,10 @@ class _Keeping:
             self._writer.finish(self._reason or "the loop ended without a word")
             return
         before = self._last.after if self._last is not None else Phase.IDLE
-        cause, now = self._cause, self._time if self._last is None else max(self._time, self._last.time)
+        cause, now = (
+            self._cause,
+            self._time if self._last is None else max(self._time, self._last.time),
+        )
         if before != Phase.STOPPING:
             self._keeper.transition(Transition(now, before, Phase.STOPPING, cause))
         self._keeper.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))

@@ -20,7 +20,9 @@ def live_view(port: int) -> Callable[[str, Array], None]:
     try:
         import foxglove
     except ImportError:
-        raise RigtwinError("the foxglove-sdk package is missing; pip install 'rigtwin[live]'") from None
+        raise RigtwinError(
+            "the foxglove-sdk package is missing; pip install 'rigtwin[live]'"
+        ) from None
     try:
         server = foxglove.start_server(name="rigtwin", host=HOST, port=port)
     except (RuntimeError, OverflowError) as error:
@@ -29,7 +31,11 @@ def live_view(port: int) -> Callable[[str, Array], None]:
 
     def show(topic: str, rows: Array) -> None:
         if topic not in channels:
-            schema = foxglove.Schema(name=type_name(topic), encoding="protobuf", data=descriptor(topic, topic_fields(topic)))
+            schema = foxglove.Schema(
+                name=type_name(topic),
+                encoding="protobuf",
+                data=descriptor(topic, topic_fields(topic)),
+            )
             channels[topic] = foxglove.Channel(topic, schema=schema, message_encoding="protobuf")
         for row in rows[::SHOWN]:
             channels[topic].log(encoded(row), log_time=max(0, round(float(row[0]) * 1e9)))

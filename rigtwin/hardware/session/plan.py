@@ -36,7 +36,9 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
     unknown = [name for name in tables if name != "test"]
     tests = tables.get("test")
     if unknown or not isinstance(tests, list) or not tests:
-        raise RigtwinError(f"unknown {unknown[0]!r}; expected [[test]] tables" if unknown else "no [[test]] in it")
+        raise RigtwinError(
+            f"unknown {unknown[0]!r}; expected [[test]] tables" if unknown else "no [[test]] in it"
+        )
     found: list[Planned] = []
     for number, test in enumerate(tests, start=1):
         where = f"test {number}"
@@ -44,20 +46,36 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
             raise RigtwinError(f"{where} = {test!r}; expected a table, [[test]]")
         for key in test:
             if key not in ("experiment", "name", "seed", "pause", "set"):
-                raise RigtwinError(f"{where}: unknown {key!r}; there are experiment, name, seed, pause, set")
-        experiment, seed, pause = test.get("experiment"), test.get("seed", 0), test.get("pause", 0.0)
+                raise RigtwinError(
+                    f"{where}: unknown {key!r}; there are experiment, name, seed, pause, set"
+                )
+        experiment, seed, pause = (
+            test.get("experiment"),
+            test.get("seed", 0),
+            test.get("pause", 0.0),
+        )
         if not isinstance(experiment, str):
             raise RigtwinError(f"{where}: experiment is missing")
         find(experiment)
         if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
             raise RigtwinError(f"{where}: seed = {seed!r}; expected 0 or more")
-        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0.0 <= pause <= LONGEST:
+        if (
+            isinstance(pause, bool)
+            or not isinstance(pause, int | float)
+            or not 0.0 <= pause <= LONGEST
+        ):
             raise RigtwinError(f"{where}: pause = {pause!r}; expected 0 to {LONGEST:g} s")
         settings = test.get("set", {})
         if not isinstance(settings, Mapping):
             raise RigtwinError(f"{where}: set = {settings!r}; expected a table of settings")
         name = test.get("name", f"{number:02d}-{experiment}-{seed}")
-        if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
+        if (
+            not isinstance(name, str)
+            or not name.strip()
+            or "/" in name
+            or name.startswith(".")
+            or not name.isprintable()
+        ):
             raise RigtwinError(f"{where}: name = {name!r}; expected what a file can be called")
         if name in (other.name for other in found):
             raise RigtwinError(f"{where}: name {name!r} is another test's; expected one of its own")
@@ -86,10 +104,16 @@ def session(parsed: Namespace) -> int:
     except OSError as error:
         raise RigtwinError(f"cannot make {parsed.folder}: {error.strerror}") from None
     real = parsed.target == "daq" and not parsed.dry_run
-    todo = [test for test in tests if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap", real))]
+    todo = [
+        test
+        for test in tests
+        if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap", real))
+    ]
     taken = [test.name for test in todo if (parsed.folder / f"{test.name}.mcap").exists()]
     if taken and not parsed.resume:
-        raise RigtwinError(f"{parsed.folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder")
+        raise RigtwinError(
+            f"{parsed.folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder"
+        )
     # Every mistake is found before the first test moves anything.
     ready = [(test, test_of(_of(parsed, test), test.experiment)) for test in todo]
     for _, one in ready:
@@ -144,7 +168,15 @@ def _compared(path: Path) -> None:
     """Where the rig and the twin disagree, at once."""
     from rigtwin.cli.diagnosis_commands import compare
 
-    arguments = {"recording": path, "other": None, "json": None, "machine": None, "effect": [], "set": [], "config": None}
+    arguments = {
+        "recording": path,
+        "other": None,
+        "json": None,
+        "machine": None,
+        "effect": [],
+        "set": [],
+        "config": None,
+    }
     try:
         compare(Namespace(**arguments))
     except RigtwinError as error:

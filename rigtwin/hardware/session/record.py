@@ -69,7 +69,9 @@ def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     """What a recording says beyond the test: the channel table, and how a twin made it."""
     told = {CARD_RECORD: {"table": written(test.table)}}
     if virtual:
-        told[TWIN_RECORD] = twin_values(test.seed, flattened(test.configuration), test.effects, __version__)
+        told[TWIN_RECORD] = twin_values(
+            test.seed, flattened(test.configuration), test.effects, __version__
+        )
     return told
 
 
@@ -96,18 +98,28 @@ def record_at_leisure(
         writer.reserve()
         for name, values in metadata(test, virtual=True).items():
             writer.add_metadata(name, values)
-        ended = supervise(rig, limited, test.demands, Keeper(writer), stop, updating=updating, progress=progress)
+        ended = supervise(
+            rig, limited, test.demands, Keeper(writer), stop, updating=updating, progress=progress
+        )
         writer.finish(ended.cause.reason)
     return ended
 
 
-def watched(test: Test, path: Path, guarded: bool, notes: Sequence[tuple[str, dict[str, str]]] = (), live: int = 0) -> Watched:
+def watched(
+    test: Test,
+    path: Path,
+    guarded: bool,
+    notes: Sequence[tuple[str, dict[str, str]]] = (),
+    live: int = 0,
+) -> Watched:
     """What a guardian has to know of a test."""
     safety = test.configuration.safety
     # The last tick that may be late comes `missed` + 1 periods after the one before, and a little more.
     patience = min((safety.missed + 1.5) * test.configuration.timing.period, LONGEST)
     told = metadata(test, virtual=not guarded) | dict(notes)
-    return Watched(_writing(path, test), told, test.table if guarded else None, patience, safety.hold, live)
+    return Watched(
+        _writing(path, test), told, test.table if guarded else None, patience, safety.hold, live
+    )
 
 
 def record_in_real_time(
@@ -131,7 +143,9 @@ def record_in_real_time(
     with ExitStack() as stack:
         grants = stack.enter_context(in_real_time(fifo))
         try:
-            ended = supervise(rig, limited, test.demands, guardian, stop, lateness, progress=progress)
+            ended = supervise(
+                rig, limited, test.demands, guardian, stop, lateness, progress=progress
+            )
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
             raise

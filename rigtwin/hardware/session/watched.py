@@ -37,4 +37,6 @@ class Watched:
     patience: float
     hold: float
     live: int = 0
-    phases: tuple[Phase, ...] = field(default=(Phase.ARMED, Phase.RAMPING, Phase.RUNNING, Phase.STOPPING))
+    phases: tuple[Phase, ...] = field(
+        default=(Phase.ARMED, Phase.RAMPING, Phase.RUNNING, Phase.STOPPING)
+    )
