@@ -10,14 +10,19 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
+from rigtwin.description.configuration import from_assignments
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.daq.virtual import VirtualCard
 from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
-from rigtwin.description.configuration import from_assignments
+from rigtwin.hardware.session.record import (
+    Test,
+    open_virtual_card,
+    record_at_leisure,
+    record_in_real_time,
+)
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 
@@ -93,10 +98,10 @@ def compute(name: str, folder: Path, paced: bool) -> Array:
     not the card. paced: one tick a period, from a cold cache as on the rig, or one after the other."""
     test = _test(name)
     tape = _Taped(test.terminals())
-    card, _ = on_virtual_card(test, tape)
+    card, _ = open_virtual_card(test, tape)
     record_at_leisure(card, test, folder / "tape.mcap")
     tape.rewind()
-    card, device = on_virtual_card(test, tape)
+    card, device = open_virtual_card(test, tape)
     timed = _Timed(card, device, Pacer(test.configuration.timing.period) if paced else None)
     # Without a pause the kernel would stop a FIFO loop for 50 ms of each second.
     record_in_real_time(timed, test, folder / "timed.mcap", lambda: None, guarded=False, fifo=paced)

@@ -78,8 +78,8 @@ def run(parsed: Namespace) -> int:
 
 
 def _run_supervised(parsed: Namespace, path: Path) -> int:
+    from rigtwin.cli.session_commands import plan_test
     from rigtwin.cli.session_commands import run as work
-    from rigtwin.cli.session_commands import test_of
 
     if parsed.target == "daq" and parsed.card is None:
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
@@ -90,7 +90,7 @@ def _run_supervised(parsed: Namespace, path: Path) -> int:
             "--live goes with a session in real time: --real-time, or --target daq without --dry-run"
         )
     writable(apart(path, *(given for given in (parsed.card, parsed.config) if given is not None)))
-    return work(parsed, test_of(parsed, parsed.name), path)
+    return work(parsed, plan_test(parsed, parsed.name), path)
 
 
 def card(parsed: Namespace) -> int:

@@ -14,8 +14,8 @@ from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.faults import processes
-from rigtwin.hardware.faults.campaign import Fault, Outcome, drawn, tried
-from rigtwin.hardware.faults.kinds import KINDS, Kind
+from rigtwin.hardware.faults.campaign import Fault, FaultResult, draw_faults, try_fault
+from rigtwin.hardware.faults.kinds import KINDS, FaultKind
 
 HEADER = (
     "fault",
@@ -39,8 +39,8 @@ def faults(parsed: Namespace) -> int:
         if out is not None:
             writable(out)
     channels = load_table(parsed.card)
-    todo = _todo(parsed)
-    outcomes, undone = list[Outcome](), list[str]()
+    todo = _draw(parsed)
+    outcomes, undone = list[FaultResult](), list[str]()
     with (
         TemporaryDirectory(prefix="rigtwin-faults-") as folder,
         tqdm(todo, unit="fault", disable=None, leave=False) as bar,
@@ -48,7 +48,7 @@ def faults(parsed: Namespace) -> int:
         try:
             for fault in bar:
                 bar.set_description(fault.kind.name)
-                run = processes.tried if fault.kind.place == "process" else tried
+                run = processes.try_process_fault if fault.kind.place == "process" else try_fault
                 try:
                     outcomes.append(run(fault, channels, Path(folder)))
                 except RigtwinError as error:
@@ -60,12 +60,12 @@ def faults(parsed: Namespace) -> int:
         for kind in KINDS
     ]
     rows = [row for row in rows if row[2] != "0"]
-    failed = [outcome for outcome in outcomes if not outcome.passed]
+    failed = [outcome for outcome in outcomes if not outcome.ok]
     passed = len(outcomes) - len(failed)
     said = f"{len(outcomes)} faults of {len(rows)} kinds, seed {parsed.seed}: {passed} sessions ended as they must"
     print(table([HEADER, *rows]))
     for outcome in failed:
-        print(f"failed: {_described(outcome)}")
+        print(f"failed: {_describe(outcome)}")
     for one in undone:
         print(f"not run: {one}")
     print(said)
@@ -76,14 +76,14 @@ def faults(parsed: Namespace) -> int:
     return 0 if not failed and not undone else 4
 
 
-def _todo(parsed: Namespace) -> list[Fault]:
+def _draw(parsed: Namespace) -> list[Fault]:
     here = [kind for kind in KINDS if kind.place != "process"]
     apart = [kind for kind in KINDS if kind.place == "process"]
-    todo = drawn(parsed.each * len(here), parsed.seed, here)
-    return todo + drawn(parsed.processes * len(apart), parsed.seed + 1, apart)
+    todo = draw_faults(parsed.each * len(here), parsed.seed, here)
+    return todo + draw_faults(parsed.processes * len(apart), parsed.seed + 1, apart)
 
 
-def _row(kind: Kind, outcomes: list[Outcome]) -> tuple[str, ...]:
+def _row(kind: FaultKind, outcomes: list[FaultResult]) -> tuple[str, ...]:
     """One line of the table."""
     seen = [outcome for outcome in outcomes if outcome.late is not None]
     late = [outcome.late for outcome in seen if outcome.late is not None]
@@ -102,7 +102,7 @@ def _row(kind: Kind, outcomes: list[Outcome]) -> tuple[str, ...]:
     )
 
 
-def _described(outcome: Outcome) -> str:
+def _describe(outcome: FaultResult) -> str:
     fault = outcome.fault
     return (
         f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, seed {fault.seed}: safe "
@@ -110,10 +110,10 @@ def _described(outcome: Outcome) -> str:
     )
 
 
-def _write(path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[Outcome]) -> None:
+def _write(path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[FaultResult]) -> None:
     lines = [said + ".", "", "| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
-    lines += ["", *(f"- failed: {_described(outcome)}" for outcome in failed)]
+    lines += ["", *(f"- failed: {_describe(outcome)}" for outcome in failed)]
     try:
         old = path.read_text(encoding="utf-8") if path.exists() else ""
         before, mark, _ = old.partition(MARK)

@@ -14,19 +14,19 @@ from rigtwin.console import late, table
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
-from rigtwin.hardware.daq.table import load_table, trusted
+from rigtwin.hardware.daq.table import load_table, require_trust
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
-from rigtwin.hardware.realtime import machine_lacks
-from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
+from rigtwin.hardware.realtime import list_shortcomings
+from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
 from rigtwin.hardware.session.record import (
     Test,
-    on_card,
-    on_virtual_card,
+    open_card,
+    open_virtual_card,
     record_at_leisure,
     record_in_real_time,
 )
 from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.supervised import Ended
+from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording import load
 
@@ -36,13 +36,13 @@ PORTS = 65535
 def run(parsed: Namespace, test: Test, path: Path) -> int:
     """Runs a test under supervision as the command line asks. Returns the exit code."""
     if parsed.target == "twin":
-        return _on_twin(parsed, test, path)
+        return _run_on_twin(parsed, test, path)
     if parsed.dry_run:
-        return _dry(parsed, test, path)
-    return _on_the_rig(parsed, test, path)
+        return _dry_run(parsed, test, path)
+    return _run_on_rig(parsed, test, path)
 
 
-def _on_twin(parsed: Namespace, test: Test, path: Path) -> int:
+def _run_on_twin(parsed: Namespace, test: Test, path: Path) -> int:
     twin = WiredTwin(test.terminals(), test.table)
     with ExitStack() as stack:
         stop = stack.enter_context(stop_requests(parsed.stop_file))
@@ -54,39 +54,39 @@ def _on_twin(parsed: Namespace, test: Test, path: Path) -> int:
             )
         else:
             ended = record_at_leisure(twin, test, path, stop, bar.update)
-    return _said(test, path, ended)
+    return _report(test, path, ended)
 
 
-def _dry(parsed: Namespace, test: Test, path: Path) -> int:
-    card, _ = on_virtual_card(test)
+def _dry_run(parsed: Namespace, test: Test, path: Path) -> int:
+    card, _ = open_virtual_card(test)
     with stop_requests(parsed.stop_file) as stop, _bar(test) as bar:
         ended = record_at_leisure(card, test, path, stop, bar.update)
-    code = _said(test, path, ended)
+    code = _report(test, path, ended)
     if ended.ticks:
         rows: list[tuple[str, ...]] = [("predicted", "peak", "limit", "margin")]
-        for quantity in predicted(load(path), test.limited):
+        for quantity in predict_peaks(load(path), test.card_configuration):
             peak, limit = (
                 f"{quantity.peak:.4g} {quantity.unit}",
                 f"{quantity.limit:g} {quantity.unit}",
             )
             rows.append((quantity.name, peak, limit, f"{100 * quantity.margin:.0f} %"))
         print(table(rows))
-    for lacking in _lacking(test):
+    for lacking in _list_obstacles(test):
         print(f"before the rig may be armed: {lacking}")
     if ended.cause == COMPLETED and not test.effects:
         enter(
             parsed.card,
-            _key(test),
+            _dry_run_key(test),
             {"experiment": test.experiment, "date": date.today().isoformat()},
         )
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code
 
 
-def _lacking(test: Test) -> list[str]:
+def _list_obstacles(test: Test) -> list[str]:
     """What would keep this test off the real rig, and what this computer lacks."""
     lacking: list[str] = []
-    for look in (lambda: trusted(test.table, date.today()), lambda: on_card(test)):
+    for look in (lambda: require_trust(test.table, date.today()), lambda: open_card(test)):
         try:
             look()
         except RigtwinError as error:
@@ -94,20 +94,20 @@ def _lacking(test: Test) -> list[str]:
     return lacking
 
 
-def _key(test: Test) -> str:
+def _dry_run_key(test: Test) -> str:
     return digest(test.experiment, test.configuration, test.demands, test.table)
 
 
-def permitted(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
+def require_permission(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
     """The card, on which nothing has moved yet, and what the recording has to say of it. Raises RigtwinError if the test must
     not be run on the rig."""
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
-    trusted(test.table, date.today())
-    _ = test.limited
-    card = on_card(test)
+    require_trust(test.table, date.today())
+    _ = test.card_configuration
+    card = open_card(test)
     notes: list[tuple[str, dict[str, str]]] = []
-    if not passed(parsed.card, _key(test)):
+    if not has_passed(parsed.card, _dry_run_key(test)):
         if not parsed.without_dry_run:
             raise RigtwinError(
                 f"{test.experiment} with these settings has had no dry run; do it first: the same command with --dry-run "
@@ -117,19 +117,19 @@ def permitted(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict
     return card, notes
 
 
-def _on_the_rig(parsed: Namespace, test: Test, path: Path) -> int:
-    card, notes = permitted(parsed, test)
-    for lacking in machine_lacks():
+def _run_on_rig(parsed: Namespace, test: Test, path: Path) -> int:
+    card, notes = require_permission(parsed, test)
+    for lacking in list_shortcomings():
         print(f"this computer lacks {lacking}")
-    if not parsed.arm and not _armed_by_hand(test):
+    if not parsed.arm and not _ask_to_arm(test):
         print("not armed; nothing moved")
         return 1
     with stop_requests(parsed.stop_file) as stop, _bar(test) as bar:
         ended = record_in_real_time(card, test, path, stop, True, notes, parsed.live, bar.update)
-    return _said(test, path, ended)
+    return _report(test, path, ended)
 
 
-def _armed_by_hand(test: Test) -> bool:
+def _ask_to_arm(test: Test) -> bool:
     if not sys.stdin.isatty():
         raise RigtwinError(
             "no terminal to ask for arming; say --arm if everybody is clear of the rig"
@@ -154,7 +154,7 @@ def _bar(test: Test) -> tqdm:
     )
 
 
-def _said(test: Test, path: Path, ended: Ended) -> int:
+def _report(test: Test, path: Path, ended: SessionEnd) -> int:
     seconds = ended.ticks * test.configuration.timing.period
     print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {ended.cause.reason}")
     lateness = load(path).lateness if ended.ticks else {}
@@ -163,7 +163,7 @@ def _said(test: Test, path: Path, ended: Ended) -> int:
     return 0 if ended.cause == COMPLETED else 3
 
 
-def test_of(parsed: Namespace, name: str) -> Test:
+def plan_test(parsed: Namespace, name: str) -> Test:
     """The test of a command line: experiment, settings, seed, card. Raises RigtwinError."""
     from experiments import find
     from rigtwin.console import configured

@@ -12,7 +12,7 @@ from rigtwin.components import LoadCell, Lvdt
 from rigtwin.components.plant import Plant
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
+from rigtwin.signals.noise import remove_mains, rms, smallest_step, white_noise
 
 OUTSTANDING = 1.6
 """Times its nominal value, and times what the other sensors have more than nominal, from which a sensor's noise, hum or bit
@@ -37,7 +37,7 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Plant) 
     """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should read."""
     signal = recording.column("/sensor", name)
     difference = signal - predicted
-    line = difference - without_mains(difference, recording.period, plant.mains.frequency)
+    line = difference - remove_mains(difference, recording.period, plant.mains.frequency)
     bit = smallest_step(signal)
     # White noise as the bits leave it: a coarse bit adds a variance of its own.
     white = math.sqrt(max(white_noise(signal) ** 2 - bit**2 / 12.0, 0.0))

@@ -163,7 +163,7 @@ def _schedule() -> Grant:
     return Grant("FIFO scheduling")
 
 
-def machine_lacks() -> list[str]:
+def list_shortcomings() -> list[str]:
     """What this computer lacks for a loop in real time, a line each; changes nothing."""
     lacks: list[str] = []
     with in_real_time() as grants:
@@ -181,5 +181,5 @@ def machine_lacks() -> list[str]:
     return lacks
 
 
-def described(grants: tuple[Grant, ...]) -> str:
+def describe_grants(grants: tuple[Grant, ...]) -> str:
     return "; ".join(f"{grant.name}: {grant.lacking or 'granted'}" for grant in grants)

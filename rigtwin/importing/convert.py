@@ -54,7 +54,7 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
         for channel, values in signals.items()
     }
     time = _time(data, columns, wanted, rows)
-    time, signals = _distinct(data, time, signals, report)
+    time, signals = _drop_repeats(data, time, signals, report)
     taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
     if taken.sum() < 2:
         raise RigtwinError(
@@ -62,7 +62,7 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
         )
     time, signals = time[taken], {channel: values[taken] for channel, values in signals.items()}
     period = wanted.period or _period(time)
-    _whole(data, time, signals)
+    _require_numbers(data, time, signals)
     if wanted.resample is not None:
         bridged = np.diff(time)
         bridged = bridged[bridged > (1.0 + JITTER) * period]
@@ -70,16 +70,16 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
             report.append(
                 f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, {bridged.sum():.4g} s in all"
             )
-        time, signals = _resampled(time, signals, period, wanted.resample)
+        time, signals = _resample(time, signals, period, wanted.resample)
         report.append(f"resampled from {period:g} s to {wanted.resample:g} s: {len(time)} ticks")
         period = wanted.resample
     else:
-        _even(data, time, period, report)
+        _require_even_ticks(data, time, period, report)
     for channel, values in signals.items():
         report += [
-            f"{channel[0]}.{channel[1]} {each}" for each in _oddities(values, time - time[0])
+            f"{channel[0]}.{channel[1]} {each}" for each in _find_oddities(values, time - time[0])
         ]
-    ticks = _written(out, wanted, period, signals)
+    ticks = _write(out, wanted, period, signals)
     report.append(f"{ticks} ticks of {period:g} s for machine {wanted.machine} in {out}")
     return report
 
@@ -149,7 +149,7 @@ def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
     return factor * values
 
 
-def _distinct(
+def _drop_repeats(
     data: Path, time: Array, signals: dict[tuple[str, str], Array], report: list[str]
 ) -> tuple[Array, dict[tuple[str, str], Array]]:
     """Without rows that are there twice. Time that goes back, or two different values at one time, is refused."""
@@ -175,7 +175,7 @@ def _distinct(
     return time[~again], {channel: values[~again] for channel, values in signals.items()}
 
 
-def _whole(data: Path, time: Array, signals: dict[tuple[str, str], Array]) -> None:
+def _require_numbers(data: Path, time: Array, signals: dict[tuple[str, str], Array]) -> None:
     """Raises RigtwinError where a cell held no number."""
     for channel, values in signals.items():
         wrong = ~np.isfinite(values)
@@ -203,7 +203,7 @@ def _period(time: Array) -> float:
     return period
 
 
-def _even(data: Path, time: Array, period: float, report: list[str]) -> None:
+def _require_even_ticks(data: Path, time: Array, period: float, report: list[str]) -> None:
     """Raises RigtwinError if the time stamps are not those of one period."""
     steps = np.diff(time)
     off = np.abs(steps - period) > JITTER * period
@@ -224,7 +224,7 @@ def _even(data: Path, time: Array, period: float, report: list[str]) -> None:
         report.append(f"time stamps are off by up to {worst:.2g} s; taken as ticks of {period:g} s")
 
 
-def _resampled(
+def _resample(
     time: Array, signals: dict[tuple[str, str], Array], period: float, wanted: float
 ) -> tuple[Array, dict[tuple[str, str], Array]]:
     """At another period, straight between samples; smoothed first where that is longer, so that nothing is aliased."""
@@ -237,7 +237,7 @@ def _resampled(
     return ticks, found
 
 
-def _oddities(values: Array, time: Array) -> list[str]:
+def _find_oddities(values: Array, time: Array) -> list[str]:
     if np.ptp(values) == 0.0:
         return [f"is {values[0]:g} throughout"]
     found = []
@@ -263,7 +263,7 @@ def _oddities(values: Array, time: Array) -> list[str]:
     return found
 
 
-def _written(out: Path, wanted: Map, period: float, signals: dict[tuple[str, str], Array]) -> int:
+def _write(out: Path, wanted: Map, period: float, signals: dict[tuple[str, str], Array]) -> int:
     fields: dict[str, list[str]] = {}
     for topic, name in signals:
         fields.setdefault(topic, []).append(name)

@@ -59,7 +59,7 @@ def load(path: Path) -> Map:
         raise RigtwinError(f"{path}: {error}") from None
 
 
-def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
+def _require_keys(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{where}: expected a table")
     for key in table:
@@ -82,13 +82,13 @@ def _number(where: str, value: object, low: float = -math.inf, high: float = mat
 
 
 def _map(document: Mapping[str, Any]) -> Map:
-    _known("the map", document, ("machine", "experiment", "time", "channels", "controller"))
+    _require_keys("the map", document, ("machine", "experiment", "time", "channels", "controller"))
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
         raise RigtwinError(
             'machine is missing; expected the name that its description has, such as machine = "emps"'
         )
-    time = _known(
+    time = _require_keys(
         "[time]",
         document.get("time", {}),
         ("column", "unit", "period", "resample", "start", "until"),
@@ -135,7 +135,7 @@ def _channel(name: str) -> tuple[str, str]:
 
 def _source(name: str, given: object) -> Source:
     where = f"[channels] {name!r}"
-    table = _known(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
+    table = _require_keys(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
     if ("column" in table) == ("constant" in table):
         raise RigtwinError(f'{where}: expected either column = "NAME" or constant = NUMBER')
     if "unit" in table:

@@ -74,7 +74,7 @@ def read(path: Path) -> Columns:
 # Text.
 
 
-def _decoded(path: Path) -> str:
+def _decode(path: Path) -> str:
     raw = path.read_bytes()
     for mark, name in (
         (b"\xef\xbb\xbf", "utf-8-sig"),
@@ -133,7 +133,7 @@ def _value(cell: str, decimal: str) -> float:
         return _stamp(cell)
 
 
-def _counted(line: str, separator: str, decimal: str) -> int:
+def _count_numbers(line: str, separator: str, decimal: str) -> int:
     """How many numbers a line holds, 0 if anything else is in it or there are none."""
     cells = _cells(line, separator)
     while cells and not cells[-1]:
@@ -147,14 +147,14 @@ def _counted(line: str, separator: str, decimal: str) -> int:
     return len(cells) if numbers else 0
 
 
-def layout(lines: list[str]) -> Layout | None:
+def find_layout(lines: list[str]) -> Layout | None:
     """How a text is written; None if no lines of numbers are in it."""
     best: tuple[tuple[int, int], Layout] | None = None
     for separator in SEPARATORS:
         for decimal in (".", ","):
             if decimal == separator:
                 continue
-            counts = [_counted(line, separator, decimal) for line in lines[:HEADER]]
+            counts = [_count_numbers(line, separator, decimal) for line in lines[:HEADER]]
             first = next((n for n in range(len(counts)) if _begins(counts, n)), None)
             if first is None:
                 continue
@@ -169,7 +169,7 @@ def layout(lines: list[str]) -> Layout | None:
             if best is None or quality > best[0]:
                 best = (
                     quality,
-                    _headed(lines, Layout(separator, decimal, first, (), ()), counts[first]),
+                    _read_header(lines, Layout(separator, decimal, first, (), ()), counts[first]),
                 )
     return None if best is None else best[1]
 
@@ -183,7 +183,7 @@ def _begins(counts: list[int], at: int) -> bool:
     )
 
 
-def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
+def _read_header(lines: list[str], found: Layout, columns: int) -> Layout:
     """The layout with names and units from the lines above the data."""
     above = []
     for line in reversed(lines[: found.first]):
@@ -202,7 +202,7 @@ def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
             names, units = above[1], nearest
         else:
             names = nearest
-    pairs = [_named(name, unit) for name, unit in zip(names, units, strict=True)]
+    pairs = [_split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
     return Layout(
         found.separator,
         found.decimal,
@@ -212,7 +212,7 @@ def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
     )
 
 
-def _named(name: str, unit: str) -> tuple[str, str]:
+def _split_unit(name: str, unit: str) -> tuple[str, str]:
     """A name and its unit, which may stand in brackets behind it."""
     match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     if match and not unit and match.group(1) and is_unit(match.group(2)):
@@ -221,10 +221,10 @@ def _named(name: str, unit: str) -> tuple[str, str]:
 
 
 def _text(path: Path) -> Columns:
-    lines = [line for line in _decoded(path).splitlines()]
+    lines = [line for line in _decode(path).splitlines()]
     while lines and not lines[-1].strip():
         lines.pop()
-    found = layout(lines)
+    found = find_layout(lines)
     if found is None:
         raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
     names = list(found.names)
@@ -272,7 +272,7 @@ def _matlab(path: Path) -> Columns:
     found: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith(("__", "#")):
-            found.update(_flat(name, value))
+            found.update(_flatten(name, value))
     longest = max((len(each) for each in found.values()), default=0)
     # Scalars are settings, not columns.
     return Columns(
@@ -282,17 +282,17 @@ def _matlab(path: Path) -> Columns:
     )
 
 
-def _flat(name: str, value: Any) -> dict[str, Array]:
+def _flatten(name: str, value: Any) -> dict[str, Array]:
     """Columns of a variable: a vector, a matrix's columns as name:1, name:2, …, a structure's fields as name.field."""
     if hasattr(value, "_fieldnames"):
         found: dict[str, Array] = {}
         for each in value._fieldnames:
-            found.update(_flat(f"{name}.{each}", getattr(value, each)))
+            found.update(_flatten(f"{name}.{each}", getattr(value, each)))
         return found
     if isinstance(value, dict):
         found = {}
         for each, inner in value.items():
-            found.update(_flat(f"{name}.{each}", inner))
+            found.update(_flatten(f"{name}.{each}", inner))
         return found
     array = np.asarray(value)
     if array.dtype.kind not in "fiub":

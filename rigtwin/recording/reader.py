@@ -30,7 +30,7 @@ from rigtwin.recording.schema import (
     TRANSITION_RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
-    known_topics,
+    list_topics,
     tags,
 )
 
@@ -162,7 +162,7 @@ def load(path: Path) -> Recording:
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
         channel = channels.get(number)
-        if channel is None or channel.topic not in known_topics():
+        if channel is None or channel.topic not in list_topics():
             continue
         if channel.topic in tables:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
@@ -170,7 +170,7 @@ def load(path: Path) -> Recording:
             raise RigtwinError(
                 f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start"
             )
-        values = _decoded(path, channel, schemas.get(channel.schema_id), data)
+        values = _decode(path, channel, schemas.get(channel.schema_id), data)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
         said = (
@@ -178,8 +178,8 @@ def load(path: Path) -> Recording:
             if END_RECORD in metadata
             else ""
         )
-        raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}{said}")
-    time, columns = _aligned(tables, notes)
+        raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
+    time, columns = _align(tables, notes)
     if not len(time):
         raise RigtwinError(
             f"{path}: {' and '.join(tables)} have no tick in common; expected the same times on each"
@@ -198,7 +198,7 @@ def load(path: Path) -> Recording:
         twin=metadata.get(TWIN_RECORD, {}),
         end=metadata.get(END_RECORD, {}).get("reason", ""),
         notes=tuple(notes),
-        transitions=_in_order(states),
+        transitions=_sort(states),
         lateness=metadata.get(LATENESS_RECORD, {}),
     )
 
@@ -215,10 +215,10 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except _DAMAGE:
         pass
-    return _in_order(found)
+    return _sort(found)
 
 
-def _in_order(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
+def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """On a full disk the last ones stand where room had been kept for them, near the beginning of the file."""
     return tuple(sorted(transitions, key=_moment))
 
@@ -259,7 +259,7 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
     return controller
 
 
-def _decoded(
+def _decode(
     path: Path, channel: Channel, schema: Schema | None, data: list[bytes]
 ) -> dict[str, Array]:
     """The columns of a topic: every number in it, those that the channel table names first."""
@@ -353,7 +353,7 @@ def _protobuf(
     return names, [item.number for item in found.fields] if doubles else [], decode
 
 
-def _aligned(
+def _align(
     tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
 ) -> tuple[Array, dict[str, dict[str, Array]]]:
     """The ticks that every topic has, in order."""

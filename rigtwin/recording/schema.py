@@ -59,12 +59,12 @@ def tags(count: int) -> NDArray[np.uint8]:
     return ((np.arange(1, count + 1) << 3) | _DOUBLE_WIRE_TYPE).astype(np.uint8)
 
 
-def known_topics() -> tuple[str, ...]:
+def list_topics() -> tuple[str, ...]:
     """Topics of the channel table, in order."""
     return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))
 
 
-def encoded(values: NDArray[np.float64]) -> bytes:
+def encode(values: NDArray[np.float64]) -> bytes:
     """One message of a topic, of its fields' values."""
     message = np.empty(len(values), FIELD)
     message["tag"], message["value"] = tags(len(values)), values

@@ -65,7 +65,7 @@ _PREFIX = 9
 """Bytes of a record's opcode and length."""
 
 
-def _encoded(record: McapRecord) -> bytes:
+def _encode(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
@@ -117,7 +117,7 @@ class Writer:
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
-        self._put(MCAP0_MAGIC + _encoded(Header(profile="", library="rigtwin")))
+        self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
         config = json.dumps({"controller": controller})
         self.add_metadata(
             RECORD,
@@ -144,7 +144,7 @@ class Writer:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record now."""
-        record = _encoded(Metadata(name=name, metadata=dict(values)))
+        record = _encode(Metadata(name=name, metadata=dict(values)))
         if self._full:
             self._put_into_room(record)
             return
@@ -215,7 +215,7 @@ class Writer:
             self._file.close()
             return
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
-        self._put(_encoded(DataEnd(data_section_crc=0)))
+        self._put(_encode(DataEnd(data_section_crc=0)))
         start = self._offset
         summary = bytearray()
         offsets = bytearray()
@@ -227,8 +227,8 @@ class Writer:
             (Opcode.METADATA_INDEX, [*self._metadata]),
         ]
         for opcode, records in groups:
-            encoded = b"".join(_encoded(record) for record in records)
-            offsets += _encoded(
+            encoded = b"".join(_encode(record) for record in records)
+            offsets += _encode(
                 SummaryOffset(
                     group_opcode=opcode, group_start=start + len(summary), group_length=len(encoded)
                 )
@@ -237,7 +237,7 @@ class Writer:
         footer = Footer(
             summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
         )
-        self._put(bytes(summary + offsets) + _encoded(footer) + MCAP0_MAGIC)
+        self._put(bytes(summary + offsets) + _encode(footer) + MCAP0_MAGIC)
         self._file.close()
 
     def _register(self, topic: str) -> None:
@@ -253,13 +253,13 @@ class Writer:
         )
         self._schemas.append(schema)
         self._channels.append(channel)
-        self._put(_encoded(schema) + _encoded(channel))
+        self._put(_encode(schema) + _encode(channel))
 
     def _put_chunk(self, messages: NDArray[np.void], times: NDArray[np.uint64]) -> None:
         content = messages.tobytes()
         packed = zstandard.ZstdCompressor(level=1).compress(content)
         start = self._offset
-        chunk = _encoded(
+        chunk = _encode(
             Chunk(
                 compression="zstd",
                 data=packed,
@@ -334,10 +334,10 @@ class Writer:
         """Writes over the room kept, which needs no space, and over the rest of it a smaller one."""
         assert self._room is not None
         place, end = self._room
-        rest = end - place - len(record) - len(_encoded(Metadata(name=_RESERVE, metadata={"": ""})))
+        rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))
         if rest < 0:
             return
-        filling = _encoded(Metadata(name=_RESERVE, metadata={"": " " * rest}))
+        filling = _encode(Metadata(name=_RESERVE, metadata={"": " " * rest}))
         with suppress(OSError):
             self._file.seek(place)
             self._file.write(record + filling)

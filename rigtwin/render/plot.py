@@ -94,7 +94,7 @@ PANELS = (
 """What is drawn, from top to bottom; a panel without data is left out."""
 
 
-def _plainly(recording: Recording) -> tuple[Panel, ...]:
+def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
     """A panel for every channel name of another machine: what was commanded and what was sensed under one name together."""
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
@@ -110,7 +110,7 @@ def _plainly(recording: Recording) -> tuple[Panel, ...]:
     )
 
 
-def stretch(recording: Recording, start: float, until: float | None) -> slice:
+def find_stretch(recording: Recording, start: float, until: float | None) -> slice:
     """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
@@ -126,13 +126,13 @@ def stretch(recording: Recording, start: float, until: float | None) -> slice:
 
 def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
     """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
-    checked_ending(out)
-    ticks = stretch(recording, start, until)
+    check_ending(out)
+    ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]
     panels = (
         PANELS
         if all(recording.has("/sensor", name) for name in RIG_SENSORS)
-        else _plainly(recording)
+        else _plain_panels(recording)
     )
     there = [
         (
@@ -170,7 +170,7 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     save(figure, out)
 
 
-def checked_ending(out: Path) -> None:
+def check_ending(out: Path) -> None:
     """Raises RigtwinError unless a figure can be written to that name."""
     if out.suffix.lower() not in KINDS:
         raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")

@@ -25,7 +25,7 @@ from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.render.plot import ASKED, SENSED, stretch
+from rigtwin.render.plot import ASKED, SENSED, find_stretch
 from rigtwin.simulation.mechanics import SCENE
 from rigtwin.simulation.structure_motion import recorded_wing
 
@@ -70,7 +70,7 @@ def film(
                 f"{recording.path}: the position of {joint} has values that are no numbers; "
                 "nothing can be drawn of it"
             )
-    ticks = stretch(recording, start, until)
+    ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in motions.items()}
     traces = _Traces(_curves(recording, machine), recording.time, ticks)

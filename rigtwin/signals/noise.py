@@ -55,7 +55,7 @@ def rms(signal: Array) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
-def without_mains(signal: Array, period: float, frequency: float) -> Array:
+def remove_mains(signal: Array, period: float, frequency: float) -> Array:
     """The signal less its mains line; its mean stays. The line is looked for within ±0.5 Hz of `frequency` (Hz)."""
     count = len(signal)
     time = np.arange(count) * period
@@ -64,7 +64,7 @@ def without_mains(signal: Array, period: float, frequency: float) -> Array:
     grid = np.fft.rfftfreq(count, period)
     near = np.abs(grid - frequency) <= MAINS_SEARCH
     if near.sum() < 3:
-        return _less_line(signal, centred, window, time, frequency)
+        return _remove_line(signal, centred, window, time, frequency)
     peak = grid[near][np.argmax(np.abs(np.fft.rfft(window * centred))[near])]
     width = grid[1]
 
@@ -77,10 +77,10 @@ def without_mains(signal: Array, period: float, frequency: float) -> Array:
         method="bounded",
         options={"xatol": width * 1e-3},
     )
-    return _less_line(signal, centred, window, time, float(found.x))
+    return _remove_line(signal, centred, window, time, float(found.x))
 
 
-def _less_line(
+def _remove_line(
     signal: Array, centred: Array, window: Array, time: Array, frequency: float
 ) -> Array:
     basis = np.column_stack(
@@ -106,7 +106,7 @@ def band(signal: Array, period: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Motion:
+class EstimatedMotion:
     """An estimated motion. position: shape (ticks,); correction: what of it is not as expected; velocity_error: standard
     deviation of its rate of change, unit/s."""
 
@@ -115,14 +115,14 @@ class Motion:
     velocity_error: float
 
 
-def motion(measured: Array, expected: Array, period: float, mains: float) -> Motion:
+def estimate_motion(measured: Array, expected: Array, period: float, mains: float) -> EstimatedMotion:
     """The motion beneath a noisy measurement, given what a model expects of it.
 
     Where measured − expected is noise, the expectation is the better estimate of the motion, plus a constant offset. What
     stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum at every frequency: of all linear estimates the
     one with the least error, in position and in velocity.
     """
-    difference = without_mains(measured - expected, period, mains)
+    difference = remove_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
     padding = min(PADDING, len(difference) - 1)
     start, end = (
@@ -140,10 +140,10 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
     grid = np.fft.rfftfreq(len(extended), period)
     kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))
     correction = offset + kept[padding : padding + len(difference)]
-    return Motion(expected + correction, correction, error)
+    return EstimatedMotion(expected + correction, correction, error)
 
 
-def smoothed(signal: Array, period: float) -> tuple[Array, float]:
+def smooth(signal: Array, period: float) -> tuple[Array, float]:
     """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left.
     Where it stays within that error it is taken to rest."""
     noise = white_noise(signal)
@@ -162,10 +162,10 @@ def smoothed(signal: Array, period: float) -> tuple[Array, float]:
         ]
     )
     error = noise * math.sqrt(float(np.mean(gain)))
-    return _rested(kept, error, max(3, round(REST / period))), error
+    return _straighten_rests(kept, error, max(3, round(REST / period))), error
 
 
-def _rested(motion: Array, error: float, window: int) -> Array:
+def _straighten_rests(motion: Array, error: float, window: int) -> Array:
     """The motion with stretches in which it stays within its error straightened."""
     span = maximum_filter1d(motion, window) - minimum_filter1d(motion, window)
     still = np.diff(np.concatenate([[0], (span < STILL * error).astype(np.int8), [0]]))

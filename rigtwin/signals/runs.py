@@ -22,7 +22,7 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
     return int(starts[longest]), int(ends[longest] - starts[longest]) + 1
 
 
-def cut_off(signal: Array) -> np.ndarray:
+def find_cut_off(signal: Array) -> np.ndarray:
     """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
     found = np.zeros(len(signal), bool)
     if white_noise(signal) >= smallest_step(signal):

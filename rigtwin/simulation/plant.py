@@ -53,7 +53,7 @@ class Contacts(NamedTuple):
     yielded: Array
 
 
-class Machine(NamedTuple):
+class PlantState(NamedTuple):
     """All that compiled code needs to run one plant. plain: whether its commands act as they are and its contacts do not
     change with the motion, as in the nominal rig."""
 
@@ -97,14 +97,14 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
     )
 
 
-def deflected(plant: RigPlant, preload: float) -> float:
+def start_deflection(plant: RigPlant, preload: float) -> float:
     """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 class Simulation:
     """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
-    at rest. Owns the MuJoCo structures that `machine` looks into."""
+    at rest. Owns the MuJoCo structures that `state` looks into."""
 
     def __init__(
         self,
@@ -130,12 +130,12 @@ class Simulation:
         ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - start_deflection(
             plant, preload
         )
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
-        self.machine = Machine(
+        self.state = PlantState(
             view,
             substeps,
             not touching.changing and all(each.neutral for each in drives),
@@ -228,24 +228,24 @@ def true_measurements(mechanics: Handles) -> Measurements:
 
 
 @compilable
-def sense(machine: Machine) -> Measurements:
+def sense(state: PlantState) -> Measurements:
     """Ideal measurements now, under the commands held until now.
 
     The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
     that accelerates the carriage with the plate, which a velocity one timestep old would not show.
     """
-    mechanics, yielded = machine.mechanics, machine.contacts.yielded
+    mechanics, yielded = state.mechanics, state.contacts.yielded
     ground, structure = (
-        machine.ground_state.position[0] + yielded[0],
-        machine.structure_state.position[0] + yielded[1],
+        state.ground_state.position[0] + yielded[0],
+        state.structure_state.position[0] + yielded[1],
     )
-    onward = next_position(machine.ground, machine.ground_state, machine.ground_command.memory[3])
+    onward = next_position(state.ground, state.ground_state, state.ground_command.memory[3])
     drive(mechanics, mechanics.ground, ground, onward + yielded[0])
     onward = next_position(
-        machine.structure, machine.structure_state, machine.structure_command.memory[3]
+        state.structure, state.structure_state, state.structure_command.memory[3]
     )
     drive(mechanics, mechanics.structure, structure, onward + yielded[1])
-    touch(mechanics, machine.contacts)
+    touch(mechanics, state.contacts)
     brace(mechanics)
     forward(mechanics.model, mechanics.data, 0, 0)
     return true_measurements(mechanics)
@@ -253,45 +253,45 @@ def sense(machine: Machine) -> Measurements:
 
 @compilable
 def advance(
-    machine: Machine, ground_command: float, structure_command: float, voltage: float
+    state: PlantState, ground_command: float, structure_command: float, voltage: float
 ) -> None:
     """One control period with the commands held."""
-    if machine.plain:
+    if state.plain:
         advance_plain(
-            machine.mechanics,
-            machine.substeps,
-            machine.ground,
-            machine.ground_state,
-            machine.structure,
-            machine.structure_state,
+            state.mechanics,
+            state.substeps,
+            state.ground,
+            state.ground_state,
+            state.structure,
+            state.structure_state,
             ground_command,
             structure_command,
             voltage,
         )
-        machine.ground_command.memory[3] = ground_command
-        machine.structure_command.memory[3] = structure_command
+        state.ground_command.memory[3] = ground_command
+        state.structure_command.memory[3] = structure_command
         return
-    mechanics, yielded = machine.mechanics, machine.contacts.yielded
-    for _ in range(machine.substeps):
+    mechanics, yielded = state.mechanics, state.contacts.yielded
+    for _ in range(state.substeps):
         ground, structure = (
-            machine.ground_state.position[0] + yielded[0],
-            machine.structure_state.position[0] + yielded[1],
+            state.ground_state.position[0] + yielded[0],
+            state.structure_state.position[0] + yielded[1],
         )
-        asked = conditioned(machine.ground_drive, machine.ground_command, ground_command)
-        advance_cylinder(machine.ground, machine.ground_state, asked)
-        asked = conditioned(machine.structure_drive, machine.structure_command, structure_command)
-        advance_cylinder(machine.structure, machine.structure_state, asked)
-        mechanics.control[0] = conditioned(machine.motor_drive, machine.motor_command, voltage)
-        if machine.contacts.changing:
-            give_way(mechanics, machine.contacts)
-        drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])
+        asked = conditioned(state.ground_drive, state.ground_command, ground_command)
+        advance_cylinder(state.ground, state.ground_state, asked)
+        asked = conditioned(state.structure_drive, state.structure_command, structure_command)
+        advance_cylinder(state.structure, state.structure_state, asked)
+        mechanics.control[0] = conditioned(state.motor_drive, state.motor_command, voltage)
+        if state.contacts.changing:
+            give_way(mechanics, state.contacts)
+        drive(mechanics, mechanics.ground, ground, state.ground_state.position[0] + yielded[0])
         drive(
             mechanics,
             mechanics.structure,
             structure,
-            machine.structure_state.position[0] + yielded[1],
+            state.structure_state.position[0] + yielded[1],
         )
-        touch(mechanics, machine.contacts)
+        touch(mechanics, state.contacts)
         brace(mechanics)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)
@@ -309,7 +309,7 @@ def advance_plain(
     structure_command: float,
     voltage: float,
 ) -> None:
-    """The same for a machine whose commands act as they are and whose contacts do not change: a third faster."""
+    """The same for a plant whose commands act as they are and whose contacts do not change: a third faster."""
     mechanics.control[0] = voltage
     for _ in range(substeps):
         ground_here, structure_here = ground_state.position[0], structure_state.position[0]

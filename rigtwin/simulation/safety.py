@@ -66,7 +66,7 @@ class Trip(IntEnum):
 """Plain numbers: looking up an enumeration's value takes longer than the comparison."""
 
 
-class Watch(NamedTuple):
+class LimitMemory(NamedTuple):
     """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
     were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
     (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place. Arrays for
@@ -79,20 +79,20 @@ class Watch(NamedTuple):
     motor: Array | list[float]
 
 
-def watching() -> Watch:
+def empty_memory() -> LimitMemory:
     """Before the first tick, for a loop in Python."""
     unknown = [math.nan]
-    return Watch(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
+    return LimitMemory(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
 
 
-def watching_compiled() -> Watch:
+def empty_memory_arrays() -> LimitMemory:
     """Before the first tick, for a compiled loop."""
-    return Watch(*(np.array(values) for values in watching()))
+    return LimitMemory(*(np.array(values) for values in empty_memory()))
 
 
 @compilable
-def sensed_wrong(
-    limits: Safety, period: float, watch: Watch, measured: Measurements
+def judge_measurements(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements
 ) -> tuple[int, int]:
     """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
     for column in range(4):
@@ -100,18 +100,18 @@ def sensed_wrong(
             return _NOT_A_NUMBER, column
     trip, at = _NONE, 0
     for column in range(4):
-        change = abs(measured[column] - watch.measured[column])
+        change = abs(measured[column] - memory.measured[column])
         rate = limits.force_rate if column == 3 else limits.lvdt_rate
         if change > rate * period and trip == _NONE:
             trip, at = _JUMP, column
-        watch.repeats[column] = watch.repeats[column] + 1.0 if change == 0.0 else 1.0
-        if watch.repeats[column] >= limits.stuck and trip == _NONE:
+        memory.repeats[column] = memory.repeats[column] + 1.0 if change == 0.0 else 1.0
+        if memory.repeats[column] >= limits.stuck and trip == _NONE:
             trip, at = _STUCK, column
-        watch.measured[column] = measured[column]
-    place = int(watch.travel[VELOCITY_SPAN]) if watch.travel[VELOCITY_SPAN] >= 0.0 else 0
-    moved = abs(measured.suspension_lvdt - watch.travel[place])
-    watch.travel[place] = measured.suspension_lvdt
-    watch.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
+        memory.measured[column] = measured[column]
+    place = int(memory.travel[VELOCITY_SPAN]) if memory.travel[VELOCITY_SPAN] >= 0.0 else 0
+    moved = abs(measured.suspension_lvdt - memory.travel[place])
+    memory.travel[place] = measured.suspension_lvdt
+    memory.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
     if trip != _NONE:
         return trip, at
     if abs(measured.structure_lvdt) > limits.structure:
@@ -130,14 +130,14 @@ def sensed_wrong(
         > limits.wheel
     ):
         return _WHEEL, 2
-    if abs(measured.load_cell - watch.motor[0]) > limits.motor:
+    if abs(measured.load_cell - memory.motor[0]) > limits.motor:
         return _MOTOR, 3
     return _NONE, 0
 
 
 @compilable
-def commanded_wrong(
-    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+def judge_commands(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
     """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
     are remembered as written."""
@@ -151,7 +151,7 @@ def commanded_wrong(
         return _COMMAND, 5
     for column in (0, 1, 3):
         rate = limits.voltage_rate if column == 3 else limits.command_rate
-        if abs(commands[column] - watch.commands[column]) > rate * period:
+        if abs(commands[column] - memory.commands[column]) > rate * period:
             return _COMMAND_RATE, 4 + column
     if abs(commands.ground - measured.ground_lvdt) > limits.following:
         return _FOLLOWING, 0
@@ -160,32 +160,32 @@ def commanded_wrong(
     if abs(commands.force - measured.load_cell) > limits.following_force:
         return _FOLLOWING, 3
     for column in range(4):
-        watch.commands[column] = commands[column]
+        memory.commands[column] = commands[column]
     share = 1.0 - math.exp(-period / MOTOR_LAG)
-    force = watch.motor[0] if math.isfinite(watch.motor[0]) else measured.load_cell
-    watch.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
+    force = memory.motor[0] if math.isfinite(memory.motor[0]) else measured.load_cell
+    memory.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
     return _NONE, 0
 
 
 @compilable
-def judged(
-    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+def judge_limits(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
     """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
-    trip, column = sensed_wrong(limits, period, watch, measured)
+    trip, column = judge_measurements(limits, period, memory, measured)
     if trip == _NONE:
-        trip, column = commanded_wrong(limits, period, watch, measured, commands)
+        trip, column = judge_commands(limits, period, memory, measured, commands)
     return trip, column
 
 
-def held(limits: Safety, commands: Commands) -> Commands:
+def stop_state(limits: Safety, commands: Commands) -> Commands:
     """The stop state after commands: no force, cylinders where they were told to be, but not beyond their limits."""
     ground = min(max(commands.ground, -limits.ground), limits.ground)
     structure = min(max(commands.structure, -limits.structure), limits.structure)
     return Commands(ground, structure, 0.0, 0.0)
 
 
-def beyond(limits: Safety, measured: Measurements) -> bool:
+def is_beyond(limits: Safety, measured: Measurements) -> bool:
     """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
     ground, structure = (
         abs(measured.ground_lvdt) <= limits.ground,
@@ -194,7 +194,7 @@ def beyond(limits: Safety, measured: Measurements) -> bool:
     return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
-def within(limits: Safety, measured: Measurements) -> str | None:
+def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
     """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
     hysteresis."""
     share = 1.0 - limits.hysteresis
@@ -209,7 +209,7 @@ def within(limits: Safety, measured: Measurements) -> str | None:
     return None
 
 
-def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
+def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
     """One line for the operator. column: of Measurements, from 4 on of Commands."""
     name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
     lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)

@@ -11,14 +11,14 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Disturbance, sampled, sensing
-from rigtwin.simulation.plant import Machine, Simulation, advance, sense
+from rigtwin.simulation.plant import PlantState, Simulation, advance, sense
 
 _advance = kernel(advance)
 
 
 @kernel
-def _sense(machine: Machine, out: Array) -> None:
-    true = sense(machine)
+def _sense(plant: PlantState, out: Array) -> None:
+    true = sense(plant)
     for number in range(4):
         out[number] = true[number]
 
@@ -54,7 +54,7 @@ class Twin:
 
     def read(self) -> Measurements:
         true = np.empty(4)
-        _sense(self.simulation.machine, true)
+        _sense(self.simulation.state, true)
         self.truth = Measurements(*true.tolist())
         return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
 
@@ -63,7 +63,7 @@ class Twin:
         return self._missed.random(ticks) < self._share_missed
 
     def write(self, commands: Commands) -> None:
-        _advance(self.simulation.machine, commands.ground, commands.structure, commands.voltage)
+        _advance(self.simulation.state, commands.ground, commands.structure, commands.voltage)
         self.held = commands
 
     def stop(self) -> None:

@@ -34,32 +34,32 @@ class Still:
     repeats: int
 
 
-def at_rest(rig: DrivenRig, ticks: int = LOOKED) -> tuple[Still, ...]:
+def measure_rest(rig: DrivenRig, ticks: int = LOOKED) -> tuple[Still, ...]:
     """Every input while nothing moves. The rig must have been started; no output is written. Raises RigtwinError."""
     values = np.array([rig.read() for _ in range(ticks)])
     return tuple(
-        Still(name, float(np.mean(column)), float(np.std(column)), _repeats(column))
+        Still(name, float(np.mean(column)), float(np.std(column)), _count_repeats(column))
         for name, column in zip(Measurements._fields, values.T, strict=True)
     )
 
 
-def _repeats(column: Array) -> int:
+def _count_repeats(column: Array) -> int:
     changes = np.flatnonzero(np.diff(column) != 0.0)
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(column) - 1])))))
 
 
-def zeroed(
+def set_zeros(
     table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
 ) -> ChannelTable:
     """The table whose inputs read their references (zero where none is given) as the rig now stands."""
     lines = [
-        _scaled(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
+        _rescale(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
         for line, signal in zip(table.inputs, still, strict=True)
     ]
     return replace(table, inputs=tuple(lines))
 
 
-def spanned(
+def set_spans(
     table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
 ) -> ChannelTable:
     """The table whose named inputs, which read true at zero, read their references as the rig now stands. Raises RigtwinError
@@ -81,16 +81,16 @@ def spanned(
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, the wrong way; check signs first"
                 )
-            line = _scaled(line, scale=line.scaling.scale * factor)
+            line = _rescale(line, scale=line.scaling.scale * factor)
         lines.append(line)
     return replace(table, inputs=tuple(lines))
 
 
-def _scaled(line: Line, **changes: float) -> Line:
+def _rescale(line: Line, **changes: float) -> Line:
     return line._replace(scaling=line.scaling._replace(**changes))
 
 
-def bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Array]:
+def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Array]:
     """A session that moves one output after the other a little and back: the ground and the structure by `stroke`, m, then the
     motor by `force`, N, without feedback. Returns configuration and demands, shape (ticks, 3)."""
     ticks = round(BUMP / period)
@@ -104,18 +104,18 @@ def bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Ar
     ), demands
 
 
-def responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, float]]:
+def fit_responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, float]]:
     """Output → (input that must follow it, its gain on the demand, standard error of that), from a session of `bumps`."""
     ticks = len(demands) // 3
     found: dict[str, tuple[str, float, float]] = {}
     for column, (output, sensor) in enumerate(FOLLOWS.items()):
         stretch = slice(column * ticks, (column + 1) * ticks)
-        gain, error = _gain(
+        gain, error = _fit_gain(
             demands[stretch, column], measured[stretch, Measurements._fields.index(sensor)]
         )
         found[output] = (sensor, gain, error)
     stretch = slice(ticks, 2 * ticks)
-    gain, error = _gain(
+    gain, error = _fit_gain(
         demands[stretch, 1], measured[stretch, Measurements._fields.index("suspension_lvdt")]
     )
     found["travel"] = ("suspension_lvdt", gain, error)
@@ -126,7 +126,7 @@ FOLLOWS = {"ground": "ground_lvdt", "structure": "structure_lvdt", "voltage": "l
 """Which input each output moves; the suspension's travel follows the structure while the rail holds the carriage."""
 
 
-def _gain(asked: Array, read: Array) -> tuple[float, float]:
+def _fit_gain(asked: Array, read: Array) -> tuple[float, float]:
     """Least squares of `read` on `asked` and a constant."""
     design = np.column_stack([asked, np.ones(len(asked))])
     solution, residual, *_ = np.linalg.lstsq(design, read, rcond=None)
@@ -134,7 +134,7 @@ def _gain(asked: Array, read: Array) -> tuple[float, float]:
     return float(solution[0]), spread / float(np.linalg.norm(asked - asked.mean()))
 
 
-def signed(
+def correct_signs(
     table: ChannelTable, found: Mapping[str, tuple[str, float, float]], moved: Mapping[str, int]
 ) -> tuple[ChannelTable, tuple[str, ...]]:
     """The table with every sign as it must be, all of them checked, and what was changed. moved: output → 1 if the operator saw
@@ -152,23 +152,23 @@ def signed(
         went = moved[driven]
         if output in outputs:
             if went < 0:
-                outputs[output] = _turned(outputs[output])
+                outputs[output] = _turn_sign(outputs[output])
                 said.append(f"{output}: output went the wrong way; its sign is turned")
             outputs[output] = outputs[output]._replace(sign_checked=True)
         if np.sign(gain) != went:
-            inputs[sensor] = _turned(inputs[sensor])
+            inputs[sensor] = _turn_sign(inputs[sensor])
             said.append(f"{sensor}: reads the wrong way; its sign is turned")
         inputs[sensor] = inputs[sensor]._replace(sign_checked=True)
     turned = replace(table, inputs=tuple(inputs.values()), outputs=tuple(outputs.values()))
     return turned, tuple(said)
 
 
-def _turned(line: Line) -> Line:
+def _turn_sign(line: Line) -> Line:
     """The other sign; what the offset makes of a reading turns with it."""
-    return _scaled(line, sign=-line.scaling.sign, offset=-line.scaling.offset)
+    return _rescale(line, sign=-line.scaling.sign, offset=-line.scaling.offset)
 
 
-def dated(table: ChannelTable, operator: str, note: str, today: date) -> ChannelTable:
+def sign_off(table: ChannelTable, operator: str, note: str, today: date) -> ChannelTable:
     return replace(table, calibrated=today.isoformat(), operator=operator, note=note)
 
 

@@ -32,7 +32,7 @@ class CardFault(RigtwinError):
 
 
 @contextmanager
-def translated(doing: str) -> Iterator[None]:
+def translate_errors(doing: str) -> Iterator[None]:
     """Gives what nidaqmx raises as a CardFault of one line."""
     from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
 
@@ -61,7 +61,7 @@ def require_client() -> None:
         raise CardFault(PACKAGE) from None
 
 
-def connected(address: str) -> grpc.Channel | None:
+def connect(address: str) -> grpc.Channel | None:
     """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
     require_client()
     if not address:
@@ -110,7 +110,7 @@ class Card:
         from nidaqmx.system import System
 
         table = self._table
-        with translated(f"card {table.device}"):
+        with translate_errors(f"card {table.device}"):
             options = self._options("")
             system = System.local() if options is None else System.remote(options)
             names = [device.name for device in system.devices]
@@ -149,7 +149,7 @@ class Card:
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         table = self._table
-        with translated(f"card {table.device}"):
+        with translate_errors(f"card {table.device}"):
             inputs, outputs, pressure = (
                 self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE)
             )
@@ -191,7 +191,7 @@ class Card:
             if self._pacer is None:
                 self._drop_what_is_old()
         except Exception as error:
-            with translated(f"card {self._table.device} gives no sample"):
+            with translate_errors(f"card {self._table.device} gives no sample"):
                 raise error
         samples = zip(self._inputs, self._volts.tolist(), strict=True)
         return Measurements(*[factor * volts + offset for (factor, offset, _), volts in samples])
@@ -215,14 +215,14 @@ class Card:
         self._count += 1
 
     def write(self, commands: Commands) -> None:
-        self._asked[:] = self._in_volts(commands)
+        self._asked[:] = self._to_volts(commands)
         try:
             self._writer.write_one_sample(self._asked)
         except Exception as error:
-            with translated(f"card {self._table.device} takes no output"):
+            with translate_errors(f"card {self._table.device} takes no output"):
                 raise error
 
-    def _in_volts(self, commands: Commands) -> list[float]:
+    def _to_volts(self, commands: Commands) -> list[float]:
         asked = zip(
             self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True
         )
@@ -232,14 +232,14 @@ class Card:
         ]
 
     def pressure(self, on: bool) -> None:
-        with translated(f"card {self._table.device}: pressure line {self._table.pressure}"):
+        with translate_errors(f"card {self._table.device}: pressure line {self._table.pressure}"):
             self._pressure.write_one_sample_one_line(on)
 
     def stop(self) -> None:
         """Motor to zero, pressure off, the card's lines given back; a card that takes no output any more is reset, which sets
         them to zero. Never raises: there is nobody left to hear it."""
         if len(self._tasks) == 3:
-            self._asked[2] = self._in_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
+            self._asked[2] = self._to_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
             refused = False
             try:
                 self._writer.write_one_sample(self._asked)
@@ -281,7 +281,7 @@ class Card:
                 else kind(name)
             )
         except Exception as error:
-            with translated(
+            with translate_errors(
                 f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"
             ):
                 raise error

@@ -56,7 +56,7 @@ def values_of(lines: Conversion, volts: Array, out: Array) -> None:
 
 
 @compilable
-def digitised(lines: Conversion, volts: Array, out: Array) -> None:
+def digitise(lines: Conversion, volts: Array, out: Array) -> None:
     """Voltages as 16 bits hold them, both of shape (lines,)."""
     for line in range(len(out)):
         bit = 2.0 * lines.range[line] / CODES
@@ -66,4 +66,4 @@ def digitised(lines: Conversion, volts: Array, out: Array) -> None:
 
 to_volts = kernel(volts_of)
 to_values = kernel(values_of)
-to_bits = kernel(digitised)
+to_bits = kernel(digitise)

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.hardware.daq.card import INPUTS, OUTPUTS, PRESSURE, CardFault, connected, translated
+from rigtwin.hardware.daq.card import (
+    INPUTS,
+    OUTPUTS,
+    PRESSURE,
+    CardFault,
+    connect,
+    translate_errors,
+)
 from rigtwin.hardware.daq.conversion import conversion, to_volts
 from rigtwin.hardware.daq.table import ChannelTable
 
@@ -25,19 +32,19 @@ class LastResort:
         self._values, self._volts = np.zeros(3), np.empty(3)
         to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
 
-        connected(table.address)  # loads the driver's client, which takes a while
+        connect(table.address)  # loads the driver's client, which takes a while
 
     def prepare(self) -> None:
         """Called once the owner has its outputs. Raises CardFault."""
         if self._table.address:
-            with translated(f"card {self._table.device}: watching it"):
+            with translate_errors(f"card {self._table.device}: watching it"):
                 self._attach()
 
     def force_off(self, positions: Sequence[float]) -> None:
         """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
         self._values[:2] = positions
         to_volts(self._conversion, self._values, self._volts)
-        with translated(f"card {self._table.device}: stopping it"):
+        with translate_errors(f"card {self._table.device}: stopping it"):
             if self._outputs is None:
                 self._take()
             assert self._outputs is not None
@@ -45,7 +52,7 @@ class LastResort:
 
     def pressure_off(self) -> None:
         """Raises CardFault."""
-        with translated(f"card {self._table.device}: taking its pressure off"):
+        with translate_errors(f"card {self._table.device}: taking its pressure off"):
             if self._pressure is None:
                 self._take()
             assert self._pressure is not None
@@ -65,20 +72,20 @@ class LastResort:
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
         channel, attach = (
-            connected(self._table.address),
+            connect(self._table.address),
             SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
         )
         assert channel is not None
         for name in (OUTPUTS, PRESSURE, INPUTS):
             options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
             self._tasks.append(Task(name, grpc_options=options))
-        self._writers(started=True)
+        self._open_writers(started=True)
 
     def _take(self) -> None:
         from nidaqmx import Task
 
         self.close()
-        channel = connected(self._table.address)
+        channel = connect(self._table.address)
         names = (f"{OUTPUTS}-again", f"{PRESSURE}-again")
         if channel is None:
             outputs, pressure = (Task(name) for name in names)
@@ -95,9 +102,9 @@ class LastResort:
                 self._table.physical(line.line), min_val=-volts, max_val=volts
             )
         pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
-        self._writers(started=False)
+        self._open_writers(started=False)
 
-    def _writers(self, started: bool) -> None:
+    def _open_writers(self, started: bool) -> None:
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)

@@ -95,7 +95,7 @@ class ChannelTable:
         """The driver's name of a line."""
         return f"{self.device}/{line}"
 
-    def of(self, safety: Safety) -> Safety:
+    def tighten(self, safety: Safety) -> Safety:
         """The limits with what the card knows of its sensors, or those asked for, if they are closer."""
         return safety._replace(
             **{
@@ -107,10 +107,10 @@ class ChannelTable:
 
 def load_table(path: Path) -> ChannelTable:
     """Reads a channel table. Raises RigtwinError naming file and fault."""
-    return read_toml(path, parsed)
+    return read_toml(path, parse_table)
 
 
-def parsed(tables: Mapping[str, Any]) -> ChannelTable:
+def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
     """The channel table of TOML's tables. Raises RigtwinError for anything missing, unknown or twice."""
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:
@@ -212,7 +212,7 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
     return Line(name, line, unit, scaling, sign_checked)
 
 
-def fit(table: ChannelTable, safety: Safety) -> None:
+def require_ranges(table: ChannelTable, safety: Safety) -> None:
     """Raises RigtwinError unless every limit lies within what its line can carry."""
     limits = {
         "ground_lvdt": ("safety.ground", safety.ground),
@@ -236,7 +236,7 @@ def fit(table: ChannelTable, safety: Safety) -> None:
             )
 
 
-def trusted(table: ChannelTable, today: date) -> None:
+def require_trust(table: ChannelTable, today: date) -> None:
     """Raises RigtwinError unless somebody has calibrated this table and checked every sign: needed to move a real rig."""
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
@@ -255,10 +255,10 @@ def trusted(table: ChannelTable, today: date) -> None:
         raise RigtwinError("card.operator is missing: expected who calibrated it")
 
 
-def written(table: ChannelTable) -> str:
+def to_toml(table: ChannelTable) -> str:
     """The table as TOML."""
-    lines = ["[card]", f"pressure = {_quoted(table.pressure)}"]
-    lines += [f"{key} = {_quoted(getattr(table, key))}" for key in _FREE_TEXT]
+    lines = ["[card]", f"pressure = {_quote(table.pressure)}"]
+    lines += [f"{key} = {_quote(getattr(table, key))}" for key in _FREE_TEXT]
     lines += [
         "",
         "[plausible]",
@@ -270,8 +270,8 @@ def written(table: ChannelTable) -> str:
             lines += [
                 "",
                 f"[{group}.{signal.name}]",
-                f"line = {_quoted(signal.line)}",
-                f"unit = {_quoted(signal.unit)}",
+                f"line = {_quote(signal.line)}",
+                f"unit = {_quote(signal.unit)}",
             ]
             lines += [
                 f"scale = {scaling.scale!r}",
@@ -283,6 +283,6 @@ def written(table: ChannelTable) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -87,7 +87,7 @@ class InProcess(grpc.Channel):
     def __exit__(self, *_: object) -> None: ...
 
 
-class _Calls(grpc.GenericRpcHandler):
+class _CallHandler(grpc.GenericRpcHandler):
     """Every call of the service, found when it is made."""
 
     def __init__(self, card: VirtualCard) -> None:
@@ -126,7 +126,7 @@ def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
     server = grpc.server(
         ThreadPoolExecutor(max_workers=8),
-        handlers=[_Calls(card)],
+        handlers=[_CallHandler(card)],
         options=(("grpc.so_reuseport", 0),),
     )
     try:

@@ -54,8 +54,8 @@ class OnDemand:
 
     def begin(self) -> None: ...
 
-    def passed(self, done: int) -> int:
-        """Ticks that have passed when the next sample is asked for."""
+    def next_tick(self, done: int) -> int:
+        """The tick of the sample that is asked for next."""
         return done + 1
 
     def now(self, done: int) -> int:
@@ -74,7 +74,7 @@ class RealTime:
     def begin(self) -> None:
         self._start = monotonic()
 
-    def passed(self, done: int) -> int:
+    def next_tick(self, done: int) -> int:
         return max(self.now(done), done)
 
     def now(self, _: int) -> int:
@@ -187,7 +187,7 @@ class VirtualCard:
         return response(value=self._device)
 
     def _GetDeviceAttributeString(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+        self._require_device(request.device_name)
         lists = {
             0x231E: [f"ai{n}" for n in range(32)],
             0x231F: [f"ao{n}" for n in range(4)],
@@ -202,24 +202,24 @@ class VirtualCard:
         )
 
     def _GetDeviceAttributeBool(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+        self._require_device(request.device_name)
         return response(value=True)
 
     def _GetDeviceAttributeDouble(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+        self._require_device(request.device_name)
         return response(value=_SUPPORTED)
 
     def _GetDeviceAttributeDoubleArray(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+        self._require_device(request.device_name)
         ranges = INPUT_RANGES if request.attribute_raw == 0x2990 else (10.0,)
         return response(value=[edge for volts in ranges for edge in (-volts, volts)])
 
-    def _known_device(self, name: str) -> None:
+    def _require_device(self, name: str) -> None:
         if name != self._device:
             raise DriverError(NO_DEVICE, f"Device identifier is invalid. Device specified: {name}")
 
     def _ResetDevice(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+        self._require_device(request.device_name)
         self._tasks.clear()
         self.outputs[:] = 0.0
         self.pressure = False
@@ -245,7 +245,7 @@ class VirtualCard:
         task = self._task(request)
         for line in text.split(","):
             device, _, name = line.strip().partition("/")
-            self._known_device(device)
+            self._require_device(device)
             number = re.fullmatch(rf"{kind}(\d+)", name)
             if number is None or int(number[1]) >= count:
                 raise DriverError(
@@ -324,7 +324,7 @@ class VirtualCard:
             task.next += count
         else:
             if task.next > 0:
-                self.run_until(self._time.passed(self.tick))
+                self.run_until(self._time.next_tick(self.tick))
             task.next, behind, count = 1, 0, 1
         samples = [self._samples[-1 - behind + number] for number in range(count)]
         places = [self._inputs.index(line) if line in self._inputs else -1 for line in task.lines]

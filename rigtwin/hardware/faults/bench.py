@@ -111,7 +111,7 @@ class FaultyBench:
         if there and self.shown < 0:
             self.shown = self.tick
 
-    def safe_from(self) -> int:
+    def find_safe_tick(self) -> int:
         """First tick from which the motor's output is zero for good and the cylinders' are held or without pressure."""
         last = min(self.tick, len(self.written))
         motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
@@ -121,7 +121,7 @@ class FaultyBench:
         changes = np.flatnonzero(moving) + 1
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 
-    def exceeded(self, limits: Safety, since: int) -> float:
+    def peak_share(self, limits: Safety, since: int) -> float:
         """Greatest true magnitude of position, travel or force from a tick on, in its limit."""
         last = min(self.tick, len(self.truth))
         bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])

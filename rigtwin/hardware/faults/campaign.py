@@ -22,10 +22,10 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import InProcess
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
-from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, Kind
+from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
 from rigtwin.hardware.session.record import Test, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.supervised import ARMED, LOOKING, SETTLING
+from rigtwin.hardware.supervision import ARMED, LOOKING, SETTLING
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 
@@ -46,7 +46,7 @@ SLOW = 5
 class Fault:
     """What is put into one session. at: tick of the card; place: input or output that has it."""
 
-    kind: Kind
+    kind: FaultKind
     experiment: str
     at: int
     place: int
@@ -54,7 +54,7 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class FaultResult:
     """What became of it. late: ticks from when the fault could be seen to safe outputs, None if it never could and the test was
     completed; from_start: ticks from the fault to safe outputs; exceeded: greatest true position, travel or force in its
     limit; cause, reason: as the recording says; right: whether they name the fault; readable: recording to its last tick."""
@@ -69,7 +69,7 @@ class Outcome:
     readable: bool
 
     @property
-    def passed(self) -> bool:
+    def ok(self) -> bool:
         """Whether the session was stopped as it must be."""
         return (
             (self.late is None or self.late <= 5)
@@ -79,7 +79,7 @@ class Outcome:
         )
 
 
-def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
+def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> list[Fault]:
     """So many faults, the kinds in turn, everything else at random."""
     random = np.random.default_rng(seed)
     moving, ending = 1000.0 * (LOOKING + ARMED), BEFORE + 1000.0 * DURATION
@@ -100,7 +100,7 @@ def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
     return faults
 
 
-def test_of(fault: Fault, table: ChannelTable) -> Test:
+def plan_test(fault: Fault, table: ChannelTable) -> Test:
     """The session that is to have a fault."""
     from experiments import find
 
@@ -116,7 +116,7 @@ def test_of(fault: Fault, table: ChannelTable) -> Test:
     )
 
 
-def whole(test: Test) -> int:
+def count_card_ticks(test: Test) -> int:
     """Ticks that a session may take, and some more."""
     return len(test.demands) + 4000
 
@@ -137,19 +137,19 @@ class _GlitchingCard(VirtualCard):
         return super().answer(call, request, response)
 
 
-def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
+def try_fault(fault: Fault, table: ChannelTable, folder: Path) -> FaultResult:
     """One fault in this process. Raises RigtwinError only if the session could not even begin."""
-    test = test_of(fault, table)
+    test = plan_test(fault, table)
     period, name = test.configuration.timing.period, fault.kind.name
     bench = FaultyBench(
-        test.terminals(), table, name, fault.at, fault.place, fault.seed, whole(test)
+        test.terminals(), table, name, fault.at, fault.place, fault.seed, count_card_ticks(test)
     )
     virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
-    with _full_disk(path) as fill, stop_requests(stop_file) as asked:
+    with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
 
         def stop() -> str | None:
             if virtual.tick >= fault.at:
@@ -161,21 +161,21 @@ def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
                     stop_file.touch()
                 elif name == "full disk":
                     fill()
-            return asked()
+            return find_request()
 
-        def flushed(_: int) -> None:
+        def show_full_disk(_: int) -> None:
             if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
                 bench.shown = virtual.tick
 
         updating = (
-            _failing(fault, virtual) if fault.kind.place in ("controller", "loop") else healthy
+            _make_failing_update(fault, virtual) if fault.kind.place in ("controller", "loop") else healthy
         )
-        record_at_leisure(card, test, path, stop, flushed, updating)
+        record_at_leisure(card, test, path, stop, show_full_disk, updating)
     stop_file.unlink(missing_ok=True)
-    return judged(fault, test, bench, path)
+    return judge(fault, test, bench, path)
 
 
-def _failing(fault: Fault, card: VirtualCard) -> Any:
+def _make_failing_update(fault: Fault, card: VirtualCard) -> Any:
     """A controller, or the loop around it, that fails in its time; before the test it is the first tick that fails."""
 
     def update(controlling: Any, state: Any, measured: Any, demand: Any) -> tuple[Any, Commands]:
@@ -213,11 +213,11 @@ def _full_disk(path: Path) -> Iterator[Callable[[], None]]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def judged(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> Outcome:
+def judge(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:
     """What the log of the terminals and the recording say."""
     ended = last_words(path)
     cause, reason = ended
-    safe = bench.safe_from()
+    safe = bench.find_safe_tick()
     harmless = cause == "completed"
     shown = fault.at if fault.kind.everywhere else bench.shown
     late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
@@ -227,8 +227,8 @@ def judged(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> Outcome:
         or SIGNALS[fault.place] in reason
     )
     right = named and (cause in fault.kind.causes or (harmless and shown < 0))
-    exceeded = bench.exceeded(test.limited.safety, fault.at)
-    return Outcome(fault, late, safe - fault.at, exceeded, cause, reason, right, readable(path))
+    exceeded = bench.peak_share(test.card_configuration.safety, fault.at)
+    return FaultResult(fault, late, safe - fault.at, exceeded, cause, reason, right, is_readable(path))
 
 
 def last_words(path: Path) -> tuple[str, str]:
@@ -237,7 +237,7 @@ def last_words(path: Path) -> tuple[str, str]:
     return (found[-1]["cause"], found[-1]["reason"]) if found else ("", "")
 
 
-def readable(path: Path) -> bool:
+def is_readable(path: Path) -> bool:
     """Whether a recording can be read as far as it goes; one that ended before the test began has nothing but its states."""
     try:
         recording = load(path)

@@ -12,13 +12,13 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration, flattened
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, written
+from rigtwin.hardware.daq.table import ChannelTable, to_toml
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.peaks import Peak, peaks
 
 
-def predicted(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
+def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
     """How near to every limit a session came that was recorded on the virtual card."""
     commands = np.column_stack([recording.column("/command", name) for name in Commands._fields])
     measurements = np.column_stack(
@@ -31,7 +31,7 @@ def digest(
     experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
 ) -> str:
     """What makes a session another one: experiment, every setting, what is demanded, and the channel table."""
-    told = json.dumps([experiment, flattened(configuration), written(table)], sort_keys=True)
+    told = json.dumps([experiment, flattened(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
 
 
@@ -40,7 +40,7 @@ def ledger(card: Path) -> Path:
     return card.with_suffix(".dry-runs.json")
 
 
-def passed(card: Path, key: str) -> bool:
+def has_passed(card: Path, key: str) -> bool:
     """Whether that session has had a dry run which completed. Raises RigtwinError for a list that cannot be read."""
     return key in _entries(ledger(card))
 

@@ -12,21 +12,21 @@ from typing import Any
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import monotonic
 from rigtwin.hardware.session.guardian_process import guard
-from rigtwin.hardware.session.recorder import ROW
-from rigtwin.hardware.session.watched import (
+from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
     GROUND,
+    GUARDED,
     NUMBERS,
     PREPARED,
     READ,
     RING,
     STRUCTURE,
-    WATCHED,
     WRITTEN,
-    Watched,
-    parts,
+    GuardianSettings,
+    split_memory,
 )
+from rigtwin.hardware.session.recorder import ROW
 from rigtwin.hardware.supervisor import Transition
 
 STARTED = 30.0
@@ -36,17 +36,17 @@ ABSENT = 1.0
 
 
 class Guardian:
-    """The loop's side: a `rigtwin.hardware.supervised.Recorder` whose work another process does."""
+    """The loop's side: a `rigtwin.hardware.supervision.Recorder` whose work another process does."""
 
-    def __init__(self, watched: Watched) -> None:
+    def __init__(self, settings: GuardianSettings) -> None:
         """Raises RigtwinError if the recording cannot be written or the other process does not come."""
-        self._watched, self._finishing = watched, False
+        self._settings, self._finishing = settings, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
         memory = context.RawArray("d", NUMBERS + RING * ROW)
-        self._shared, self._ring = parts(memory)
+        self._shared, self._ring = split_memory(memory)
         self._pipe, theirs = context.Pipe()
-        arguments = (watched, theirs, memory, os.getpid())
+        arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
             self._process.start()
@@ -87,19 +87,19 @@ class Guardian:
             raise RigtwinError(self.fault or "the guardian process does not answer")
 
     def transition(self, transition: Transition) -> None:
-        if transition.after in self._watched.phases and self._shared[WATCHED] == 0.0:
+        if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
             self._shared[BEAT] = time.monotonic()
-            self._shared[WATCHED] = 1.0
+            self._shared[GUARDED] = 1.0
         self._send("transition", transition)
-        if transition.after not in self._watched.phases:
-            self._shared[WATCHED] = 0.0
+        if transition.after not in self._settings.phases:
+            self._shared[GUARDED] = 0.0
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
         self._send("metadata", name, values)
 
     def finish(self, reason: str) -> None:
         """Ends the recording and the other process."""
-        self._shared[WATCHED], self._finishing = 0.0, True
+        self._shared[GUARDED], self._finishing = 0.0, True
         self._send("finish", reason)
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()

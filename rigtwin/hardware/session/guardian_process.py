@@ -15,20 +15,20 @@ from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import PRIORITY, monotonic
-from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
-from rigtwin.hardware.session.watched import (
+from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
     GROUND,
+    GUARDED,
     PREPARED,
     READ,
     RING,
     STRUCTURE,
-    WATCHED,
     WRITTEN,
-    Watched,
-    parts,
+    GuardianSettings,
+    split_memory,
 )
+from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
 from rigtwin.hardware.supervisor import Cause, Phase, Transition
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.loop import BLOCK
@@ -41,7 +41,7 @@ GONE = 1.0
 """s within which a killed process must be gone."""
 
 
-def guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
+def guard(settings: GuardianSettings, pipe: Connection, memory: Any, owner: int) -> None:
     """The other process."""
     # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
     with suppress(OSError, AttributeError):
@@ -49,16 +49,16 @@ def guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    shared, ring = parts(memory)
+    shared, ring = split_memory(memory)
     from rigtwin.recording import Writer
 
     try:
-        writer = Writer(**watched.recording)
+        writer = Writer(**settings.recording)
         writer.reserve()
-        for name, values in watched.metadata.items():
+        for name, values in settings.metadata.items():
             writer.add_metadata(name, values)
-        view = _live(watched)
-        keeping = _Keeping(writer, pipe, watched, view, shared, ring)
+        view = _open_live_view(settings)
+        keeping = _GuardianKeeper(writer, pipe, settings, view, shared, ring)
         keeping.make_ready()
     except RigtwinError as error:
         pipe.send(str(error))
@@ -70,22 +70,22 @@ def guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
         # Of this thread alone: writing the recording must never be in the loop's way.
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
     pipe.send("ready")
-    died = _died_or_hung(owner, shared, watched, keeping)
+    died = _guard_loop(owner, shared, settings, keeping)
     if died is not None:
         keeping.stop_rig(died, shared)
     thread.join(1.0)
     keeping.finish(died)
 
 
-def _live(watched: Watched) -> Callable[[str, Array], None] | None:
-    if watched.live == 0:
+def _open_live_view(settings: GuardianSettings) -> Callable[[str, Array], None] | None:
+    if settings.live == 0:
         return None
-    from rigtwin.hardware.session.live import live_view
+    from rigtwin.hardware.session.live import open_live_view
 
-    return live_view(watched.live)
+    return open_live_view(settings.live)
 
 
-def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping) -> Cause | None:
+def _guard_loop(owner: int, shared: Array, settings: GuardianSettings, keeping: _GuardianKeeper) -> Cause | None:
     """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
     handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
     try:
@@ -97,18 +97,18 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
                 time.sleep(LOOK)
                 dead = os.getppid() != owner
             if dead:
-                return Cause("process", "the controller process died") if shared[WATCHED] else None
+                return Cause("process", "the controller process died") if shared[GUARDED] else None
             if (
-                watched.table is not None
-                and shared[WATCHED]
-                and monotonic() - shared[BEAT] > watched.patience
+                settings.table is not None
+                and shared[GUARDED]
+                and monotonic() - shared[BEAT] > settings.patience
             ):
                 with suppress(ProcessLookupError):
                     os.kill(owner, signal.SIGKILL)
-                if handle is not None and not watched.table.address:
+                if handle is not None and not settings.table.address:
                     # A driver on this computer keeps the lines until the process is gone altogether.
                     select.select([handle], [], [], GONE)
-                waited = f"{1e3 * watched.patience:.3g} ms"
+                waited = f"{1e3 * settings.patience:.3g} ms"
                 return Cause(
                     "process",
                     f"the controller process died or hung: no tick for {waited}; it was killed",
@@ -119,24 +119,24 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
             os.close(handle)
 
 
-class _Keeping:
+class _GuardianKeeper:
     """Writes what the loop sends, on a thread of its own."""
 
     def __init__(
         self,
         writer: Any,
         pipe: Connection,
-        watched: Watched,
+        settings: GuardianSettings,
         view: Callable[[str, Array], None] | None,
         shared: Array,
         ring: Array,
     ) -> None:
         self._shared, self._ring = shared, ring
-        self._writer, self._keeper, self._pipe, self._watched, self._view = (
+        self._writer, self._keeper, self._pipe, self._settings, self._view = (
             writer,
             Keeper(writer),
             pipe,
-            watched,
+            settings,
             view,
         )
         self._last: Transition | None = None
@@ -176,10 +176,10 @@ class _Keeping:
 
     def make_ready(self) -> None:
         """Everything that takes time, before there is anything to watch."""
-        if self._watched.table is not None:
+        if self._settings.table is not None:
             from rigtwin.hardware.daq.failsafe import LastResort
 
-            self._resort = LastResort(self._watched.table)
+            self._resort = LastResort(self._settings.table)
 
     def _prepare(self) -> None:
         if self._resort is not None:
@@ -207,10 +207,10 @@ class _Keeping:
         said = cause.reason
         resort = self._resort
         if resort is not None:
-            failed = _tried_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
+            failed = _try_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
             if failed is None:
-                time.sleep(self._watched.hold)
-            failed = _tried_often(resort.pressure_off) or failed
+                time.sleep(self._settings.hold)
+            failed = _try_often(resort.pressure_off) or failed
             if failed is not None:
                 said = f"{said}; and {failed}: stop the rig by hand"
             resort.close()
@@ -234,7 +234,7 @@ class _Keeping:
             self._writer.finish(cause.reason)
 
 
-def _tried_often(act: Callable[[], None]) -> str | None:
+def _try_often(act: Callable[[], None]) -> str | None:
     """What is wrong with it after some tries, or None."""
     failed = None
     for _ in range(TRIES):

@@ -8,14 +8,14 @@ from typing import Any
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
-from rigtwin.recording.schema import descriptor, encoded, type_name
+from rigtwin.recording.schema import descriptor, encode, type_name
 
 HOST = "127.0.0.1"
 SHOWN = 10
 """Every so many ticks one is shown."""
 
 
-def live_view(port: int) -> Callable[[str, Array], None]:
+def open_live_view(port: int) -> Callable[[str, Array], None]:
     """Starts serving; returns what takes rows of a topic whose first column is the time in s. Raises RigtwinError."""
     try:
         import foxglove
@@ -38,6 +38,6 @@ def live_view(port: int) -> Callable[[str, Array], None]:
             )
             channels[topic] = foxglove.Channel(topic, schema=schema, message_encoding="protobuf")
         for row in rows[::SHOWN]:
-            channels[topic].log(encoded(row), log_time=max(0, round(float(row[0]) * 1e9)))
+            channels[topic].log(encode(row), log_time=max(0, round(float(row[0]) * 1e9)))
 
     return show

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigtwin.cli.session_commands import permitted, run, test_of
+from rigtwin.cli.session_commands import plan_test, require_permission, run
 from rigtwin.description.configuration import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
@@ -19,7 +19,7 @@ LONGEST = 3600.0
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedTest:
     """One test of a list. pause: s before it; settings: `key=value` texts, as --set takes them."""
 
     name: str
@@ -29,7 +29,7 @@ class Planned:
     settings: list[str] = field(default_factory=list)
 
 
-def planned(tables: Mapping[str, Any]) -> list[Planned]:
+def parse_plan(tables: Mapping[str, Any]) -> list[PlannedTest]:
     """The tests of a TOML list. Raises RigtwinError naming the test and what is wrong with it."""
     from experiments import find
 
@@ -39,7 +39,7 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
         raise RigtwinError(
             f"unknown {unknown[0]!r}; expected [[test]] tables" if unknown else "no [[test]] in it"
         )
-    found: list[Planned] = []
+    found: list[PlannedTest] = []
     for number, test in enumerate(tests, start=1):
         where = f"test {number}"
         if not isinstance(test, Mapping):
@@ -79,7 +79,7 @@ def planned(tables: Mapping[str, Any]) -> list[Planned]:
             raise RigtwinError(f"{where}: name = {name!r}; expected what a file can be called")
         if name in (other.name for other in found):
             raise RigtwinError(f"{where}: name {name!r} is another test's; expected one of its own")
-        found.append(Planned(name, experiment, seed, float(pause), list(_assignments(settings))))
+        found.append(PlannedTest(name, experiment, seed, float(pause), list(_assignments(settings))))
     return found
 
 
@@ -98,7 +98,7 @@ def session(parsed: Namespace) -> int:
     """Runs the list. Stops at the first test that did not end as it should. Returns the exit code."""
     if parsed.target == "daq" and parsed.card is None:
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
-    tests = read_toml(parsed.list, planned)
+    tests = read_toml(parsed.list, parse_plan)
     try:
         parsed.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -107,7 +107,7 @@ def session(parsed: Namespace) -> int:
     todo = [
         test
         for test in tests
-        if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap", real))
+        if not (parsed.resume and is_complete(parsed.folder / f"{test.name}.mcap", real))
     ]
     taken = [test.name for test in todo if (parsed.folder / f"{test.name}.mcap").exists()]
     if taken and not parsed.resume:
@@ -115,11 +115,11 @@ def session(parsed: Namespace) -> int:
             f"{parsed.folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder"
         )
     # Every mistake is found before the first test moves anything.
-    ready = [(test, test_of(_of(parsed, test), test.experiment)) for test in todo]
+    ready = [(test, plan_test(_of(parsed, test), test.experiment)) for test in todo]
     for _, one in ready:
-        _ = one.limited
+        _ = one.card_configuration
         if real:
-            permitted(parsed, one)
+            require_permission(parsed, one)
     if len(todo) < len(tests):
         print(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
     for test, one in ready:
@@ -127,7 +127,7 @@ def session(parsed: Namespace) -> int:
             print(f"pause of {test.pause:g} s before {test.name}", flush=True)
             time.sleep(test.pause)
         path = parsed.folder / f"{test.name}.mcap"
-        aside = _aside(path)
+        aside = move_aside(path)
         code = run(parsed, one, path)
         if aside is not None:
             print(f"what was there before is in {aside}")
@@ -138,12 +138,12 @@ def session(parsed: Namespace) -> int:
     return 0
 
 
-def _of(parsed: Namespace, test: Planned) -> Namespace:
+def _of(parsed: Namespace, test: PlannedTest) -> Namespace:
     """The command line of one test: its own settings after those of the session."""
     return Namespace(**{**vars(parsed), "seed": test.seed, "set": [*parsed.set, *test.settings]})
 
 
-def _completed(path: Path, real: bool) -> bool:
+def is_complete(path: Path, real: bool) -> bool:
     """Whether it is there, of the rig itself where that is asked for."""
     if not path.exists():
         return False
@@ -154,7 +154,7 @@ def _completed(path: Path, real: bool) -> bool:
     return recording.end == "completed" and real == (not recording.twin)
 
 
-def _aside(path: Path) -> Path | None:
+def move_aside(path: Path) -> Path | None:
     """A recording of a test that did not complete is kept under another name."""
     if not path.exists():
         return None

@@ -11,15 +11,15 @@ from typing import Any
 from controllers import update
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, applied, flattened
-from rigtwin.hardware.daq.card import Card, connected, require_client
-from rigtwin.hardware.daq.table import ChannelTable, fit, written
+from rigtwin.hardware.daq.card import Card, connect, require_client
+from rigtwin.hardware.daq.table import ChannelTable, require_ranges, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard, Wired
-from rigtwin.hardware.realtime import Lateness, Pacer, described, in_real_time
+from rigtwin.hardware.realtime import Lateness, Pacer, describe_grants, in_real_time
 from rigtwin.hardware.session.guardian import Guardian
+from rigtwin.hardware.session.guardian_settings import GuardianSettings
 from rigtwin.hardware.session.recorder import Keeper
-from rigtwin.hardware.session.watched import Watched
-from rigtwin.hardware.supervised import Ended, Update, supervise
+from rigtwin.hardware.supervision import SessionEnd, Update, supervise
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer, twin_values
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
@@ -43,17 +43,17 @@ class Test:
     effects: Sequence[str] = ()
 
     @property
-    def limited(self) -> Configuration:
+    def card_configuration(self) -> Configuration:
         """With the limits that the card's table adds. Raises RigtwinError where a limit does not fit the card's lines."""
-        fit(self.table, self.configuration.safety)
-        return self.configuration._replace(safety=self.table.of(self.configuration.safety))
+        require_ranges(self.table, self.configuration.safety)
+        return self.configuration._replace(safety=self.table.tighten(self.configuration.safety))
 
     def terminals(self) -> Terminals:
         """The twin at the card's terminals, wired as the table says."""
         return Terminals(applied(self.configuration, list(self.effects)), self.table, self.seed)
 
 
-def on_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
+def open_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
     """The card backend on a virtual card in this process: the unmodified nidaqmx client, volts both ways."""
     require_client()
     from rigtwin.hardware.daq.transport import InProcess
@@ -67,7 +67,7 @@ def on_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, V
 
 def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     """What a recording says beyond the test: the channel table, and how a twin made it."""
-    told = {CARD_RECORD: {"table": written(test.table)}}
+    told = {CARD_RECORD: {"table": to_toml(test.table)}}
     if virtual:
         told[TWIN_RECORD] = twin_values(
             test.seed, flattened(test.configuration), test.effects, __version__
@@ -75,7 +75,7 @@ def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     return told
 
 
-def _writing(path: Path, test: Test) -> dict[str, Any]:
+def _writer_arguments(path: Path, test: Test) -> dict[str, Any]:
     return {
         "path": path,
         "experiment": test.experiment,
@@ -91,10 +91,10 @@ def record_at_leisure(
     stop: Callable[[], str | None] = lambda: None,
     progress: Callable[[int], object] = lambda _: None,
     updating: Update = update,
-) -> Ended:
+) -> SessionEnd:
     """On a twin whose time waits for the loop, as fast as it goes. Raises RigtwinError before anything is recorded."""
-    limited = test.limited
-    with Writer(**_writing(path, test)) as writer:
+    limited = test.card_configuration
+    with Writer(**_writer_arguments(path, test)) as writer:
         writer.reserve()
         for name, values in metadata(test, virtual=True).items():
             writer.add_metadata(name, values)
@@ -105,20 +105,20 @@ def record_at_leisure(
     return ended
 
 
-def watched(
+def guardian_settings(
     test: Test,
     path: Path,
     guarded: bool,
     notes: Sequence[tuple[str, dict[str, str]]] = (),
     live: int = 0,
-) -> Watched:
+) -> GuardianSettings:
     """What a guardian has to know of a test."""
     safety = test.configuration.safety
     # The last tick that may be late comes `missed` + 1 periods after the one before, and a little more.
     patience = min((safety.missed + 1.5) * test.configuration.timing.period, LONGEST)
     told = metadata(test, virtual=not guarded) | dict(notes)
-    return Watched(
-        _writing(path, test), told, test.table if guarded else None, patience, safety.hold, live
+    return GuardianSettings(
+        _writer_arguments(path, test), told, test.table if guarded else None, patience, safety.hold, live
     )
 
 
@@ -132,14 +132,14 @@ def record_in_real_time(
     live: int = 0,
     progress: Callable[[int], object] = lambda _: None,
     fifo: bool = True,
-) -> Ended:
+) -> SessionEnd:
     """In real time, with a guardian process. guarded: whether the rig is a card that the guardian has to stop if this process
     dies; notes: more metadata records. Raises RigtwinError before anything moves."""
-    limited = test.limited
+    limited = test.card_configuration
     safety, period = limited.safety, limited.timing.period
     whole = len(test.demands) + round(2.0 * (safety.ramp + safety.hold + 1.0) / period)
     lateness = Lateness(whole)
-    guardian = Guardian(watched(test, path, guarded, notes, live))
+    guardian = Guardian(guardian_settings(test, path, guarded, notes, live))
     with ExitStack() as stack:
         grants = stack.enter_context(in_real_time(fifo))
         try:
@@ -149,15 +149,15 @@ def record_in_real_time(
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
             raise
-    guardian.add_metadata(LATENESS_RECORD, lateness.record(described(grants)))
+    guardian.add_metadata(LATENESS_RECORD, lateness.record(describe_grants(grants)))
     guardian.finish(ended.cause.reason)
     return ended
 
 
-def on_card(test: Test) -> Card:
+def open_card(test: Test) -> Card:
     """The card itself, inspected. Raises CardFault; moves nothing."""
     period = test.configuration.timing.period
-    channel = connected(test.table.address)
+    channel = connect(test.table.address)
     pacer = Pacer(period) if test.table.timing == "software" else None
     card = Card(test.table, period, channel, pacer=pacer)
     card.inspect()

@@ -20,7 +20,7 @@ _SIGNALS = [
 
 @contextmanager
 def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]]:
-    """Gives a function to be called once a tick: who asked to stop, or None. Ctrl-C and the other signals that end a program
+    """Gives a function to be called once a tick: who find_request to stop, or None. Ctrl-C and the other signals that end a program
     are requests inside this context; on a terminal so is any key; so is a file of that name."""
     said: list[str] = []
 
@@ -32,7 +32,7 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
     try:
         with _single_keys() as keys:
 
-            def asked() -> str | None:
+            def find_request() -> str | None:
                 if said:
                     return said[0]
                 if path is not None and os.path.exists(path):  # noqa: PTH110 - 1 us instead of 3, every tick
@@ -42,7 +42,7 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
                     return "stopped by the operator: key"
                 return None
 
-            yield asked
+            yield find_request
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

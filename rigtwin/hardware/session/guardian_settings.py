@@ -14,19 +14,19 @@ from rigtwin.numerics.arrays import Array
 
 RING = 8192
 """Ticks that the shared memory holds for the recording: seconds of them."""
-BEAT, GROUND, STRUCTURE, WATCHED, WRITTEN, READ, PREPARED, ALIVE, NUMBERS = range(9)
+BEAT, GROUND, STRUCTURE, GUARDED, WRITTEN, READ, PREPARED, ALIVE, NUMBERS = range(9)
 """Numbers in the shared memory, before the ticks: time of the last tick, positions held, whether there is anything to watch,
 ticks written by the loop and read by the guardian, whether it could stop the rig, when it last looked."""
 
 
-def parts(memory: Any) -> tuple[Array, Array]:
+def split_memory(memory: Any) -> tuple[Array, Array]:
     """The numbers, and the ring of ticks."""
     whole = np.frombuffer(memory)
     return whole[:NUMBERS], whole[NUMBERS:].reshape(RING, ROW)
 
 
 @dataclass(frozen=True)
-class Watched:
+class GuardianSettings:
     """What the guardian has to know. recording: arguments of rigtwin.recording.Writer; metadata: records added at once;
     table: of the card, None for a rig that needs no stopping; patience: s without a tick before it acts; hold: s before it
     takes the pressure off; live: port of a live view on this computer, 0 for none."""

@@ -33,13 +33,13 @@ from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.rig import DrivenRig
 from rigtwin.simulation.safety import (
     Trip,
-    beyond,
-    commanded_wrong,
-    explained,
-    held,
-    sensed_wrong,
-    watching,
-    within,
+    empty_memory,
+    explain_trip,
+    find_arming_obstacle,
+    is_beyond,
+    judge_commands,
+    judge_measurements,
+    stop_state,
 )
 
 LOOKING = 0.3
@@ -85,7 +85,7 @@ class Recorder(Protocol):
 
 
 @dataclass(frozen=True)
-class Ended:
+class SessionEnd:
     """How a session ended. ticks: of the test that were recorded; transitions: all of them, in order; peaks: greatest magnitude
     of each measurement, and of the commands' voltage."""
 
@@ -104,7 +104,7 @@ def supervise(
     lateness: Lateness | None = None,
     updating: Update = update,
     progress: Callable[[int], object] = lambda _: None,
-) -> Ended:
+) -> SessionEnd:
     """Runs a test, demands of shape (ticks, 3). stop: looked at in every tick; a text stops the session and is its reason.
     lateness: is filled, if the rig runs in real time. Raises RigtwinError only before anything has moved."""
     return _Session(rig, configuration, demands, recorder, stop, lateness, updating, progress).run()
@@ -128,7 +128,7 @@ class _Session:
         self._updating, self._progress = updating, progress
         self._controller = controller(configuration.controller, self._period)
         self._state = initial_state(self._controller)
-        self._watch = watching()
+        self._memory = empty_memory()
         self._supervisor = Supervisor(recorder.transition)
         self._target = self._start_of(configuration, demands)
         self._before = (LOOKING, ARMED, self._limits.ramp, SETTLING)
@@ -147,7 +147,7 @@ class _Session:
         return Commands(ground, structure, force, force / MOTOR_CONSTANT)
 
     @property
-    def _elapsed(self) -> float:
+    def _interval(self) -> float:
         """s since the tick before, of which some may have been missed."""
         return (1 + self._rig.missed) * self._period
 
@@ -155,7 +155,7 @@ class _Session:
     def _time(self) -> float:
         return self._clock * self._period
 
-    def run(self) -> Ended:
+    def run(self) -> SessionEnd:
         """The way through all states; every step of it ends in `_come_to_rest`."""
         rig, recorder = self._rig, self._recorder
         try:
@@ -182,7 +182,7 @@ class _Session:
             self._progress(self._done - self._done_before)
         names = (*Measurements._fields, "voltage")
         transitions = tuple(self._supervisor.transitions)
-        return Ended(
+        return SessionEnd(
             transitions[-1].cause,
             self._done,
             transitions,
@@ -193,20 +193,20 @@ class _Session:
         """Idle: whether every sensor lives and lies within its limit. Returns the commands at which nothing moves. Raises
         RigtwinError if the rig must not be armed."""
         measured = self._rig.read()
-        refused = within(self._limits, measured)
+        refused = find_arming_obstacle(self._limits, measured)
         if refused is not None:
             raise RigtwinError(f"not armed: {refused}")
         rest = self._held = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
         self._updating(self._controller, self._state, measured, Demand(*self._demands[0].tolist()))
         for _ in range(max(round(LOOKING / self._period), 1)):
             self._rig.write(rest)
-            cause = self._faulty(measured)
-            number, column = commanded_wrong(
-                self._limits, self._elapsed, self._watch, measured, rest
+            cause = self._find_fault(measured)
+            number, column = judge_commands(
+                self._limits, self._interval, self._memory, measured, rest
             )
             if number != Trip.NONE:
                 cause = Cause(
-                    Trip(number).name.lower(), explained(Trip(number), self._limits, column)
+                    Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
                 )
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
@@ -230,7 +230,7 @@ class _Session:
         self._supervisor.go(
             Phase.RAMPING, Cause("ramp", "ramping to the start", fault=False), self._time
         )
-        for share in _cosine(self._limits.ramp, self._period):
+        for share in _cosine_shares(self._limits.ramp, self._period):
             between = Commands(
                 *(a + share * (b - a) for a, b in zip(rest, self._target, strict=True))
             )
@@ -268,19 +268,19 @@ class _Session:
         self._clock += self._rig.missed
         if self._lateness is not None:
             self._lateness.missed += self._rig.missed
-        cause = self._faulty(measured)
+        cause = self._find_fault(measured)
         if cause is None and running and self._clock >= len(self._demands):
             return COMPLETED
         commands = self._held
         if cause is None:
             try:
                 commands = command(measured)
-                number, column = commanded_wrong(
-                    self._limits, self._elapsed, self._watch, measured, commands
+                number, column = judge_commands(
+                    self._limits, self._interval, self._memory, measured, commands
                 )
                 if number != Trip.NONE:
                     cause = Cause(
-                        Trip(number).name.lower(), explained(Trip(number), self._limits, column)
+                        Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
                     )
             except Exception as error:
                 commands = self._held
@@ -300,10 +300,10 @@ class _Session:
             self._lateness.add(getattr(self._rig, "late", 0.0), monotonic() - begun)
         return None
 
-    def _faulty(self, measured: Measurements) -> Cause | None:
+    def _find_fault(self, measured: Measurements) -> Cause | None:
         """What is wrong besides the commands."""
         self._recorder.beat(self._held.ground, self._held.structure)
-        number, column = sensed_wrong(self._limits, self._elapsed, self._watch, measured)
+        number, column = judge_measurements(self._limits, self._interval, self._memory, measured)
         missed = self._rig.missed
         if missed > self._limits.missed:
             return Cause(
@@ -316,7 +316,7 @@ class _Session:
                 f"of the last ticks {100 * self._behind:.0f} % were missed; the loop cannot keep the pace",
             )
         if number != Trip.NONE:
-            return Cause(Trip(number).name.lower(), explained(Trip(number), self._limits, column))
+            return Cause(Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column))
         fault = self._recorder.fault
         if fault is not None:
             return Cause("recording", fault)
@@ -331,7 +331,7 @@ class _Session:
         tick: float = math.nan,
     ) -> Cause:
         """Outputs to the stop state, now: no force, cylinders where they were last told to be. Then it is noted."""
-        self._held = held(self._limits, self._held)
+        self._held = stop_state(self._limits, self._held)
         try:
             self._rig.write(self._held)
         except Exception:
@@ -347,7 +347,7 @@ class _Session:
             later = self._ramp_out(rest)
             cause = later or cause
         for _ in range(0 if cause.name in NOT_HELD else round(self._limits.hold / self._period)):
-            if not self._pressure or not self._holding():
+            if not self._pressure or not self._hold():
                 break
         try:
             self._rig.pressure(False)
@@ -359,15 +359,15 @@ class _Session:
 
     def _ramp_out(self, rest: Commands) -> Cause | None:
         begin = self._held
-        for share in _cosine(self._limits.ramp, self._period):
+        for share in _cosine_shares(self._limits.ramp, self._period):
             between = Commands(*(a + share * (b - a) for a, b in zip(begin, rest, strict=True)))
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
-        self._held = held(self._limits, self._held)
+        self._held = stop_state(self._limits, self._held)
         return None
 
-    def _holding(self) -> bool:
+    def _hold(self) -> bool:
         """A tick of holding. False if there is no use in it: the card is gone, or a cylinder is beyond its limit."""
         try:
             measured = self._rig.read()
@@ -377,7 +377,7 @@ class _Session:
         self._recorder.beat(self._held.ground, self._held.structure)
         self._clock += self._rig.missed
         self._row(measured, self._held)
-        return not beyond(self._limits, measured)
+        return not is_beyond(self._limits, measured)
 
     def _row(self, measured: Measurements, commands: Commands, tick: float = math.nan) -> None:
         """Notes a tick, which is over with that. tick: its number in the test, if it is of the test."""
@@ -398,7 +398,7 @@ class _Session:
             self._done_before = self._done
 
 
-def _cosine(duration: float, period: float) -> Iterator[float]:
+def _cosine_shares(duration: float, period: float) -> Iterator[float]:
     """From 0 to 1 without a jump in velocity."""
     ticks = max(1, round(duration / period))
     for tick in range(1, ticks + 1):
