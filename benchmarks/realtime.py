@@ -7,6 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from google.protobuf.message import Message
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
@@ -15,7 +16,7 @@ from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
-from rigtwin.hardware.daq.virtual import VirtualCard
+from rigtwin.hardware.daq.virtual import Response, VirtualCard
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import (
     Test,
@@ -59,7 +60,7 @@ class _Timed:
         self._answer = device.answer
         device.answer = self._timed  # type: ignore[method-assign]
 
-    def _timed(self, call: str, request: object, response: type) -> object:
+    def _timed(self, call: str, request: Message, response: Response) -> Message:
         begun = perf_counter()
         try:
             return self._answer(call, request, response)
@@ -89,7 +90,9 @@ class _Timed:
 def _test(name: str) -> Test:
     """Without the class a shared computer may keep a loop waiting for longer than a rig could bear; here nothing moves."""
     experiment = EXPERIMENTS[name]
-    configuration = from_assignments(experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"])
+    configuration = from_assignments(
+        experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"]
+    )
     return Test(name, configuration, experiment.demands(configuration, 0), 0, load_table(CARD))
 
 
@@ -127,7 +130,10 @@ def main() -> None:
                 times = 1e6 * compute(test, folder, paced)
                 figures = (*np.percentile(times, [50, 99, 99.9]), times.max())
                 how = "one a ms" if paced else "without a pause"
-                print(f"{test:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures), flush=True)
+                print(
+                    f"{test:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures),
+                    flush=True,
+                )
         print("\nlateness of the twin in real time, us")
         print("scheduling    median  99.9 %    most  missed of 20 000")
         for fifo in (True, False):

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
+from experiments import find
 from rigtwin.cli import main
 from rigtwin.description.configuration import Configuration, from_assignments
 from rigtwin.errors import RigtwinError
@@ -57,8 +58,6 @@ def card(tmp_path):
 
 
 def session(*settings: str, seed: int = 0) -> Test:
-    from experiments import find
-
     experiment = find("imposed")
     configuration = from_assignments(experiment.configuration, ["timing.duration=1", "safety.ramp=0.3", *settings])
     return Test("imposed", configuration, experiment.demands(configuration, seed), seed, TABLE)
@@ -195,7 +194,7 @@ def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, mo
 )
 def test_mistakes_in_a_list(tables, said):
     with pytest.raises(RigtwinError, match=said):
-        parse_plan(tables)
+        parse_plan(tables, find)
 
 
 def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):

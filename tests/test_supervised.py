@@ -22,7 +22,7 @@ from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import WiredTwin
 from rigtwin.hardware.faults.campaign import draw_faults, last_words, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
-from rigtwin.hardware.faults.processes import try_process_fault as tried_apart
+from rigtwin.hardware.faults.processes import try_process_fault
 from rigtwin.hardware.session.record import Test, open_virtual_card, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
@@ -221,7 +221,7 @@ def test_limits_of_the_card_reach_the_session():
 @pytest.mark.parametrize("kind", HERE, ids=lambda kind: kind.name)
 def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
     [fault] = draw_faults(1, seed, [kind])
-    outcome = try_fault(fault, TABLE, tmp_path)
+    outcome = try_fault(fault, find(fault.experiment), TABLE, tmp_path)
     assert outcome.ok, outcome
 
 
@@ -229,7 +229,8 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="Linux")
 def test_a_dead_controller_process_is_stopped_for(tmp_path):
     [fault] = draw_faults(1, 3, APART)
-    outcome = tried_apart(replace(fault, at=1300 + fault.at % 500), TABLE, tmp_path)
+    fault = replace(fault, at=1300 + fault.at % 500)
+    outcome = try_process_fault(fault, find(fault.experiment), TABLE, tmp_path)
     assert (outcome.cause, outcome.right, outcome.readable) == ("process", True, True)
     assert outcome.exceeded <= 1.1
     # In ticks of a card whose clock is slowed; a busy computer may add to them.

@@ -51,7 +51,7 @@ LEAST_STROKE, MOST_STROKE = 0.001, 0.02
 
 
 def serve(parsed: Namespace) -> int:
-    """A virtual card with the twin at its terminals, in real time, for any NI-DAQmx gRPC client on this computer."""
+    """Serves a virtual card with the twin at its terminals, in real time, on this computer."""
     require_client()
     from rigtwin.hardware.daq.transport import LOCAL
     from rigtwin.hardware.daq.transport import serve as listen
@@ -64,7 +64,8 @@ def serve(parsed: Namespace) -> int:
     card = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, port = listen(card, parsed.port)
     print(
-        f'virtual card {table.device}: set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.',
+        f"virtual card {table.device}: "
+        f'set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.',
         flush=True,
     )
     with stop_requests() as stop:
@@ -80,11 +81,13 @@ def free(parsed: Namespace) -> int:
     table = load_table(parsed.card)
     if not table.address:
         raise RigtwinError(
-            "card.address is empty: the driver of this computer frees a dead program's lines by itself"
+            "card.address is empty: "
+            "the driver of this computer frees a dead program's lines by itself"
         )
     left = release(table)
     print(
-        f"motor at zero, pressure off; {'what a dead program had is free' if left else 'nothing had been left'}"
+        "motor at zero, pressure off; "
+        f"{'what a dead program had is free' if left else 'nothing had been left'}"
     )
     return 0
 
@@ -124,7 +127,8 @@ def check(parsed: Namespace) -> int:
         for signal in still:
             if signal.repeats >= table.plausible.stuck:
                 raise RigtwinError(
-                    f"{signal.name} gave {signal.repeats} times the same reading: stuck or not connected"
+                    f"{signal.name} gave {signal.repeats} times the same reading: "
+                    "stuck or not connected"
                 )
         table = set_spans(table, still, spans) if spans else table
         table = set_zeros(table, still, references) if parsed.zero else table
@@ -180,7 +184,8 @@ def _signs(
     """Moves every output a little, under supervision, and turns the signs that are wrong."""
     if wiring is None and not parsed.arm:
         _ask(
-            "the check moves ground, structure and motor a little; everybody clear? type arm to go: ",
+            "the check moves ground, structure and motor a little; "
+            "everybody clear? type arm to go: ",
             ("arm",),
         )
     rig = _rig(table, wiring)
@@ -199,7 +204,8 @@ def _signs(
         recording = load(path)
     if recording.ticks != len(demands):
         raise RigtwinError(
-            f"{len(demands) - recording.ticks} ticks were missed; do it again, with less else on this computer"
+            f"{len(demands) - recording.ticks} ticks were missed; do it again, "
+            "with less else on this computer"
         )
     measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
     moved = {output: _find_direction(output, table, wiring, told) for output in OUTPUTS}
@@ -225,7 +231,7 @@ def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
 def _find_direction(
     output: str, table: ChannelTable, wiring: ChannelTable | None, told: Mapping[str, int]
 ) -> int:
-    """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
+    """Says whether an output went the way of its command: told, asked, or known."""
     if output in told:
         return told[output]
     place = OUTPUTS.index(output)

@@ -100,7 +100,7 @@ def card(parsed: Namespace) -> int:
 
 
 def session(parsed: Namespace) -> int:
-    from rigtwin.hardware.session.plan import session as work
+    from rigtwin.cli.session_commands import session as work
 
     return work(parsed)
 

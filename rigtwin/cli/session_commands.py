@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from argparse import Namespace
 from contextlib import ExitStack
 from datetime import date
@@ -11,6 +12,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from rigtwin.console import late, table
+from rigtwin.description.configuration import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
@@ -18,6 +20,7 @@ from rigtwin.hardware.daq.table import load_table, require_trust
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import list_shortcomings
 from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
+from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.hardware.session.record import (
     Test,
     open_card,
@@ -98,9 +101,13 @@ def _dry_run_key(test: Test) -> str:
     return digest(test.experiment, test.configuration, test.demands, test.table)
 
 
-def require_permission(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
-    """The card, on which nothing has moved yet, and what the recording has to say of it. Raises RigtwinError if the test must
-    not be run on the rig."""
+def require_permission(
+    parsed: Namespace, test: Test
+) -> tuple[Card, list[tuple[str, dict[str, str]]]]:
+    """The card, on which nothing has moved yet, and what the recording has to say of it.
+
+    Raises RigtwinError if the test must not be run on the rig.
+    """
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     require_trust(test.table, date.today())
@@ -110,7 +117,8 @@ def require_permission(parsed: Namespace, test: Test) -> tuple[Card, list[tuple[
     if not has_passed(parsed.card, _dry_run_key(test)):
         if not parsed.without_dry_run:
             raise RigtwinError(
-                f"{test.experiment} with these settings has had no dry run; do it first: the same command with --dry-run "
+                f"{test.experiment} with these settings has had no dry run; do it first: "
+                "the same command with --dry-run "
                 "(or say who answers for it: --without-dry-run NAME)"
             )
         notes.append(("rigtwin.override", {"dry run": f"left out by {parsed.without_dry_run}"}))
@@ -125,7 +133,9 @@ def _run_on_rig(parsed: Namespace, test: Test, path: Path) -> int:
         print("not armed; nothing moved")
         return 1
     with stop_requests(parsed.stop_file) as stop, _bar(test) as bar:
-        ended = record_in_real_time(card, test, path, stop, True, notes, parsed.live, bar.update)
+        ended = record_in_real_time(
+            card, test, path, stop, guarded=True, notes=notes, live=parsed.live, progress=bar.update
+        )
     return _report(test, path, ended)
 
 
@@ -135,7 +145,8 @@ def _ask_to_arm(test: Test) -> bool:
             "no terminal to ask for arming; say --arm if everybody is clear of the rig"
         )
     print(
-        f"{test.experiment} on card {test.table.device}. Any key stops it. Everybody clear of the rig?"
+        f"{test.experiment} on card {test.table.device}. Any key stops it. Everybody clear of the "
+        "rig?"
     )
     try:
         return input("type arm to go: ").strip() == "arm"
@@ -181,3 +192,79 @@ def plan_test(parsed: Namespace, name: str) -> Test:
         load_table(parsed.card or CARD),
         parsed.effect,
     )
+
+
+def session(parsed: Namespace) -> int:
+    """Runs a list of tests, up to the first that did not end as it should.
+
+    Parameters
+    ----------
+    parsed : Namespace
+        The command line of `rigtwin session`.
+
+    Returns
+    -------
+    int
+        The exit code.
+
+    Raises
+    ------
+    RigtwinError
+        For a mistake in the command line or in any test of the list, before anything moves.
+    """
+    from experiments import find
+
+    if parsed.target == "daq" and parsed.card is None:
+        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
+    tests = read_toml(parsed.list, lambda tables: parse_plan(tables, find))
+    try:
+        parsed.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot make {parsed.folder}: {error.strerror}") from None
+    real = parsed.target == "daq" and not parsed.dry_run
+    paths = {test.name: parsed.folder / f"{test.name}.mcap" for test in tests}
+    todo = [test for test in tests if not (parsed.resume and is_complete(paths[test.name], real))]
+    taken = [test.name for test in todo if paths[test.name].exists()]
+    if taken and not parsed.resume:
+        raise RigtwinError(
+            f"{parsed.folder} holds {taken[0]}.mcap already; "
+            "--resume goes on, or name another --folder"
+        )
+    # Every mistake is found before the first test moves anything.
+    ready = [(test, plan_test(_command_line(parsed, test), test.experiment)) for test in todo]
+    for _, one in ready:
+        _ = one.card_configuration
+        if real:
+            require_permission(parsed, one)
+    if len(todo) < len(tests):
+        print(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
+    for test, one in ready:
+        if test.pause:
+            print(f"pause of {test.pause:g} s before {test.name}", flush=True)
+            time.sleep(test.pause)
+        path = paths[test.name]
+        aside = move_aside(path)
+        code = run(parsed, one, path)
+        if aside is not None:
+            print(f"what was there before is in {aside}")
+        if code != 0:
+            print(f"{test.name} did not complete; see {path}, then --resume")
+            return code
+        _compare(path)
+    return 0
+
+
+def _command_line(parsed: Namespace, test: PlannedTest) -> Namespace:
+    """The command line of one test: its own settings after those of the session."""
+    return Namespace(**{**vars(parsed), "seed": test.seed, "set": [*parsed.set, *test.settings]})
+
+
+def _compare(path: Path) -> None:
+    """Says where the rig and the twin disagree, at once."""
+    from rigtwin.cli.diagnosis_commands import compare
+
+    nothing = {"other": None, "json": None, "machine": None, "config": None}
+    try:
+        compare(Namespace(recording=path, effect=[], set=[], **nothing))
+    except RigtwinError as error:
+        print(f"not compared: {error}")

@@ -1,4 +1,8 @@
-"""Real time: deadlines that do not drift, what the system grants a loop that must meet them, and how late it was."""
+"""Real time.
+
+Deadlines that do not drift, what the system grants a loop that must meet them, and how late it
+was.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,8 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 SPIN = 200e-6
-"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by tens of microseconds."""
+"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by
+tens of microseconds."""
 PRIORITY = 80
 EDGES = tuple(
     1e-6 * value
@@ -45,8 +50,8 @@ def sleep_until(deadline: float, spin: float = SPIN) -> None:
 class Pacer:
     """Ticks at absolute deadlines, so that a late one does not shift those after it.
 
-    late: s by which the last wait ended after its deadline. A tick that ends after the next deadline is missed, and the loop
-    goes on with the first one that is still ahead.
+    late: s by which the last wait ended after its deadline. A tick that ends after the next
+    deadline is missed, and the loop goes on with the first one that is still ahead.
     """
 
     def __init__(self, period: float) -> None:
@@ -78,8 +83,11 @@ class Lateness:
             self._count += 1
 
     def record(self, scheduling: str) -> dict[str, str]:
-        """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum
-        of both, ticks missed, and what the system granted."""
+        """What a recording keeps.
+
+        The histogram (upper edges in s, ticks in each class), median, 99.9th percentile and
+        maximum of both, ticks missed, and what the system granted.
+        """
         figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
         for name, values in (
             ("late", self._late[: self._count]),
@@ -104,7 +112,10 @@ def _statistics(values: Array) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Grant:
-    """One thing that a loop in real time wants of the system. lacking: why it is not there and how to get it, or empty."""
+    """One thing that a loop in real time wants of the system.
+
+    lacking: why it is not there and how to get it, or empty.
+    """
 
     name: str
     lacking: str = ""
@@ -112,8 +123,11 @@ class Grant:
 
 @contextmanager
 def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
-    """Takes what the system permits for the time of the loop, and gives it back: FIFO scheduling, memory locked, no garbage
-    collection. Yields what was granted and what not. `fifo`: whether to ask for the scheduling class at all."""
+    """Takes what the system permits for the time of the loop, and gives it back.
+
+    FIFO scheduling, memory locked, no garbage collection. Yields what was granted and what not.
+    `fifo`: whether to ask for the scheduling class at all.
+    """
     grants = [_memory(), Grant("no garbage collection")]
     collecting, interval = gc.isenabled(), sys.getswitchinterval()
     gc.collect()

@@ -1,8 +1,10 @@
-"""A test on a rig that is ramped in and out under supervision: the same for the real rig, its virtual card and the twin.
+"""A test on a rig that is ramped in and out under supervision.
 
-Between controller and rig stand the limits of `rigtwin.simulation.safety` and the states of `rigtwin.hardware.supervisor`. Whatever goes wrong,
-the outputs go to the stop state at that tick: motor to zero force, cylinders hold, and after a while their pressure is taken
-off.
+The same for the real rig, its virtual card and the twin.
+
+Between controller and rig stand the limits of `rigtwin.simulation.safety` and the states of
+`rigtwin.hardware.supervisor`. Whatever goes wrong, the outputs go to the stop state at that tick:
+motor to zero force, cylinders hold, and after a while their pressure is taken off.
 """
 
 from __future__ import annotations
@@ -43,14 +45,16 @@ from rigtwin.simulation.safety import (
 )
 
 LOOKING = 0.3
-"""s for which the sensors are looked at before the rig is armed; it also warms up everything that a tick needs."""
+"""s for which the sensors are looked at before the rig is armed; it also warms up everything that
+a tick needs."""
 ARMED = 0.1
 """s of pressure before anything is moved."""
 SETTLING = 0.3
 """s at the start position between the ramp and the test."""
 
 OFTEN, MOST_MISSED = 0.005, 0.2
-"""Share by which a tick enters the average of ticks missed, and what that may be: one in five, over some 200."""
+"""Share by which a tick enters the average of ticks missed, and what that may be: one in five,
+over some 200."""
 NOT_HELD = ("following", "structure", "ground", "travel", "velocity", "wheel")
 """Causes after which cylinders are not held under pressure: one of them may be what is wrong."""
 UNREAD = Measurements(math.nan, math.nan, math.nan, math.nan)
@@ -59,20 +63,29 @@ Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Comman
 
 
 class Recorder(Protocol):
-    """Keeps what a session does. `fault`: why it cannot any more, or None; looked at in every tick."""
+    """Keeps what a session does.
+
+    `fault`: why it cannot any more, or None; looked at in every tick.
+    """
 
     @property
     def fault(self) -> str | None: ...
 
     def tick(self, row: tuple[float, ...]) -> None:
-        """One tick of the session: the fields of /session, those of /command, then the tick's number in the test, not a number
-        outside it."""
+        """One tick of the session.
+
+        The fields of /session, those of /command, then the tick's number in the test, not a number
+        outside it.
+        """
         ...
 
     def transition(self, transition: Transition) -> None: ...
 
     def ready(self) -> None:
-        """Called when the rig's lines are there and nothing moves yet. Raises RigtwinError if the session must not begin."""
+        """Called when the rig's lines are there and nothing moves yet.
+
+        Raises RigtwinError if the session must not begin.
+        """
         ...
 
     def beat(self, ground: float, structure: float) -> None:
@@ -86,8 +99,11 @@ class Recorder(Protocol):
 
 @dataclass(frozen=True)
 class SessionEnd:
-    """How a session ended. ticks: of the test that were recorded; transitions: all of them, in order; peaks: greatest magnitude
-    of each measurement, and of the commands' voltage."""
+    """How a session ended.
+
+    ticks: of the test that were recorded; transitions: all of them, in order; peaks: greatest
+    magnitude of each measurement, and of the commands' voltage.
+    """
 
     cause: Cause
     ticks: int
@@ -105,9 +121,21 @@ def supervise(
     updating: Update = update,
     progress: Callable[[int], object] = lambda _: None,
 ) -> SessionEnd:
-    """Runs a test, demands of shape (ticks, 3). stop: looked at in every tick; a text stops the session and is its reason.
-    lateness: is filled, if the rig runs in real time. Raises RigtwinError only before anything has moved."""
-    return _Session(rig, configuration, demands, recorder, stop, lateness, updating, progress).run()
+    """Runs a test, demands of shape (ticks, 3).
+
+    stop: looked at in every tick; a text stops the session and is its reason. lateness: is filled,
+    if the rig runs in real time. Raises RigtwinError only before anything has moved.
+    """
+    return _Session(
+        rig,
+        configuration,
+        demands,
+        recorder,
+        stop=stop,
+        lateness=lateness,
+        updating=updating,
+        progress=progress,
+    ).run()
 
 
 class _Session:
@@ -190,8 +218,11 @@ class _Session:
         )
 
     def _look(self) -> Commands:
-        """Idle: whether every sensor lives and lies within its limit. Returns the commands at which nothing moves. Raises
-        RigtwinError if the rig must not be armed."""
+        """Idle: whether every sensor lives and lies within its limit.
+
+        Returns the commands at which nothing moves. Raises RigtwinError if the rig must not be
+        armed.
+        """
         measured = self._rig.read()
         refused = find_arming_obstacle(self._limits, measured)
         if refused is not None:
@@ -257,8 +288,10 @@ class _Session:
         return commands
 
     def _tick(self, command: Callable[[Measurements], Commands]) -> Cause | None:
-        """One tick: read, look, command, look, write. Returns why the session must stop, after the outputs are at the stop
-        state, or None."""
+        """One tick: read, look, command, look, write.
+
+        Returns why the session must stop, after the outputs are at the stop state, or None.
+        """
         running = self._supervisor.phase == Phase.RUNNING
         try:
             measured = self._rig.read()
@@ -313,10 +346,13 @@ class _Session:
         if self._behind > MOST_MISSED:
             return Cause(
                 "late",
-                f"of the last ticks {100 * self._behind:.0f} % were missed; the loop cannot keep the pace",
+                f"of the last ticks {100 * self._behind:.0f} % were missed; "
+                "the loop cannot keep the pace",
             )
         if number != Trip.NONE:
-            return Cause(Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column))
+            return Cause(
+                Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
+            )
         fault = self._recorder.fault
         if fault is not None:
             return Cause("recording", fault)
@@ -330,7 +366,10 @@ class _Session:
         commands: Commands | None = None,
         tick: float = math.nan,
     ) -> Cause:
-        """Outputs to the stop state, now: no force, cylinders where they were last told to be. Then it is noted."""
+        """Outputs to the stop state, now: no force, cylinders where they were last told to be.
+
+        Then it is noted.
+        """
         self._held = stop_state(self._limits, self._held)
         try:
             self._rig.write(self._held)
@@ -368,7 +407,10 @@ class _Session:
         return None
 
     def _hold(self) -> bool:
-        """A tick of holding. False if there is no use in it: the card is gone, or a cylinder is beyond its limit."""
+        """A tick of holding.
+
+        False if there is no use in it: the card is gone, or a cylinder is beyond its limit.
+        """
         try:
             measured = self._rig.read()
             self._rig.write(self._held)
@@ -380,7 +422,10 @@ class _Session:
         return not is_beyond(self._limits, measured)
 
     def _row(self, measured: Measurements, commands: Commands, tick: float = math.nan) -> None:
-        """Notes a tick, which is over with that. tick: its number in the test, if it is of the test."""
+        """Notes a tick, which is over with that.
+
+        tick: its number in the test, if it is of the test.
+        """
         held, rig = self._held, self._rig
         written = (held.ground, held.structure, held.voltage, float(self._pressure))
         late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)

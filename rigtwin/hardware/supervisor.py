@@ -1,8 +1,9 @@
 """The states of a session on a rig, and the only ways between them.
 
-    idle → armed → ramping → running → stopping → stopped | faulted
+idle → armed → ramping → running → stopping → stopped | faulted
 
-From armed on, `stopping` can be reached from every state, and nothing but `stopping` leads out of motion.
+From armed on, `stopping` can be reached from every state, and nothing but `stopping` leads out of
+motion.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from rigtwin.errors import RigtwinError
 
 
 class Phase(IntEnum):
-    """What the rig may do. IDLE, STOPPED, FAULTED: motor without force, no pressure. ARMED: pressure, nothing moves."""
+    """What the rig may do.
+
+    IDLE, STOPPED, FAULTED: motor without force, no pressure. ARMED: pressure, nothing moves.
+    """
 
     IDLE = 0
     ARMED = 1
@@ -39,8 +43,11 @@ NEXT = {
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a session leaves a state. name: one word, for programs; reason: one line, for the operator; fault: whether it must
-    not go on as if nothing had been."""
+    """Why a session leaves a state.
+
+    name: one word, for programs; reason: one line, for the operator; fault: whether it must not go
+    on as if nothing had been.
+    """
 
     name: str
     reason: str

@@ -16,9 +16,11 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 
 FLAT = 8
-"""Equal samples in a row at a signal's very end of range, with a step into them: it is cut off there."""
+"""Equal samples in a row at a signal's very end of range, with a step into them: it is cut off
+there."""
 ABRUPT, BITS = 0.1, 2.0
-"""Share of a signal's typical step, and its smallest steps, with which it runs into such a stretch at least."""
+"""Share of a signal's typical step, and its smallest steps, with which it runs into such a stretch
+at least."""
 OUTLIER = 100.0
 """Times the range of nearly all of a signal at which a sample is damage."""
 JITTER = 0.5
@@ -28,10 +30,14 @@ BLOCK = 10_000
 
 
 def convert(data: Path, map_path: Path, out: Path) -> list[str]:
-    """Writes the recording; what was found, a line each. Raises RigtwinError before anything is written."""
+    """Writes the recording; what was found, a line each.
+
+    Raises RigtwinError before anything is written.
+    """
     wanted, columns = load(map_path), read(data)
     report = [
-        f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, columns {', '.join(columns.values)}"
+        f"{data}: {columns.form}; {len(next(iter(columns.values.values())))} rows, "
+        f"columns {', '.join(columns.values)}"
     ]
     signals = {
         channel: _signal(data, columns, source) for channel, source in wanted.channels.items()
@@ -58,7 +64,8 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
     taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
     if taken.sum() < 2:
         raise RigtwinError(
-            f"{data}: nothing lies between start = {wanted.start:g} s and until = {wanted.until:g} s"
+            f"{data}: "
+            f"nothing lies between start = {wanted.start:g} s and until = {wanted.until:g} s"
         )
     time, signals = time[taken], {channel: values[taken] for channel, values in signals.items()}
     period = wanted.period or _period(time)
@@ -68,7 +75,8 @@ def convert(data: Path, map_path: Path, out: Path) -> list[str]:
         bridged = bridged[bridged > (1.0 + JITTER) * period]
         if len(bridged):
             report.append(
-                f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, {bridged.sum():.4g} s in all"
+                f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, "
+                f"{bridged.sum():.4g} s in all"
             )
         time, signals = _resample(time, signals, period, wanted.resample)
         report.append(f"resampled from {period:g} s to {wanted.resample:g} s: {len(time)} ticks")
@@ -124,7 +132,8 @@ def _unit_notes(columns: Columns, channel: tuple[str, str], source: Source) -> l
         and unit_of(said) != unit_of(source.unit)
     ):
         return [
-            f"{name}: the file says {said} of column {source.column!r}, the map {source.unit}; taken as {source.unit}"
+            f"{name}: the file says {said} of column {source.column!r}, the map {source.unit}; "
+            f"taken as {source.unit}"
         ]
     return []
 
@@ -140,7 +149,8 @@ def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
     base, factor = unit_of(said)
     if base != "s":
         raise RigtwinError(
-            f"{data}: time column {wanted.time!r} is in {said!r}; expected a unit of time, say it in [time] unit"
+            f"{data}: time column {wanted.time!r} is in {said!r}; expected a unit of time, "
+            "say it in [time] unit"
         )
     if not np.isfinite(values).all():
         raise RigtwinError(
@@ -152,7 +162,10 @@ def _time(data: Path, columns: Columns, wanted: Map, rows: int) -> Array:
 def _drop_repeats(
     data: Path, time: Array, signals: dict[tuple[str, str], Array], report: list[str]
 ) -> tuple[Array, dict[tuple[str, str], Array]]:
-    """Without rows that are there twice. Time that goes back, or two different values at one time, is refused."""
+    """Without rows that are there twice.
+
+    Time that goes back, or two different values at one time, is refused.
+    """
     steps = np.diff(time)
     if (steps < 0).any():
         row = int(np.argmax(steps < 0)) + 2
@@ -168,7 +181,8 @@ def _drop_repeats(
             row = int(np.argmax(unlike)) + 2
             name = ".".join(channel)
             raise RigtwinError(
-                f"{data}: row {row} has the same time as the one before, but another value of {name}; expected each time once "
+                f"{data}: row {row} has the same time as the one before, "
+                f"but another value of {name}; expected each time once "
                 "(is the time column's resolution too coarse? then give [time] period instead)"
             )
     report.append(f"{int(again.sum())} rows were there twice and are left out")
@@ -182,7 +196,8 @@ def _require_numbers(data: Path, time: Array, signals: dict[tuple[str, str], Arr
         if wrong.any():
             when = time[int(np.argmax(wrong))] - time[0]
             raise RigtwinError(
-                f"{data}: {'.'.join(channel)} is not a number in {int(wrong.sum())} rows, the first at {when:g} s; "
+                f"{data}: {'.'.join(channel)} is not a number in {int(wrong.sum())} rows, "
+                f"the first at {when:g} s; "
                 "take a stretch without them by [time] start and until"
             )
 
@@ -210,14 +225,16 @@ def _require_even_ticks(data: Path, time: Array, period: float, report: list[str
     if off.any():
         at = int(np.argmax(off))
         raise RigtwinError(
-            f"{data}: {int(off.sum())} gaps in time, the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
+            f"{data}: {int(off.sum())} gaps in time, "
+            f"the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
             f"{period:g} s is the rule; take a stretch without them by [time] start and until, "
             f"or say [time] resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
     if drift * len(time) > JITTER * period:
         report.append(
-            f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, mostly {period:g} s"
+            f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, "
+            f"mostly {period:g} s"
         )
     worst = float(np.max(np.abs(steps - period)))
     if worst > 0.01 * period:
@@ -227,7 +244,10 @@ def _require_even_ticks(data: Path, time: Array, period: float, report: list[str
 def _resample(
     time: Array, signals: dict[tuple[str, str], Array], period: float, wanted: float
 ) -> tuple[Array, dict[tuple[str, str], Array]]:
-    """At another period, straight between samples; smoothed first where that is longer, so that nothing is aliased."""
+    """At another period, straight between samples.
+
+    Smoothed first where that is longer, so that nothing is aliased.
+    """
     ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
     found = {}
     for channel, values in signals.items():
@@ -245,7 +265,8 @@ def _find_oddities(values: Array, time: Array) -> list[str]:
     far = np.abs(values - np.median(values))
     if spread > 0.0 and far.max() > OUTLIER * spread:
         found.append(
-            f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, far outside of all else"
+            f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, "
+            "far outside of all else"
         )
     steps = np.abs(np.diff(values))
     abrupt = max(
@@ -257,7 +278,8 @@ def _find_oddities(values: Array, time: Array) -> list[str]:
             if stop - start >= FLAT and start > 3 and np.max(steps[start - 3 : start]) > abrupt:
                 share = 100.0 * float(np.mean(values == extreme))
                 found.append(
-                    f"is cut off {end} {extreme:.6g} ({share:.2g} % of the ticks), first at {time[start]:.4g} s"
+                    f"is cut off {end} {extreme:.6g} ({share:.2g} % of the ticks), "
+                    f"first at {time[start]:.4g} s"
                 )
                 break
     return found

@@ -18,7 +18,10 @@ TOPICS = ("/command", "/sensor")
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel's values come from: sign·scale·column + offset, after conversion to SI; or a constant."""
+    """Where a channel's values come from.
+
+    Sign·scale·column + offset, after conversion to SI; or a constant.
+    """
 
     column: str
     unit: str | None
@@ -30,8 +33,11 @@ class Source:
 
 @dataclass(frozen=True)
 class Map:
-    """period: s, None if the time column says it; resample: s, None if the data stay as they are; start, until: s of the data
-    that are taken."""
+    """period.
+
+    S, None if the time column says it; resample: s, None if the data stay as they are; start,
+    until: s of the data that are taken.
+    """
 
     machine: str
     experiment: str
@@ -86,7 +92,8 @@ def _map(document: Mapping[str, Any]) -> Map:
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
         raise RigtwinError(
-            'machine is missing; expected the name that its description has, such as machine = "emps"'
+            "machine is missing; expected the name that its description has, "
+            'such as machine = "emps"'
         )
     time = _require_keys(
         "[time]",
@@ -104,7 +111,8 @@ def _map(document: Mapping[str, Any]) -> Map:
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:
         raise RigtwinError(
-            '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", unit = "mm" }'
+            '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", '
+            'unit = "mm" }'
         )
     found = {_channel(name): _source(name, table) for name, table in channels.items()}
     controller = document.get("controller", {})
@@ -113,16 +121,16 @@ def _map(document: Mapping[str, Any]) -> Map:
     ):
         raise RigtwinError("[controller]: expected a table of settings")
     return Map(
-        machine,
-        str(document.get("experiment", "")),
-        str(time["column"]) if "column" in time else None,
-        str(time["unit"]) if "unit" in time else None,
-        period,
-        resample,
-        _number("[time] start", time.get("start", 0.0)),
-        _number("[time] until", time.get("until", 1e12)),
-        found,
-        dict(controller),
+        machine=machine,
+        experiment=str(document.get("experiment", "")),
+        time=str(time["column"]) if "column" in time else None,
+        time_unit=str(time["unit"]) if "unit" in time else None,
+        period=period,
+        resample=resample,
+        start=_number("[time] start", time.get("start", 0.0)),
+        until=_number("[time] until", time.get("until", 1e12)),
+        channels=found,
+        controller=dict(controller),
     )
 
 
@@ -147,10 +155,10 @@ def _source(name: str, given: object) -> Source:
     if scale == 0.0:
         raise RigtwinError(f"{where} scale = 0: expected anything else")
     return Source(
-        str(table.get("column", "")),
-        str(table["unit"]) if "unit" in table else None,
-        scale,
-        _number(f"{where} offset", table.get("offset", 0.0)),
-        float(sign),
-        _number(f"{where} constant", table["constant"]) if "constant" in table else None,
+        column=str(table.get("column", "")),
+        unit=str(table["unit"]) if "unit" in table else None,
+        scale=scale,
+        offset=_number(f"{where} offset", table.get("offset", 0.0)),
+        sign=float(sign),
+        constant=_number(f"{where} constant", table["constant"]) if "constant" in table else None,
     )

@@ -1,4 +1,7 @@
-"""Columns of numbers out of other programs' files: CSV however it was written, MATLAB v5 and v7.3, parquet."""
+"""Columns of numbers out of other programs' files.
+
+CSV however it was written, MATLAB v5 and v7.3, parquet.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,11 @@ HEADER = 400
 
 @dataclass(frozen=True)
 class Columns:
-    """values: name → numbers, not a number where a cell held none; units: name → as the file says; form: how it was read, for
-    people."""
+    """values.
+
+    Name → numbers, not a number where a cell held none; units: name → as the file says; form: how
+    it was read, for people.
+    """
 
     values: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=dict)
@@ -47,7 +53,10 @@ class Layout:
 
 
 def read(path: Path) -> Columns:
-    """All columns of a file; its kind follows the name's ending. Raises RigtwinError saying what is wrong and where."""
+    """All columns of a file; its kind follows the name's ending.
+
+    Raises RigtwinError saying what is wrong and where.
+    """
     readers = {
         ".csv": _text,
         ".txt": _text,
@@ -283,7 +292,10 @@ def _matlab(path: Path) -> Columns:
 
 
 def _flatten(name: str, value: Any) -> dict[str, Array]:
-    """Columns of a variable: a vector, a matrix's columns as name:1, name:2, …, a structure's fields as name.field."""
+    """Columns of a variable.
+
+    A vector, a matrix's columns as name:1, name:2, …, a structure's fields as name.field.
+    """
     if hasattr(value, "_fieldnames"):
         found: dict[str, Array] = {}
         for each in value._fieldnames:

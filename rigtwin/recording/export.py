@@ -13,7 +13,10 @@ from rigtwin.recording.reader import Recording
 
 
 def export(recording: Recording, path: Path) -> None:
-    """Writes every channel; the kind follows the name's ending, .csv or .mat. Raises RigtwinError for any other."""
+    """Writes every channel; the kind follows the name's ending, .csv or .mat.
+
+    Raises RigtwinError for any other.
+    """
     writers = {".csv": _csv, ".mat": _mat}
     if path.suffix.lower() not in writers:
         raise RigtwinError(

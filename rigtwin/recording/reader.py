@@ -1,4 +1,7 @@
-"""Reads recordings, whoever wrote them: JSON or protobuf messages, whole files or what is left of them."""
+"""Reads recordings, whoever wrote them.
+
+JSON or protobuf messages, whole files or what is left of them.
+"""
 
 from __future__ import annotations
 
@@ -54,9 +57,10 @@ _DAMAGE = (
 class Recording:
     """One test as recorded.
 
-    columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since the start, shape (ticks,).
-    controller: the operator's settings, empty if the recording does not say. notes: what is wrong or missing, for people.
-    transitions: of a supervised session, in order; lateness: of a loop in real time.
+    columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since
+    the start, shape (ticks,). controller: the operator's settings, empty if the recording does not
+    say. notes: what is wrong or missing, for people. transitions: of a supervised session, in
+    order; lateness: of a loop in real time.
     """
 
     path: Path
@@ -77,7 +81,10 @@ class Recording:
         return len(self.time)
 
     def __getitem__(self, channel: str) -> Array:
-        """One channel by `/topic.field`, such as `/sensor.load_cell`. Raises RigtwinError if it is missing."""
+        """One channel by `/topic.field`, such as `/sensor.load_cell`.
+
+        Raises RigtwinError if it is missing.
+        """
         topic, _, name = channel.partition(".")
         return self.column(topic, name)
 
@@ -119,7 +126,10 @@ class Recording:
 
 
 def load(path: Path) -> Recording:
-    """Reads a recording. Raises RigtwinError if it is none, is empty, or is of a format this version does not read."""
+    """Reads a recording.
+
+    Raises RigtwinError if it is none, is empty, or is of a format this version does not read.
+    """
     metadata: dict[str, dict[str, str]] = {}
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -168,7 +178,8 @@ def load(path: Path) -> Recording:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
         if max(times) >= 2**63:
             raise RigtwinError(
-                f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start"
+                f"{path}: a message on {channel.topic} has time {max(times)} ns; "
+                "expected ns since the start"
             )
         values = _decode(path, channel, schemas.get(channel.schema_id), data)
         tables[channel.topic] = (np.array(times, np.int64), values)
@@ -182,7 +193,8 @@ def load(path: Path) -> Recording:
     time, columns = _align(tables, notes)
     if not len(time):
         raise RigtwinError(
-            f"{path}: {' and '.join(tables)} have no tick in common; expected the same times on each"
+            f"{path}: {' and '.join(tables)} have no tick in common; "
+            "expected the same times on each"
         )
     _look_at_times(path, time, period, notes)
     if notes and "cut off" in notes[0]:
@@ -204,7 +216,10 @@ def load(path: Path) -> Recording:
 
 
 def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
-    """Those of a supervised session, in order, even of a recording that ended before its test began. Raises RigtwinError."""
+    """Reads a supervised session's transitions, even if it ended before its test began.
+
+    Raises RigtwinError.
+    """
     found: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
@@ -219,7 +234,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
 
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
-    """On a full disk the last ones stand where room had been kept for them, near the beginning of the file."""
+    """By time: on a full disk the last ones stand in the room kept near the file's beginning."""
     return tuple(sorted(transitions, key=_moment))
 
 
@@ -284,7 +299,8 @@ def _decode(
                 return {name: fields["value"][:, present.index(name)].copy() for name in ours}
     else:
         raise RigtwinError(
-            f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; expected json or protobuf"
+            f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; "
+            "expected json or protobuf"
         )
     rows: list[Mapping[str, Any]] = []
     for number, item in enumerate(data):
@@ -294,7 +310,8 @@ def _decode(
             row = None
         if not isinstance(row, Mapping):
             raise RigtwinError(
-                f"{path}: message {number} on {channel.topic} cannot be read; expected an object of numbers"
+                f"{path}: message {number} on {channel.topic} cannot be read; "
+                "expected an object of numbers"
             )
         rows.append(row)
     ours = [name for name in names if any(name in row for row in rows)]
@@ -366,7 +383,8 @@ def _align(
         keep = first[np.isin(times[first], common)]
         if len(keep) < len(times):
             notes.append(
-                f"{len(times) - len(keep)} messages on {topic} left out: repeated, or without their like on another topic"
+                f"{len(times) - len(keep)} messages on {topic} left out: repeated, "
+                "or without their like on another topic"
             )
         columns[topic] = {name: column[keep] for name, column in values.items()}
     return common * 1e-9, columns
@@ -381,5 +399,6 @@ def _look_at_times(path: Path, time: Array, period: float, notes: list[str]) -> 
     gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
     if len(gaps):
         notes.append(
-            f"{len(gaps)} gaps in time, the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s"
+            f"{len(gaps)} gaps in time, "
+            f"the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s"
         )

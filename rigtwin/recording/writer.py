@@ -1,7 +1,10 @@
-"""Writes a recording block by block; what a block holds is on its way to the disk when `append` returns.
+"""Writes a recording block by block.
 
-The mcap package's own writer takes one message at a time, which costs half as much as simulating the test. Here a block's
-messages are laid out at once by numpy; every record around them is the mcap package's.
+What a block holds is on its way to the disk when `append` returns.
+
+The mcap package's own writer takes one message at a time, which costs half as much as simulating
+the test. Here a block's messages are laid out at once by numpy; every record around them is the
+mcap package's.
 """
 
 from __future__ import annotations
@@ -84,9 +87,12 @@ def twin_values(
 
 
 class Writer:
-    """A recording in the making. Use as a context manager; leaving it finishes the file, also after an exception.
+    """A recording in the making.
 
-    A process that dies without leaving it (kill -9, power) loses at most the block it was about to append.
+    Use as a context manager; leaving it finishes the file, also after an exception.
+
+    A process that dies without leaving it (kill -9, power) loses at most the block it was about to
+    append.
     """
 
     def __init__(
@@ -98,8 +104,11 @@ class Writer:
         machine: str = SUSPENSION_RIG,
         fields: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
-        """period in s; controller: the operator's settings as `config.controller` holds them; fields: of each topic, by default
-        those of the channel table. Raises RigtwinError."""
+        """period in s.
+
+        Controller: the operator's settings as `config.controller` holds them; fields: of each
+        topic, by default those of the channel table. Raises RigtwinError.
+        """
         self._fields = dict(fields or {})
         try:
             self._file: BinaryIO = path.open("wb", buffering=0)
@@ -137,7 +146,10 @@ class Writer:
         self.add_metadata(TWIN_RECORD, twin_values(seed, parameters, effects, version))
 
     def reserve(self) -> None:
-        """Keeps room in the file for what has to be said when the disk is full: metadata that still fits is put there."""
+        """Keeps room in the file for what has to be said when the disk is full.
+
+        Metadata that still fits is put there.
+        """
         place = self._offset
         self.add_metadata(_RESERVE, {"": " " * _RESERVED})
         self._room = (place, self._offset)
@@ -152,7 +164,10 @@ class Writer:
         self._put(record)
 
     def append(self, **topics: Array | None) -> None:
-        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields). None is left out."""
+        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields).
+
+        None is left out.
+        """
         ticks = next((len(values) for values in topics.values() if values is not None), 0)
         self.append_at(np.arange(self._next, self._next + ticks), topics)
 
@@ -172,8 +187,11 @@ class Writer:
         )
 
     def append_beside(self, topic: str, values: Array, times: Array) -> None:
-        """Adds messages on a topic that has ticks of its own, such as those before the test begins. values: shape (messages,
-        fields); times: s since the start of the test, rising, shape (messages,); what was before it is put at its start."""
+        """Adds messages on a topic that has ticks of its own, such as those before the test begins.
+
+        values: shape (messages, fields); times: s since the start of the test, rising, shape
+        (messages,); what was before it is put at its start.
+        """
         if topic not in self._topics:
             self._register(topic)
         if len(values):
@@ -207,7 +225,10 @@ class Writer:
         self._put_chunk(messages, times)
 
     def finish(self, reason: str) -> None:
-        """Says why the test ended, writes the index, closes the file. Does nothing the second time."""
+        """Says why the test ended, writes the index, closes the file.
+
+        Does nothing the second time.
+        """
         if self._file.closed:
             return
         if self._full:

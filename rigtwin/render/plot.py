@@ -95,7 +95,10 @@ PANELS = (
 
 
 def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
-    """A panel for every channel name of another machine: what was commanded and what was sensed under one name together."""
+    """A panel for every channel name of another machine.
+
+    What was commanded and what was sensed under one name together.
+    """
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
     return tuple(
@@ -125,7 +128,10 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
 
 
 def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
-    """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
+    """Draws the recording into a png, svg or pdf file.
+
+    Raises RigtwinError for another ending or an empty stretch.
+    """
     check_ending(out)
     ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]

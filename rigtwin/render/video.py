@@ -1,4 +1,7 @@
-"""Films a recording offscreen: the rig in motion, and its force and travel drawn beneath with a line that marks the time."""
+"""Films a recording offscreen.
+
+The rig in motion, and its force and travel drawn beneath with a line that marks the time.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,8 @@ BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 SMOOTHING = 20.0
 """Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
 NO_RENDERING = (
-    "cannot render without a display; on Debian or Ubuntu: sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
+    "cannot render without a display; on Debian or Ubuntu: "
+    "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
     "elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
 )
 
@@ -54,10 +58,11 @@ def film(
     magnify: float = 1.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> None:
-    """Films the stretch from `start` to `until` (s) in real time, 30 frames a second, into an mp4 file.
+    """Films the stretch from `start` to `until` (s) in real time into an mp4 file.
 
-    magnify: how many times as large motions are drawn. progress is called with (frames done, frames in all). Raises
-    RigtwinError if the file's ending, the camera, the stretch or this machine's rendering is at fault.
+    magnify: how many times as large motions are drawn. progress is called with (frames done,
+    frames in all). Raises RigtwinError if the file's ending, the camera, the stretch or this
+    machine's rendering is at fault.
     """
     if out.suffix.lower() != ".mp4":
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
@@ -112,7 +117,7 @@ def film(
 
 
 def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
-    """Joint → position at every tick, m or rad, from what was recorded alone, so that any recording can be filmed."""
+    """Joint → position at every tick, m or rad, from what was recorded alone."""
     if machine.structure is Structure.QUARTER_CAR:
         structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
         travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
@@ -183,7 +188,10 @@ def _smooth(signal: Array, period: float) -> Array:
 
 
 def _context() -> Any:
-    """An offscreen GL context: of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere."""
+    """An offscreen GL context.
+
+    Of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere.
+    """
     kind = os.environ.get("MUJOCO_GL", "").strip().lower() or (
         "egl" if sys.platform == "linux" else "glfw"
     )
@@ -199,7 +207,7 @@ def _context() -> Any:
 def _renderer(
     machine: Machine, camera: str | None
 ) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
-    """A function from joint positions, and the beams' heights over their centre where there are any, to a picture."""
+    """A function from joint positions, and the beams' heights if there are any, to a picture."""
     quarter_car = machine.structure is Structure.QUARTER_CAR
     model = mujoco.MjModel.from_xml_path(str(SCENE if quarter_car else machine.model))
     cameras = [model.camera(number).name for number in range(model.ncam)]
@@ -239,9 +247,12 @@ def _renderer(
         context.free()
 
 
-def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
-    """Adds the cross of beams to a scene, its centre at the plate; its arms are drawn across the rig and far shorter than they
-    are, what they do along it in full size."""
+def _draw_beams(scene: mujoco.MjvScene, plate: Array, bent: Array) -> None:
+    """Adds the cross of beams to a scene, its centre at the plate.
+
+    Its arms are drawn across the rig and far shorter than they are, what they do along it in full
+    size.
+    """
     for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
         points = [
             plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm)

@@ -1,4 +1,7 @@
-"""Noise estimated from the data: the white part of a signal, the mains line, and the motion beneath a noisy sensor."""
+"""Noise estimated from the data.
+
+The white part of a signal, the mains line, and the motion beneath a noisy sensor.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,9 @@ HIGHEST_MOTION = 200.0
 def white_noise(signal: Array) -> float:
     """Standard deviation of a signal's white noise.
 
-    From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz, and their median, which
-    ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse bits make most of them zero, their rms is taken.
+    From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz,
+    and their median, which ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse
+    bits make most of them zero, their rms is taken.
     """
     third = np.diff(signal, 3)
     typical = float(np.median(np.abs(third))) / NORMAL_MEDIAN
@@ -38,7 +42,10 @@ def white_noise(signal: Array) -> float:
 
 
 def smallest_step(signal: Array) -> float:
-    """The signal's bit: the smallest difference of two of its values, rounding apart; 0 if it shows none."""
+    """The signal's bit.
+
+    The smallest difference of two of its values, rounding apart; 0 if it shows none.
+    """
     values = np.unique(signal)
     steps = np.diff(values)
     steps = steps[steps > 1e-9 * max(float(np.ptp(signal)), 1e-300)]
@@ -56,7 +63,10 @@ def rms(signal: Array) -> float:
 
 
 def remove_mains(signal: Array, period: float, frequency: float) -> Array:
-    """The signal less its mains line; its mean stays. The line is looked for within ±0.5 Hz of `frequency` (Hz)."""
+    """The signal less its mains line; its mean stays.
+
+    The line is looked for within ±0.5 Hz of `frequency` (Hz).
+    """
     count = len(signal)
     time = np.arange(count) * period
     centred = signal - np.mean(signal)
@@ -96,7 +106,10 @@ def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
 
 
 def band(signal: Array, period: float) -> tuple[float, float]:
-    """The band in Hz that holds the middle 80 % of the signal's power, mean included; (0, 0) for no signal."""
+    """The band in Hz that holds the middle 80 % of the signal's power, mean included.
+
+    (0, 0) for no signal.
+    """
     frequencies, density = spectrum(signal, period)
     if not density.any():
         return 0.0, 0.0
@@ -107,20 +120,26 @@ def band(signal: Array, period: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class EstimatedMotion:
-    """An estimated motion. position: shape (ticks,); correction: what of it is not as expected; velocity_error: standard
-    deviation of its rate of change, unit/s."""
+    """An estimated motion.
+
+    position: shape (ticks,); correction: what of it is not as expected; velocity_error: standard
+    deviation of its rate of change, unit/s.
+    """
 
     position: Array
     correction: Array
     velocity_error: float
 
 
-def estimate_motion(measured: Array, expected: Array, period: float, mains: float) -> EstimatedMotion:
+def estimate_motion(
+    measured: Array, expected: Array, period: float, mains: float
+) -> EstimatedMotion:
     """The motion beneath a noisy measurement, given what a model expects of it.
 
-    Where measured − expected is noise, the expectation is the better estimate of the motion, plus a constant offset. What
-    stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum at every frequency: of all linear estimates the
-    one with the least error, in position and in velocity.
+    Where measured − expected is noise, the expectation is the better estimate of the motion, plus
+    a constant offset. What stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum
+    at every frequency: of all linear estimates the one with the least error, in position and in
+    velocity.
     """
     difference = remove_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
@@ -144,8 +163,12 @@ def estimate_motion(measured: Array, expected: Array, period: float, mains: floa
 
 
 def smooth(signal: Array, period: float) -> tuple[Array, float]:
-    """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left.
-    Where it stays within that error it is taken to rest."""
+    """Smooths a measured motion; gives it and the standard deviation of the error left.
+
+    What is not to be told from its white noise is left out.
+
+    Where it stays within that error it is taken to rest.
+    """
     noise = white_noise(signal)
     count = len(signal)
     line = signal[0] + (signal[-1] - signal[0]) * np.arange(count) / max(count - 1, 1)
@@ -176,8 +199,11 @@ def _straighten_rests(motion: Array, error: float, window: int) -> Array:
 
 
 def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
-    """1 − noise/density up to the highest frequency below which the density, averaged over a fifth of an octave or nine
-    lines, stands out of the noise density; 0 above."""
+    """Gives the gain of a Wiener filter: 1 − noise/density where there is motion, 0 above.
+
+    Motion goes up to the highest frequency at which the density, averaged over a fifth of an octave
+    or nine lines, stands out of the noise's density.
+    """
     smooth = np.empty_like(density)
     for line in range(len(density)):
         half = max(4, line // 10)

@@ -23,7 +23,7 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
 
 
 def find_cut_off(signal: Array) -> np.ndarray:
-    """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
+    """Finds where a sensor is cut off at an end of its range, shape (ticks,)."""
     found = np.zeros(len(signal), bool)
     if white_noise(signal) >= smallest_step(signal):
         # Bits coarser than the noise stand still at rest too.

@@ -1,4 +1,7 @@
-"""The running plant: MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code."""
+"""The running plant.
+
+MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +31,16 @@ from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
 
 YIELDING = 5e-3
-"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
+"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no
+common solution."""
 
 
 class Contacts(NamedTuple):
-    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape (1,) each; yielded: of
-    the ground and structure plate under load, m, shape (2,)."""
+    """What changes with the motion in the mechanics, and its states.
+
+    gaps: of the backlashes, shape (1,) each; yielded: of the ground and structure plate under
+    load, m, shape (2,).
+    """
 
     changing: bool
     rail: Friction
@@ -54,8 +61,11 @@ class Contacts(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """All that compiled code needs to run one plant. plain: whether its commands act as they are and its contacts do not
-    change with the motion, as in the nominal rig."""
+    """All that compiled code needs to run one plant.
+
+    plain: whether its commands act as they are and its contacts do not change with the motion, as
+    in the nominal rig.
+    """
 
     mechanics: Handles
     substeps: int
@@ -79,32 +89,39 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
     forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
     return Contacts(
-        rail.changing or motor.changing or any(forces),
-        rail,
-        gap_at(carriage),
-        motor,
-        gap_at(travel),
-        plant.motor.cogging,
-        plant.motor.cogging_pitch,
-        plant.motor.cogging_phase,
-        tyre.stiffness,
-        tyre.damping,
-        tyre.hardening,
-        tyre.hardening_power,
-        *compliances,
-        plant.gas_spring,
-        np.zeros(2),
+        changing=rail.changing or motor.changing or any(forces),
+        rail=rail,
+        rail_gap=gap_at(carriage),
+        motor=motor,
+        motor_gap=gap_at(travel),
+        cogging=plant.motor.cogging,
+        cogging_pitch=plant.motor.cogging_pitch,
+        cogging_phase=plant.motor.cogging_phase,
+        stiffness=tyre.stiffness,
+        damping=tyre.damping,
+        hardening=tyre.hardening,
+        hardening_power=tyre.hardening_power,
+        ground_compliance=compliances[0],
+        structure_compliance=compliances[1],
+        gas=plant.gas_spring,
+        yielded=np.zeros(2),
     )
 
 
 def start_deflection(plant: RigPlant, preload: float) -> float:
-    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
+    """The tyre's deflection at the start, m.
+
+    It carries the motor's preload (N) and the extended gas spring.
+    """
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 class Simulation:
-    """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
-    at rest. Owns the MuJoCo structures that `state` looks into."""
+    """One plant at its start.
+
+    Ground at its first command, spring uncompressed, tyre and motor carrying the preload, all at
+    rest. Owns the MuJoCo structures that `state` looks into.
+    """
 
     def __init__(
         self,
@@ -115,7 +132,10 @@ class Simulation:
         structure: float,
         preload: float,
     ) -> None:
-        """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
+        """timestep s.
+
+        Ground and structure: commands at the start, m; preload: motor force at the start, N.
+        """
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
@@ -136,20 +156,20 @@ class Simulation:
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
         self.state = PlantState(
-            view,
-            substeps,
-            not touching.changing and all(each.neutral for each in drives),
-            sampled(plant.ground_cylinder, timestep),
-            settled(plant.ground_cylinder, here),
-            drives[0],
-            held[0],
-            sampled(plant.structure_cylinder, timestep),
-            settled(plant.structure_cylinder, carriage),
-            drives[1],
-            held[1],
-            drives[2],
-            held[2],
-            touching,
+            mechanics=view,
+            substeps=substeps,
+            plain=not touching.changing and all(each.neutral for each in drives),
+            ground=sampled(plant.ground_cylinder, timestep),
+            ground_state=settled(plant.ground_cylinder, here),
+            ground_drive=drives[0],
+            ground_command=held[0],
+            structure=sampled(plant.structure_cylinder, timestep),
+            structure_state=settled(plant.structure_cylinder, carriage),
+            structure_drive=drives[1],
+            structure_command=held[1],
+            motor_drive=drives[2],
+            motor_command=held[2],
+            contacts=touching,
         )
 
 
@@ -184,7 +204,10 @@ def stiffening(now: Contacts, deflection: float) -> float:
 
 @compilable
 def touch(mechanics: Handles, now: Contacts) -> None:
-    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
+    """Writes into the mechanics what depends on the motion.
+
+    Dry friction, cogging, the tyre's slope.
+    """
     if not now.changing:
         return
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
@@ -231,8 +254,9 @@ def true_measurements(mechanics: Handles) -> Measurements:
 def sense(state: PlantState) -> Measurements:
     """Ideal measurements now, under the commands held until now.
 
-    The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
-    that accelerates the carriage with the plate, which a velocity one timestep old would not show.
+    The plates move over the coming timestep as those commands would move them: a motor that sticks
+    passes on the force that accelerates the carriage with the plate, which a velocity one timestep
+    old would not show.
     """
     mechanics, yielded = state.mechanics, state.contacts.yielded
     ground, structure = (
@@ -309,7 +333,10 @@ def advance_plain(
     structure_command: float,
     voltage: float,
 ) -> None:
-    """The same for a plant whose commands act as they are and whose contacts do not change: a third faster."""
+    """The same for a plant whose commands act as they are and whose contacts do not change.
+
+    A third faster.
+    """
     mechanics.control[0] = voltage
     for _ in range(substeps):
         ground_here, structure_here = ground_state.position[0], structure_state.position[0]

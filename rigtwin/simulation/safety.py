@@ -1,8 +1,9 @@
-"""Limits: what ends a test at once. Looks at raw measurements and at commands before they are written, on twin and rig
-alike.
+"""Limits: what ends a test at once.
 
-A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled loop and the rig's loop
-call the same one.
+Looks at raw measurements and at commands before they are written, on twin and rig alike.
+
+A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled
+loop and the rig's loop call the same one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ MOTOR_LAG = RigPlant().motor.time_constant
 LEADING = 1.5
 """Times its cylinder's limit that a command may be."""
 VELOCITY_SPAN = 10
-"""Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
+"""Ticks over which a velocity is averaged before it is held against its limit: noise of single
+samples is no motion."""
 
 
 class Trip(IntEnum):
@@ -67,10 +69,14 @@ class Trip(IntEnum):
 
 
 class LimitMemory(NamedTuple):
-    """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
-    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
-    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place. Arrays for
-    compiled loops; lists, which Python reads faster, for others."""
+    """What the limits remember.
+
+    measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
+    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples
+    and its place, shape (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now,
+    N, shape (1,). Changed in place. Arrays for compiled loops; lists, which Python reads faster,
+    for others.
+    """
 
     measured: Array | list[float]
     repeats: Array | list[float]
@@ -82,7 +88,9 @@ class LimitMemory(NamedTuple):
 def empty_memory() -> LimitMemory:
     """Before the first tick, for a loop in Python."""
     unknown = [math.nan]
-    return LimitMemory(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
+    return LimitMemory(
+        4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown
+    )
 
 
 def empty_memory_arrays() -> LimitMemory:
@@ -94,7 +102,10 @@ def empty_memory_arrays() -> LimitMemory:
 def judge_measurements(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements
 ) -> tuple[int, int]:
-    """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
+    """Finds the first limit that the measurements violate.
+
+    A Trip's number, and the column of Measurements.
+    """
     for column in range(4):
         if not math.isfinite(measured[column]):
             return _NOT_A_NUMBER, column
@@ -124,7 +135,8 @@ def judge_measurements(
         return _GROUND, 0
     if moved > limits.velocity * VELOCITY_SPAN * period:
         return _VELOCITY, 2
-    # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
+    # What two sensors or a command say of the same thing: the wheel stands on the ground plate,
+    # the motor pushes as told.
     if (
         abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt)
         > limits.wheel
@@ -139,8 +151,10 @@ def judge_measurements(
 def judge_commands(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
-    are remembered as written."""
+    """Finds the first limit that the commands violate: a Trip's number, and 4 + column of Commands.
+
+    Commands that pass are remembered as written.
+    """
     for column in range(4):
         if not math.isfinite(commands[column]):
             return _NOT_A_NUMBER, 4 + column
@@ -171,7 +185,24 @@ def judge_commands(
 def judge_limits(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
+    """Judges one tick.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        What was seen before; changed in place.
+    measured, commands
+        Of this tick; commands before they are written.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+    """
     trip, column = judge_measurements(limits, period, memory, measured)
     if trip == _NONE:
         trip, column = judge_commands(limits, period, memory, measured, commands)
@@ -179,7 +210,10 @@ def judge_limits(
 
 
 def stop_state(limits: Safety, commands: Commands) -> Commands:
-    """The stop state after commands: no force, cylinders where they were told to be, but not beyond their limits."""
+    """The stop state after commands.
+
+    No force, cylinders where they were told to be, but not beyond their limits.
+    """
     ground = min(max(commands.ground, -limits.ground), limits.ground)
     structure = min(max(commands.structure, -limits.structure), limits.structure)
     return Commands(ground, structure, 0.0, 0.0)
@@ -195,8 +229,10 @@ def is_beyond(limits: Safety, measured: Measurements) -> bool:
 
 
 def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
-    """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
-    hysteresis."""
+    """Why the rig may not be armed as it stands, or None.
+
+    After a trip everything must be back inside its limit by the hysteresis.
+    """
     share = 1.0 - limits.hysteresis
     for name, limit in zip(
         Measurements._fields,
@@ -223,11 +259,15 @@ def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
         Trip.NOT_A_NUMBER: f"trip: {name} is not a finite number",
         Trip.GROUND: f"trip: |ground_lvdt| above {limits.ground:g} m",
         Trip.VELOCITY: f"trip: suspension_lvdt moves faster than {limits.velocity:g} m/s",
-        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: sensor or cable",
-        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
+        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: "
+        "sensor or cable",
+        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: "
+        "sensor stuck or cable off",
         Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
         Trip.COMMAND: f"trip: {name} is beyond its limit",
-        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground plate: one of them is wrong",
-        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
+        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground "
+        "plate: one of them is wrong",
+        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's "
+        "voltage: sensor or amplifier",
         Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
     }[trip]

@@ -1,4 +1,7 @@
-"""Finds out what a channel table must say: zero, span, and which way each signal goes. Writes it down with date and name."""
+"""Finds out what a channel table must say: zero, span, and which way each signal goes.
+
+Writes it down with date and name.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,10 @@ class Still:
 
 
 def measure_rest(rig: DrivenRig, ticks: int = LOOKED) -> tuple[Still, ...]:
-    """Every input while nothing moves. The rig must have been started; no output is written. Raises RigtwinError."""
+    """Every input while nothing moves.
+
+    The rig must have been started; no output is written. Raises RigtwinError.
+    """
     values = np.array([rig.read() for _ in range(ticks)])
     return tuple(
         Still(name, float(np.mean(column)), float(np.std(column)), _count_repeats(column))
@@ -51,7 +57,22 @@ def _count_repeats(column: Array) -> int:
 def set_zeros(
     table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
 ) -> ChannelTable:
-    """The table whose inputs read their references (zero where none is given) as the rig now stands."""
+    """Sets the inputs' zeros.
+
+    Parameters
+    ----------
+    table : ChannelTable
+        As it was.
+    still : tuple of Still
+        The inputs as the rig now stands.
+    references : mapping
+        Input → what it is to read, in its unit; zero where none is given.
+
+    Returns
+    -------
+    ChannelTable
+        With other offsets.
+    """
     lines = [
         _rescale(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
         for line, signal in zip(table.inputs, still, strict=True)
@@ -62,8 +83,10 @@ def set_zeros(
 def set_spans(
     table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
 ) -> ChannelTable:
-    """The table whose named inputs, which read true at zero, read their references as the rig now stands. Raises RigtwinError
-    for a reference too close to zero."""
+    """Sets the spans of inputs that read true at zero, by their references as the rig now stands.
+
+    Raises RigtwinError for a reference too close to zero.
+    """
     lines = []
     for line, signal in zip(table.inputs, still, strict=True):
         if line.name in references:
@@ -74,12 +97,14 @@ def set_spans(
             )
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(
-                    f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, which is noise; place it at its reference"
+                    f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, which is noise; "
+                    "place it at its reference"
                 )
             factor = wanted / moved
             if factor <= 0.0:
                 raise RigtwinError(
-                    f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, the wrong way; check signs first"
+                    f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, the wrong way; "
+                    "check signs first"
                 )
             line = _rescale(line, scale=line.scaling.scale * factor)
         lines.append(line)
@@ -91,8 +116,11 @@ def _rescale(line: Line, **changes: float) -> Line:
 
 
 def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Array]:
-    """A session that moves one output after the other a little and back: the ground and the structure by `stroke`, m, then the
-    motor by `force`, N, without feedback. Returns configuration and demands, shape (ticks, 3)."""
+    """A session that moves one output after the other a little and back.
+
+    The ground and the structure by `stroke`, m, then the motor by `force`, N, without feedback.
+    Returns configuration and demands, shape (ticks, 3).
+    """
     ticks = round(BUMP / period)
     bump = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(ticks) / ticks)
     demands = np.zeros((3 * ticks, 3))
@@ -105,7 +133,20 @@ def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuratio
 
 
 def fit_responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, float]]:
-    """Output → (input that must follow it, its gain on the demand, standard error of that), from a session of `bumps`."""
+    """Fits how the inputs answer the outputs in a session of `plan_bumps`.
+
+    Parameters
+    ----------
+    measured : Array
+        Columns of controllers.Measurements, shape (ticks, 4).
+    demands : Array
+        Of that session, shape (ticks, 3).
+
+    Returns
+    -------
+    dict
+        Output → input that must follow it, its gain on the demand, the gain's standard error.
+    """
     ticks = len(demands) // 3
     found: dict[str, tuple[str, float, float]] = {}
     for column, (output, sensor) in enumerate(FOLLOWS.items()):
@@ -123,7 +164,8 @@ def fit_responses(measured: Array, demands: Array) -> dict[str, tuple[str, float
 
 
 FOLLOWS = {"ground": "ground_lvdt", "structure": "structure_lvdt", "voltage": "load_cell"}
-"""Which input each output moves; the suspension's travel follows the structure while the rail holds the carriage."""
+"""Which input each output moves; the suspension's travel follows the structure while the rail
+holds the carriage."""
 
 
 def _fit_gain(asked: Array, read: Array) -> tuple[float, float]:
@@ -137,16 +179,19 @@ def _fit_gain(asked: Array, read: Array) -> tuple[float, float]:
 def correct_signs(
     table: ChannelTable, found: Mapping[str, tuple[str, float, float]], moved: Mapping[str, int]
 ) -> tuple[ChannelTable, tuple[str, ...]]:
-    """The table with every sign as it must be, all of them checked, and what was changed. moved: output → 1 if the operator saw
-    it go the way of its command's sign, else −1; the voltage's is that of the force on the plate. Raises RigtwinError where a
-    signal hardly answers."""
+    """The table with every sign as it must be, all of them checked, and what was changed.
+
+    moved: output → 1 if the operator saw it go the way of its command's sign, else −1; the
+    voltage's is that of the force on the plate. Raises RigtwinError where a signal hardly answers.
+    """
     inputs = {line.name: line for line in table.inputs}
     outputs = {line.name: line for line in table.outputs}
     said: list[str] = []
     for output, (sensor, gain, error) in found.items():
         if abs(gain) < max(0.2, STEADY * error):
             raise RigtwinError(
-                f"sign of {sensor}: it hardly answers (gain {gain:.2g} ± {error:.1g}); is it connected, has the rig pressure?"
+                f"sign of {sensor}: it hardly answers (gain {gain:.2g} ± {error:.1g}); "
+                "is it connected, has the rig pressure?"
             )
         driven = "structure" if output == "travel" else output
         went = moved[driven]

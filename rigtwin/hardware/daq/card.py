@@ -1,4 +1,7 @@
-"""A rig behind an NI card, through the nidaqmx package: the driver of this computer, or a gRPC device server."""
+"""A rig behind an NI card, through the nidaqmx package.
+
+The driver of this computer, or a gRPC device server.
+"""
 
 from __future__ import annotations
 
@@ -48,12 +51,13 @@ def translate_errors(doing: str) -> Iterator[None]:
     except (AssertionError, ValueError, TypeError) as error:
         # The client's own checks of what a card has answered.
         raise CardFault(
-            f"{doing}: it answered what the driver's client does not take: {error or type(error).__name__}"
+            f"{doing}: it answered what the driver's client does not take: "
+            f"{error or type(error).__name__}"
         ) from None
 
 
 def require_client() -> None:
-    """Raises CardFault unless the driver's client is installed, with what it needs to speak to a virtual card."""
+    """Raises CardFault unless the driver's client is installed, with what a virtual card needs."""
     try:
         import grpc  # noqa: F401
         import nidaqmx  # noqa: F401
@@ -62,13 +66,17 @@ def require_client() -> None:
 
 
 def connect(address: str) -> grpc.Channel | None:
-    """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
+    """The connection to a gRPC device server, or None for this computer's driver.
+
+    Raises CardFault.
+    """
     require_client()
     if not address:
         return None
     import grpc
 
-    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have no end of their own.
+    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have
+    # no end of their own.
     alive = (
         ("grpc.keepalive_time_ms", 1000),
         ("grpc.keepalive_timeout_ms", 1000),
@@ -78,10 +86,13 @@ def connect(address: str) -> grpc.Channel | None:
 
 
 class Card:
-    """A `DrivenRig` on a card. Inputs are clocked by the card where the table says so, else by this computer; outputs act at
+    """A `DrivenRig` on a card.
+
+    Inputs are clocked by the card where the table says so, else by this computer; outputs act at
     once. Nothing moves before `write` or `pressure`.
 
-    missed: ticks whose samples came too late to be answered. late: s by which the last sample was read after it was due.
+    missed: ticks whose samples came too late to be answered. late: s by which the last sample was
+    read after it was due.
     """
 
     def __init__(
@@ -92,8 +103,11 @@ class Card:
         clock: Callable[[], float] = monotonic,
         pacer: Pacer | None = None,
     ) -> None:
-        """period in s; channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer: waits for the
-        ticks of a card that has no clock of its own."""
+        """period in s.
+
+        Channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer:
+        waits for the ticks of a card that has no clock of its own.
+        """
         self._table, self._period, self._channel = table, period, channel
         # A tick converts seven numbers: handing them to compiled code would take longer.
         self._inputs, self._outputs = (
@@ -106,7 +120,10 @@ class Card:
         self._tasks: list[Any] = []
 
     def inspect(self) -> None:
-        """Looks whether the card is there and has what the table asks of it. Raises CardFault; moves nothing."""
+        """Looks whether the card is there and has what the table asks of it.
+
+        Raises CardFault; moves nothing.
+        """
         from nidaqmx.system import System
 
         table = self._table
@@ -139,7 +156,8 @@ class Card:
                             f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]})
                         )
                         raise CardFault(
-                            f"{group}.{line.name}.range = {line.scaling.range:g} V: {device.product_type} has {known} V"
+                            f"{group}.{line.name}.range = {line.scaling.range:g} V: "
+                            f"{device.product_type} has {known} V"
                         )
 
     def start(self) -> None:
@@ -210,7 +228,8 @@ class Card:
                 self._volts[:] = waiting[:, -1]
             self._count += self.missed
         elif self.late < 0.0:
-            # The card's clock is ahead of the computer's, or the first tick was late: its ticks are the measure.
+            # The card's clock is ahead of the computer's, or the first tick was late: its ticks
+            # are the measure.
             self._start, self.late = now - self._count * self._period, 0.0
         self._count += 1
 
@@ -236,8 +255,11 @@ class Card:
             self._pressure.write_one_sample_one_line(on)
 
     def stop(self) -> None:
-        """Motor to zero, pressure off, the card's lines given back; a card that takes no output any more is reset, which sets
-        them to zero. Never raises: there is nobody left to hear it."""
+        """Motor to zero, pressure off, the card's lines given back.
+
+        A card that takes no output any more is reset, which sets them to zero. Never raises: there
+        is nobody left to hear it.
+        """
         if len(self._tasks) == 3:
             self._asked[2] = self._to_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
             refused = False
@@ -282,7 +304,8 @@ class Card:
             )
         except Exception as error:
             with translate_errors(
-                f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"
+                f"card {self._table.device}: {name} is in use; if by a program that died, "
+                "rigtwin card release"
             ):
                 raise error
         self._tasks.append(task)

@@ -1,4 +1,7 @@
-"""Values to volts and back, and the card's 16 bits in between; the same for client, twin and virtual card."""
+"""Values to volts and back, and the card's 16 bits in between.
+
+The same for client, twin and virtual card.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ CODES = 65536
 
 
 class Conversion(NamedTuple):
-    """Scalings of several lines, each of shape (lines,): factor = sign · scale in unit/V, offset in the unit, range in V."""
+    """Scalings of several lines, each of shape (lines,).
+
+    Factor = sign · scale in unit/V, offset in the unit, range in V.
+    """
 
     factor: Array
     offset: Array

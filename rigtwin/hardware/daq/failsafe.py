@@ -21,8 +21,13 @@ from rigtwin.hardware.daq.table import ChannelTable
 
 
 class LastResort:
-    """On a gRPC device server the owner's outputs are found by their name, which can be done beforehand. A driver on this
-    computer gives them back when it sees that their owner is dead; then they are taken anew."""
+    """Sets a card's outputs to their safe state in place of their owner.
+
+    On a gRPC device server they are found by their name, which can be done beforehand.
+
+    A driver on this computer gives them back when it sees that their owner is dead; then they are
+    taken anew.
+    """
 
     def __init__(self, table: ChannelTable) -> None:
         self._table, self._conversion = table, conversion(table.outputs)
@@ -41,7 +46,10 @@ class LastResort:
                 self._attach()
 
     def force_off(self, positions: Sequence[float]) -> None:
-        """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
+        """Sets the motor to zero force and holds the cylinders at positions, m.
+
+        Raises CardFault.
+        """
         self._values[:2] = positions
         to_volts(self._conversion, self._values, self._volts)
         with translate_errors(f"card {self._table.device}: stopping it"):
@@ -114,8 +122,11 @@ class LastResort:
 
 
 def release(table: ChannelTable) -> bool:
-    """Frees what a program that died has left on a gRPC device server: motor to zero, pressure off, its tasks ended. Returns
-    whether there was anything. Raises CardFault if the outputs could not be set."""
+    """Frees what a program that died has left on a gRPC device server.
+
+    Motor to zero, pressure off, its tasks ended. Returns whether there was anything. Raises
+    CardFault if the outputs could not be set.
+    """
     resort = LastResort(table)
     try:
         resort.prepare()

@@ -1,4 +1,6 @@
-"""The channel table: which signal is on which line of the card, and what a volt means there. One TOML file a card.
+"""The channel table: which signal is on which line of the card, and what a volt means there.
+
+One TOML file a card.
 
 value = sign · scale · volts + offset, in both directions.
 """
@@ -20,10 +22,12 @@ from rigtwin.recording.channels import CHANNELS
 
 Group = TypeVar("Group")
 OUTPUTS = ("ground", "structure", "voltage")
-"""Commands that go to the card, in the order of its writes. The force demanded stays inside the controller."""
+"""Commands that go to the card, in the order of its writes. The force demanded stays inside the
+controller."""
 UNITS = {(channel.topic, channel.name): channel.unit for channel in CHANNELS}
 HEADROOM = 1.05
-"""A signal must be readable this far beyond its limit: one that stops at its limit can never be seen to exceed it."""
+"""A signal must be readable this far beyond its limit: one that stops at its limit can never be
+seen to exceed it."""
 _ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
 _DIGITAL = re.compile(r"port\d/line\d{1,2}")
 _FREE_TEXT = ("device", "address", "timing", "calibrated", "operator", "note")
@@ -40,8 +44,11 @@ class Scaling(NamedTuple):
 
 
 class Plausible(NamedTuple):
-    """What living sensors of one rig cannot do; see rigtwin.simulation.safety. stuck: same readings in a row. Greatest seen on the twin
-    in all experiments: 4 readings, 9.5 mm, 34 N."""
+    """What living sensors of one rig cannot do; see rigtwin.simulation.safety.
+
+    stuck: same readings in a row. Greatest seen on the twin in all experiments: 4 readings, 9.5
+    mm, 34 N.
+    """
 
     stuck: Annotated[
         float, Quantity("tick", 3.0, 1e9, "by chance in none of 1800 simulated tests of 45 s")
@@ -55,8 +62,11 @@ class Plausible(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One signal of the rig. line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen the
-    signal move the way that it should."""
+    """One signal of the rig.
+
+    line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen
+    the signal move the way that it should.
+    """
 
     name: str
     line: str
@@ -72,9 +82,12 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """A card's channel table. inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
-    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty for this computer's
-    driver."""
+    """A card's channel table.
+
+    inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
+    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty
+    for this computer's driver.
+    """
 
     inputs: tuple[Line, ...]
     outputs: tuple[Line, ...]
@@ -96,7 +109,7 @@ class ChannelTable:
         return f"{self.device}/{line}"
 
     def tighten(self, safety: Safety) -> Safety:
-        """The limits with what the card knows of its sensors, or those asked for, if they are closer."""
+        """Gives the limits with what the card knows of its sensors, where that is closer."""
         return safety._replace(
             **{
                 name: min(value, getattr(safety, name))
@@ -111,12 +124,16 @@ def load_table(path: Path) -> ChannelTable:
 
 
 def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
-    """The channel table of TOML's tables. Raises RigtwinError for anything missing, unknown or twice."""
+    """The channel table of TOML's tables.
+
+    Raises RigtwinError for anything missing, unknown or twice.
+    """
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:
         if name not in known:
             raise RigtwinError(
-                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], [outputs.NAME]"
+                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], "
+                "[outputs.NAME]"
             )
     card = tables.get("card", {})
     if not isinstance(card, Mapping):
@@ -131,14 +148,16 @@ def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
     pressure = card.get("pressure", "")
     if not _DIGITAL.fullmatch(pressure):
         raise RigtwinError(
-            f"card.pressure = {pressure!r}: expected the hydraulics' digital line, such as 'port0/line0'"
+            f"card.pressure = {pressure!r}: expected the hydraulics' digital line, "
+            "such as 'port0/line0'"
         )
     timing = card.get("timing", "hardware")
     if timing not in _TIMINGS:
         raise RigtwinError(f"card.timing = {timing!r}: expected {' or '.join(_TIMINGS)}")
     if not re.fullmatch(r"[A-Za-z][\w-]*", card.get("device", "Dev1")):
         raise RigtwinError(
-            f"card.device = {card['device']!r}: expected the driver's name of the card, such as 'Dev1'"
+            f"card.device = {card['device']!r}: expected the driver's name of the card, "
+            "such as 'Dev1'"
         )
     inputs = _lines("inputs", tables.get("inputs", {}), Measurements._fields, "/sensor")
     outputs = _lines("outputs", tables.get("outputs", {}), OUTPUTS, "/command")
@@ -146,7 +165,8 @@ def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
     for line in inputs + outputs:
         if line.line in taken:
             raise RigtwinError(
-                f"{taken[line.line]} and {line.name} are both on line {line.line}; expected a line each"
+                f"{taken[line.line]} and {line.name} are both on line {line.line}; "
+                "expected a line each"
             )
         taken[line.line] = line.name
     texts = {key: card[key] for key in _FREE_TEXT if key in card}
@@ -193,7 +213,8 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
     line = table.get("line")
     if not isinstance(line, str) or not _ANALOG[group].fullmatch(line):
         raise RigtwinError(
-            f"{where}.line = {line!r}: expected one such as {'ai0' if group == 'inputs' else 'ao0'!r}"
+            f"{where}.line = {line!r}: "
+            f"expected one such as {'ai0' if group == 'inputs' else 'ao0'!r}"
         )
     if table.get("unit", unit) != unit:
         raise RigtwinError(
@@ -226,22 +247,29 @@ def require_ranges(table: ChannelTable, safety: Safety) -> None:
         key, limit = limits.get(line.name, ("", 0.0))
         if line.reach < HEADROOM * limit and line.name in Measurements._fields:
             raise RigtwinError(
-                f"range too small for the limit: {line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
-                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, or a smaller limit"
+                "range too small for the limit: "
+                f"{line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
+                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, "
+                "or a smaller limit"
             )
         if line.reach < limit:
             raise RigtwinError(
-                f"range too small for the limit: {line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
+                "range too small for the limit: "
+                f"{line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
                 f"{key} is {limit:g} {line.unit}"
             )
 
 
 def require_trust(table: ChannelTable, today: date) -> None:
-    """Raises RigtwinError unless somebody has calibrated this table and checked every sign: needed to move a real rig."""
+    """Raises RigtwinError unless somebody has calibrated this table and checked every sign.
+
+    Needed to move a real rig.
+    """
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
         raise RigtwinError(
-            f"sign not checked: {', '.join(unchecked)}; rigtwin card check moves each a little and looks"
+            f"sign not checked: {', '.join(unchecked)}; "
+            "rigtwin card check moves each a little and looks"
         )
     try:
         calibrated = date.fromisoformat(table.calibrated)

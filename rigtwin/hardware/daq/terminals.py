@@ -1,4 +1,7 @@
-"""The twin as it looks at a card's terminals: voltages in, voltages out, and the hydraulics' pressure."""
+"""The twin as it looks at a card's terminals.
+
+Voltages in, voltages out, and the hydraulics' pressure.
+"""
 
 from __future__ import annotations
 
@@ -79,17 +82,22 @@ _first_sample = kernel(_sample)
 
 
 class Terminals:
-    """A rig at rest, cylinders at zero, no pressure. `wiring` says what a volt truly means on each line, whatever the table of
-    who reads it says. Without pressure the cylinders stay where they are.
+    """A rig at rest, cylinders at zero, no pressure.
 
-    truth: last measurements without noise, before the wiring, shape (4,). asked: what the actuators make of the voltages,
-    shape (3,), in the order of the table's outputs. volts: at the inputs now, as 16 bits hold them, shape (4,).
+    `wiring` says what a volt truly means on each line, whatever the table of who reads it says.
+    Without pressure the cylinders stay where they are.
+
+    truth: last measurements without noise, before the wiring, shape (4,). asked: what the
+    actuators make of the voltages, shape (3,), in the order of the table's outputs. volts: at the
+    inputs now, as 16 bits hold them, shape (4,).
     """
 
     def __init__(self, configuration: Configuration, wiring: ChannelTable, seed: int) -> None:
         rest = configuration.controller._replace(start=0.0, preload=0.0)
         twin = Twin(
-            configuration._replace(plant=without_bits(configuration.plant), controller=rest), 0.0, seed
+            configuration._replace(plant=without_bits(configuration.plant), controller=rest),
+            0.0,
+            seed,
         )
         self._twin, self._live = twin, twin.simulation.state
         self._dead = self._live._replace(
@@ -99,7 +107,9 @@ class Terminals:
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         self.truth, self.volts, self.asked = np.zeros(4), np.empty(4), np.zeros(3)
         self._noise, self._place = twin.disturbance.take(AHEAD), 0
-        _first_sample(self._live, twin.sensing, self._noise[0], self._inputs, self.truth, self.volts)
+        _first_sample(
+            self._live, twin.sensing, self._noise[0], self._inputs, self.truth, self.volts
+        )
 
     def advance(self, written: Array, pressure: bool) -> None:
         """One period under voltages that the outputs hold, shape (3,), then the next sample."""
@@ -107,15 +117,15 @@ class Terminals:
         if self._place == AHEAD:
             self._noise, self._place = self._twin.disturbance.take(AHEAD), 0
         _advance(
-            self._live if pressure else self._dead,
-            self._twin.sensing,
-            self._noise[self._place],
-            self._inputs,
-            self._outputs,
-            written,
-            self.asked,
-            self.truth,
-            self.volts,
+            plant=self._live if pressure else self._dead,
+            sensing=self._twin.sensing,
+            disturbance=self._noise[self._place],
+            inputs=self._inputs,
+            outputs=self._outputs,
+            written=written,
+            asked=self.asked,
+            truth=self.truth,
+            volts=self.volts,
         )
 
 

@@ -1,7 +1,10 @@
-"""Carries the calls of the unmodified nidaqmx client to a virtual card: in process, or through a socket.
+"""Carries the calls of the unmodified nidaqmx client to a virtual card.
 
-nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a connection that ends in a Python
-object; `serve` listens on a port, so that any NI-DAQmx gRPC client can use the twin as its card.
+In process, or through a socket.
+
+nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a
+connection that ends in a Python object; `serve` listens on a port, so that any NI-DAQmx gRPC
+client can use the twin as its card.
 """
 
 from __future__ import annotations
@@ -9,9 +12,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NoReturn
 
 import grpc
+from google.protobuf.message import Message
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.virtual import DriverError, VirtualCard
@@ -43,7 +47,10 @@ class _Entry:
 
 
 class InProcess(grpc.Channel):
-    """A connection to a card in this process. The client's messages are handed over as they are, unserialised."""
+    """A connection to a card in this process.
+
+    The client's messages are handed over as they are, unserialised.
+    """
 
     def __init__(self, card: VirtualCard) -> None:
         self._card = card
@@ -53,7 +60,7 @@ class InProcess(grpc.Channel):
     ) -> Any:  # type: ignore[override]
         call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
 
-        def invoke(request: Any, **_: Any) -> Any:
+        def invoke(request: Message, **_: object) -> Message:
             try:
                 return card.answer(call, request, response)
             except DriverError as error:
@@ -63,10 +70,10 @@ class InProcess(grpc.Channel):
 
         return invoke
 
-    def unary_stream(self, *_: Any, **__: Any) -> Any:
+    def unary_stream(self, *_: object, **__: object) -> Any:
         """Events are not carried; a client that asks for them is told so when it does."""
 
-        def refuse(*_: Any, **__: Any) -> Any:
+        def refuse(*_: object, **__: object) -> NoReturn:
             raise CardError(grpc.StatusCode.UNIMPLEMENTED, "the virtual card sends no events")
 
         return refuse
@@ -97,7 +104,9 @@ class _CallHandler(grpc.GenericRpcHandler):
 
         self._card, self._messages = card, grpc_types
 
-    def service(self, handler_call_details: Any) -> Any:
+    def service(
+        self, handler_call_details: grpc.HandlerCallDetails
+    ) -> grpc.RpcMethodHandler | None:
         service, _, call = handler_call_details.method.strip("/").partition("/")
         request, response = (
             getattr(self._messages, call + ending, None) for ending in ("Request", "Response")
@@ -105,7 +114,7 @@ class _CallHandler(grpc.GenericRpcHandler):
         if service != SERVICE or request is None or response is None:
             return None
 
-        def invoke(message: Any, context: grpc.ServicerContext) -> Any:
+        def invoke(message: Message, context: grpc.ServicerContext) -> Any:
             try:
                 return self._card.answer(call, message, response)
             except DriverError as error:
@@ -122,7 +131,10 @@ class _CallHandler(grpc.GenericRpcHandler):
 
 
 def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
-    """Listens on this computer only; port 0 takes a free one. Returns the server and its port. Raises RigtwinError."""
+    """Listens on this computer only; port 0 takes a free one.
+
+    Returns the server and its port. Raises RigtwinError.
+    """
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
     server = grpc.server(
         ThreadPoolExecutor(max_workers=8),

@@ -1,7 +1,10 @@
-"""A virtual PCI-6229: answers the NI-DAQmx calls of a client, volts in and out, with the twin at its terminals.
+"""A virtual PCI-6229.
 
-Reservations, ranges, names, the buffer of a clocked acquisition and the driver's error codes are those that NI documents, as
-far as a client such as `rigtwin.hardware.daq.card` meets them; any other call is refused by name.
+Answers the NI-DAQmx calls of a client, volts in and out, with the twin at its terminals.
+
+Reservations, ranges, names, the buffer of a clocked acquisition and the driver's error codes are
+those that NI documents, as far as a client such as `rigtwin.hardware.daq.card` meets them; any
+other call is refused by name.
 """
 
 from __future__ import annotations
@@ -9,9 +12,11 @@ from __future__ import annotations
 import re
 import threading
 from collections import deque
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
+from google.protobuf.message import Message
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable
@@ -30,6 +35,9 @@ _INITIALIZE, _ATTACH = 1, 2
 """Session initialization behaviours of NI's session service."""
 _SUPPORTED = 10_000.0
 """Hz, the fastest sample clock that the twin is worth."""
+
+Response = Callable[..., Message]
+"""Class of a call's response, made of its fields."""
 
 
 class DriverError(Exception):
@@ -100,10 +108,13 @@ class _Task:
 
 
 class VirtualCard:
-    """One card. Thread-safe. `answer` takes a call's name, its request, and the class of its response.
+    """One card.
 
-    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital line. Before the first tick
-    and after `disconnect` all outputs are at zero. wiring: the card's name, and which lines the terminals' signals are on.
+    Thread-safe. `answer` takes a call's name, its request, and the class of its response.
+
+    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital
+    line. Before the first tick and after `disconnect` all outputs are at zero. wiring: the card's
+    name, and which lines the terminals' signals are on.
     """
 
     def __init__(
@@ -126,8 +137,30 @@ class VirtualCard:
         self._lock = threading.RLock()
         self._begun = False
 
-    def answer(self, call: str, request: Any, response: type) -> Any:
-        """Raises DriverError as the driver would, RigtwinError for a call that no client of this project makes."""
+    def answer(self, call: str, request: Message, response: Response) -> Message:
+        """Answers a call.
+
+        Parameters
+        ----------
+        call : str
+            Its name in NI's gRPC service.
+        request : Message
+            What it asks.
+        response : Response
+            What its answer is made with.
+
+        Returns
+        -------
+        Message
+            The answer.
+
+        Raises
+        ------
+        DriverError
+            As the driver would.
+        RigtwinError
+            For a call that no client of this project makes.
+        """
         handler = getattr(self, f"_{call}", None)
         if handler is None:
             raise RigtwinError(f"the virtual card does not know the call {call}")
@@ -137,7 +170,8 @@ class VirtualCard:
             if not self.connected:
                 raise DriverError(
                     GONE,
-                    f"The specified device is not present or is not active in the system. Device: {self._device}",
+                    "The specified device is not present or is not active in the system. Device: "
+                    f"{self._device}",
                 )
             self._catch_up()
             return handler(request, response)
@@ -166,7 +200,7 @@ class VirtualCard:
             self._samples.append(self._terminals.volts.tolist())
         self.run_until(self._time.now(self.tick))
 
-    def _await(self, request: Any) -> None:
+    def _await(self, request: Message) -> None:
         """Outside the lock: others may write while a reader waits for its sample."""
         task = self._tasks.get(request.task.name)
         if task is not None and task.running and task.clocked and self._begun:
@@ -174,19 +208,19 @@ class VirtualCard:
 
     # The calls, by their names in the gRPC service.
 
-    def _task(self, request: Any) -> _Task:
+    def _task(self, request: Message) -> _Task:
         task = self._tasks.get(request.task.name)
         if task is None:
             raise DriverError(NO_TASK, "Task specified is invalid or does not exist.")
         return task
 
-    def _GetSystemInfoAttributeUInt32(self, request: Any, response: type) -> Any:
+    def _GetSystemInfoAttributeUInt32(self, request: Message, response: Response) -> Message:
         return response(value={0x1272: 26, 0x1923: 5}.get(request.attribute_raw, 0))
 
-    def _GetSystemInfoAttributeString(self, _: Any, response: type) -> Any:
+    def _GetSystemInfoAttributeString(self, _: Message, response: Response) -> Message:
         return response(value=self._device)
 
-    def _GetDeviceAttributeString(self, request: Any, response: type) -> Any:
+    def _GetDeviceAttributeString(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
         lists = {
             0x231E: [f"ai{n}" for n in range(32)],
@@ -201,15 +235,15 @@ class VirtualCard:
             )
         )
 
-    def _GetDeviceAttributeBool(self, request: Any, response: type) -> Any:
+    def _GetDeviceAttributeBool(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
         return response(value=True)
 
-    def _GetDeviceAttributeDouble(self, request: Any, response: type) -> Any:
+    def _GetDeviceAttributeDouble(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
         return response(value=_SUPPORTED)
 
-    def _GetDeviceAttributeDoubleArray(self, request: Any, response: type) -> Any:
+    def _GetDeviceAttributeDoubleArray(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
         ranges = INPUT_RANGES if request.attribute_raw == 0x2990 else (10.0,)
         return response(value=[edge for volts in ranges for edge in (-volts, volts)])
@@ -218,14 +252,14 @@ class VirtualCard:
         if name != self._device:
             raise DriverError(NO_DEVICE, f"Device identifier is invalid. Device specified: {name}")
 
-    def _ResetDevice(self, request: Any, response: type) -> Any:
+    def _ResetDevice(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
         self._tasks.clear()
         self.outputs[:] = 0.0
         self.pressure = False
         return response()
 
-    def _CreateTask(self, request: Any, response: type) -> Any:
+    def _CreateTask(self, request: Message, response: Response) -> Message:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"
         new = name not in self._tasks
         if new and request.initialization_behavior == _ATTACH:
@@ -238,10 +272,10 @@ class VirtualCard:
         made.task.name = name
         return made
 
-    def _GetTaskAttributeString(self, request: Any, response: type) -> Any:
+    def _GetTaskAttributeString(self, request: Message, response: Response) -> Message:
         return response(value=self._task(request).name)
 
-    def _add(self, request: Any, text: str, kind: str, count: int) -> _Task:
+    def _add(self, request: Message, text: str, kind: str, count: int) -> _Task:
         task = self._task(request)
         for line in text.split(","):
             device, _, name = line.strip().partition("/")
@@ -250,33 +284,35 @@ class VirtualCard:
             if number is None or int(number[1]) >= count:
                 raise DriverError(
                     NO_CHANNEL,
-                    f"Physical channel specified does not exist on this device. Channel: {line.strip()}",
+                    "Physical channel specified does not exist on this device. Channel: "
+                    f"{line.strip()}",
                 )
             task.lines.append(name)
         return task
 
-    def _voltage(self, request: Any, allowed: tuple[float, ...]) -> None:
+    def _voltage(self, request: Message, allowed: tuple[float, ...]) -> None:
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
             raise DriverError(
                 BAD_VALUE,
-                f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}",
+                "Requested value is not a supported value for this property. Maximum value: "
+                f"{max(allowed)}",
             )
 
-    def _CreateAIVoltageChan(self, request: Any, response: type) -> Any:
+    def _CreateAIVoltageChan(self, request: Message, response: Response) -> Message:
         self._voltage(request, INPUT_RANGES)
         self._add(request, request.physical_channel, "ai", 32)
         return response()
 
-    def _CreateAOVoltageChan(self, request: Any, response: type) -> Any:
+    def _CreateAOVoltageChan(self, request: Message, response: Response) -> Message:
         self._voltage(request, (10.0,))
         self._add(request, request.physical_channel, "ao", 4)
         return response()
 
-    def _CreateDOChan(self, request: Any, response: type) -> Any:
+    def _CreateDOChan(self, request: Message, response: Response) -> Message:
         self._add(request, request.lines, "port0/line", 32)
         return response()
 
-    def _CfgSampClkTiming(self, request: Any, response: type) -> Any:
+    def _CfgSampClkTiming(self, request: Message, response: Response) -> Message:
         if not 0.0 < request.rate <= _SUPPORTED:
             raise DriverError(
                 BAD_VALUE,
@@ -285,7 +321,7 @@ class VirtualCard:
         self._task(request).clocked = True
         return response()
 
-    def _StartTask(self, request: Any, response: type) -> Any:
+    def _StartTask(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         for other in self._tasks.values():
             both = set(other.lines) & set(task.lines)
@@ -297,18 +333,18 @@ class VirtualCard:
         task.running, task.next = True, self.tick
         return response()
 
-    def _StopTask(self, request: Any, response: type) -> Any:
+    def _StopTask(self, request: Message, response: Response) -> Message:
         self._task(request).running = False
         return response()
 
-    def _ClearTask(self, request: Any, response: type) -> Any:
+    def _ClearTask(self, request: Message, response: Response) -> Message:
         self._tasks.pop(request.task.name, None)
         return response()
 
-    def _GetReadAttributeUInt32(self, request: Any, response: type) -> Any:
+    def _GetReadAttributeUInt32(self, request: Message, response: Response) -> Message:
         return response(value=max(self._time.now(self.tick) - self._task(request).next + 1, 0))
 
-    def _ReadAnalogF64(self, request: Any, response: type) -> Any:
+    def _ReadAnalogF64(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         if not task.running:
             task.running, task.next = True, self.tick
@@ -331,7 +367,7 @@ class VirtualCard:
         values = [sample[place] if place >= 0 else 0.0 for place in places for sample in samples]
         return response(read_array=values, samps_per_chan_read=count)
 
-    def _WriteAnalogF64(self, request: Any, response: type) -> Any:
+    def _WriteAnalogF64(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         if len(request.write_array) != len(task.lines):
             raise DriverError(
@@ -347,12 +383,12 @@ class VirtualCard:
             self.outputs[int(line[2:])] = volts
         return response(samps_per_chan_written=1)
 
-    def _WriteDigitalLines(self, request: Any, response: type) -> Any:
+    def _WriteDigitalLines(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         for line, level in zip(task.lines, request.write_array, strict=False):
             if line == self._pressure_line:
                 self.pressure = bool(level)
         return response(samps_per_chan_written=1)
 
-    def _GetErrorString(self, _: Any, response: type) -> Any:
+    def _GetErrorString(self, _: Message, response: Response) -> Message:
         return response(error_string="")

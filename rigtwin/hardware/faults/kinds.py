@@ -20,8 +20,21 @@ _IMPLAUSIBLE = (
 
 @dataclass(frozen=True)
 class FaultKind:
-    """One kind of fault. place: sensor, actuator, controller, loop, card, recording, operator or process; causes: names of the
-    causes that are right; everywhere: whether it shows at once, whatever the rig does."""
+    """One kind of fault.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    place : str
+        Sensor, actuator, controller, loop, card, recording, operator or process.
+    meaning : str
+        What breaks, in words.
+    causes : tuple of str
+        Names of the supervisor's causes that are right.
+    everywhere : bool
+        Whether it shows at once, whatever the rig does.
+    """
 
     name: str
     place: str
@@ -31,7 +44,9 @@ class FaultKind:
 
 
 KINDS = (
-    FaultKind("dropout", "sensor", "reads 0 V from then on", ("stuck", *_IMPLAUSIBLE), everywhere=False),
+    FaultKind(
+        "dropout", "sensor", "reads 0 V from then on", ("stuck", *_IMPLAUSIBLE), everywhere=False
+    ),
     FaultKind("stuck", "sensor", "repeats its last reading", ("stuck",), everywhere=False),
     FaultKind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump",)),
     FaultKind("not a number", "sensor", "the driver gives NaN", ("not_a_number",)),
@@ -85,4 +100,5 @@ KINDS = (
     FaultKind("process frozen", "process", "SIGSTOP", ("process",)),
     FaultKind("controller hangs", "process", "a tick never ends", ("process",)),
 )
-"""All of them. Those of a process need two processes and a card between them; the others run in one."""
+"""All of them. Those of a process need two processes and a card between them; the others run in
+one."""

@@ -1,5 +1,7 @@
-"""Faults of the whole controller process: killed, frozen, hang. The card is behind a socket, its clock runs, and a guardian
-watches; only its word counts."""
+"""Faults of the whole controller process: killed, frozen, hanging.
+
+The card is behind a socket, its clock runs, and a guardian watches; only its word counts.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +9,14 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from multiprocessing.process import BaseProcess
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
-from typing import Any
 
+from controllers import Commands, Controller, Demand, Measurements, State
 from controllers import update as healthy
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card, connect
@@ -32,36 +37,66 @@ from rigtwin.hardware.realtime import in_real_time, monotonic
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.record import Test, guardian_settings
 from rigtwin.hardware.supervision import supervise
+from rigtwin.simulation.experiment import Experiment
 
 DILATION = 8.0
-"""By how much the card's clock is slowed: a call through a socket takes most of a millisecond, a tick needs three, and this
-computer may be doing other things. Ticks are counted, not seconds."""
+"""By how much the card's clock is slowed: a call through a socket takes most of a millisecond, a
+tick needs three, and this computer may be doing other things. Ticks are counted, not seconds."""
 TIMES = 6
 COMING = 60.0
 """s within which the controller process must have reached its fault."""
 
 
 class Stray(RigtwinError):
-    """The guardian stopped the rig before the fault came: this computer kept the loop waiting for longer than it may wait."""
+    """The guardian stopped the rig before the fault came: this computer kept the loop waiting."""
 
     def __init__(self) -> None:
         super().__init__(
-            "this computer is too busy: the loop was kept waiting and the rig stopped before its fault came"
+            "this computer is too busy: "
+            "the loop was kept waiting and the rig stopped before its fault came"
         )
 
 
-def try_process_fault(fault: Fault, table: ChannelTable, folder: Path) -> FaultResult:
-    """One such fault. A session that a busy computer has cut short is begun anew, a few times. Raises RigtwinError."""
+def try_process_fault(
+    fault: Fault, experiment: Experiment, table: ChannelTable, folder: Path
+) -> FaultResult:
+    """Runs a session whose controller process has a fault.
+
+    A session that a busy computer has cut short is begun anew, a few times.
+
+    Parameters
+    ----------
+    fault : Fault
+        Of a process.
+    experiment : Experiment
+        The one that the fault names.
+    table : ChannelTable
+        Of the virtual card.
+    folder : Path
+        Where the recording goes.
+
+    Returns
+    -------
+    FaultResult
+        What became of it.
+
+    Raises
+    ------
+    RigtwinError
+        If the fault could not be put into any of the sessions.
+    """
+    test = plan_test(fault, experiment, table)
     for _ in range(TIMES):
         with suppress(Stray):
-            return _try_once(fault, table, folder)
+            return _try_once(fault, test, folder)
     raise Stray
 
 
-def _try_once(fault: Fault, table: ChannelTable, folder: Path) -> FaultResult:
-    test = plan_test(fault, table)
-    period = test.configuration.timing.period
-    bench = FaultyBench(test.terminals(), table, "", count_card_ticks(test), 0, fault.seed, count_card_ticks(test))
+def _try_once(fault: Fault, test: Test, folder: Path) -> FaultResult:
+    table, period, ticks = test.table, test.configuration.timing.period, count_card_ticks(test)
+    bench = FaultyBench(
+        test.terminals(), table, kind="", at=ticks, place=0, seed=fault.seed, ticks=ticks
+    )
     clock = RealTime(DILATION * period)
     virtual = VirtualCard(bench, table, clock)
     server, port = serve(virtual, 0)
@@ -84,8 +119,13 @@ def _try_once(fault: Fault, table: ChannelTable, folder: Path) -> FaultResult:
     return judge(replace(fault, at=at), test, bench, path)
 
 
-def _strike(controller: Any, virtual: VirtualCard, fault: Fault, hung: Any) -> float:
-    """Strikes when the card's time has come; returns the moment. The card's time begins with the session."""
+def _strike(
+    controller: BaseProcess, virtual: VirtualCard, fault: Fault, hung: Synchronized[float]
+) -> float:
+    """Strikes when the card's time has come; returns the moment, s of `monotonic`.
+
+    The card's time begins with the session.
+    """
     if fault.kind.name == "controller hangs":
         _wait_until(
             lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang"
@@ -99,14 +139,13 @@ def _strike(controller: Any, virtual: VirtualCard, fault: Fault, hung: Any) -> f
     )
     if controller.exitcode is not None:
         raise Stray
-    os.kill(
-        controller.pid,
-        {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}[fault.kind.name],
-    )
+    assert controller.pid is not None
+    deadly = {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}
+    os.kill(controller.pid, deadly[fault.kind.name])
     return monotonic()
 
 
-def _wait_until(there: Any, what: str) -> None:
+def _wait_until(there: Callable[[], bool], what: str) -> None:
     end = monotonic() + COMING
     while not there():
         if monotonic() > end:
@@ -118,19 +157,23 @@ def _has_ended(path: Path) -> bool:
     return last_words(path)[0] == "process"
 
 
-def _control(test: Test, path: Path, fault: Fault, hung: Any) -> None:
-    """The controller process: everything slowed as the card is. What it and its guardian have to say is in the recording."""
+def _control(test: Test, path: Path, fault: Fault, hung: Synchronized[float]) -> None:
+    """The controller process: everything slowed as the card is.
+
+    What it and its guardian have to say is in the recording.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    card = Card(
-        test.table, test.configuration.timing.period, connect(test.table.address), clock=_read_slow_clock
-    )
-    patient = guardian_settings(test, path, True)
+    period, channel = test.configuration.timing.period, connect(test.table.address)
+    card = Card(test.table, period, channel, clock=_read_slow_clock)
+    usual = guardian_settings(test, path, guarded=True)
     guardian = Guardian(
-        replace(patient, patience=DILATION * patient.patience, hold=DILATION * patient.hold)
+        replace(usual, patience=DILATION * usual.patience, hold=DILATION * usual.hold)
     )
     ticks = 0
 
-    def hang(controlling: Any, state: Any, measured: Any, demand: Any) -> Any:
+    def hang(
+        controlling: Controller, state: State, measured: Measurements, demand: Demand
+    ) -> tuple[State, Commands]:
         nonlocal ticks
         ticks += 1
         if fault.kind.name == "controller hangs" and ticks > fault.at - BEFORE:

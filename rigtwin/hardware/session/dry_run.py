@@ -1,4 +1,7 @@
-"""The dry run: the exact session on the virtual card first. What it predicts, and the list of what has passed."""
+"""The dry run: the exact session on the virtual card first.
+
+What it predicts, and the list of what has passed.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[P
 def digest(
     experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
 ) -> str:
-    """What makes a session another one: experiment, every setting, what is demanded, and the channel table."""
+    """What makes a session another one.
+
+    Experiment, every setting, what is demanded, and the channel table.
+    """
     told = json.dumps([experiment, flattened(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
 
@@ -41,7 +47,10 @@ def ledger(card: Path) -> Path:
 
 
 def has_passed(card: Path, key: str) -> bool:
-    """Whether that session has had a dry run which completed. Raises RigtwinError for a list that cannot be read."""
+    """Whether that session has had a dry run which completed.
+
+    Raises RigtwinError for a list that cannot be read.
+    """
     return key in _entries(ledger(card))
 
 

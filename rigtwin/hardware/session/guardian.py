@@ -1,5 +1,7 @@
-"""The loop's side of a second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the
-rig and says so in the recording."""
+"""The loop's side of a second process that keeps the recording and guards the rig.
+
+If the loop dies or hangs, the guardian stops the rig and says so in the recording.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,6 @@ import multiprocessing
 import os
 import threading
 import time
-from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import monotonic
@@ -39,7 +40,7 @@ class Guardian:
     """The loop's side: a `rigtwin.hardware.supervision.Recorder` whose work another process does."""
 
     def __init__(self, settings: GuardianSettings) -> None:
-        """Raises RigtwinError if the recording cannot be written or the other process does not come."""
+        """Raises RigtwinError if the recording cannot be written or the process does not come."""
         self._settings, self._finishing = settings, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
@@ -62,12 +63,14 @@ class Guardian:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def beat(self, ground: float, structure: float) -> None:
+        """Tells that the loop is alive, and the positions held, m; sees whether the guardian is."""
         shared, now = self._shared, time.monotonic()
         shared[GROUND], shared[STRUCTURE], shared[BEAT] = ground, structure, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
 
     def tick(self, row: tuple[float, ...]) -> None:
+        """Hands over one tick; see `Recorder`."""
         written = int(self._shared[WRITTEN])
         if written - self._shared[READ] >= RING:
             self.fault = self.fault or "the recording cannot keep up with the loop"
@@ -79,6 +82,7 @@ class Guardian:
         """The other process writes by itself."""
 
     def ready(self) -> None:
+        """Waits until the guardian could stop the rig. Raises RigtwinError if it cannot."""
         self._send("prepare")
         end = monotonic() + STARTED
         while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
@@ -87,6 +91,7 @@ class Guardian:
             raise RigtwinError(self.fault or "the guardian process does not answer")
 
     def transition(self, transition: Transition) -> None:
+        """Has a transition recorded; the loop is guarded from arming to rest."""
         if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
             self._shared[BEAT] = time.monotonic()
             self._shared[GUARDED] = 1.0
@@ -95,6 +100,7 @@ class Guardian:
             self._shared[GUARDED] = 0.0
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        """Has a metadata record added."""
         self._send("metadata", name, values)
 
     def finish(self, reason: str) -> None:
@@ -104,13 +110,13 @@ class Guardian:
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
 
-    def _send(self, *message: Any) -> None:
+    def _send(self, *message: object) -> None:
         try:
             self._pipe.send(message)
         except (OSError, ValueError):
             self.fault = self.fault or "the guardian process is gone, and the recording with it"
 
-    def _answer(self) -> Any:
+    def _answer(self) -> object:
         try:
             return self._pipe.recv()
         except (EOFError, OSError):

@@ -1,4 +1,4 @@
-"""A live view of a session for Foxglove, in the browser or on the desktop, served on this computer only."""
+"""A live view of a session for Foxglove, served on this computer only."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ SHOWN = 10
 
 
 def open_live_view(port: int) -> Callable[[str, Array], None]:
-    """Starts serving; returns what takes rows of a topic whose first column is the time in s. Raises RigtwinError."""
+    """Starts serving; returns what takes rows of a topic whose first column is the time in s.
+
+    Raises RigtwinError.
+    """
     try:
         import foxglove
     except ImportError:

@@ -20,8 +20,11 @@ _SIGNALS = [
 
 @contextmanager
 def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]]:
-    """Gives a function to be called once a tick: who find_request to stop, or None. Ctrl-C and the other signals that end a program
-    are requests inside this context; on a terminal so is any key; so is a file of that name."""
+    """Gives a function to be called once a tick: who asked to stop, or None.
+
+    Ctrl-C and the other signals that end a program are requests inside this context; on a terminal
+    so is any key; so is a file of that name.
+    """
     said: list[str] = []
 
     def on_signal(number: int, _: FrameType | None) -> None:
@@ -50,7 +53,10 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
 
 @contextmanager
 def _single_keys() -> Iterator[bool]:
-    """Whether there is a terminal whose keys can be read one by one; for the time of the context they are."""
+    """Whether there is a terminal whose keys can be read one by one.
+
+    For the time of the context they are.
+    """
     try:
         import termios
         import tty
