@@ -80,7 +80,8 @@ def faults(parsed: Namespace) -> int:
     rows = [row for row in rows if row[2] != "0"]
     failed = [result for result in results if not result.ok]
     passed = len(results) - len(failed)
-    said = f"{len(results)} faults of {len(rows)} kinds, seed {parsed.seed}: {passed} sessions ended as they must"
+    kinds = f"{len(results)} faults of {len(rows)} kinds, seed {parsed.seed}"
+    said = f"{kinds}: {passed} sessions ended as they must"
     print(table([HEADER, *rows]))
     for result in failed:
         print(f"failed: {_describe(result)}")

@@ -125,8 +125,17 @@ class Grant:
 def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
     """Takes what the system permits for the time of the loop, and gives it back.
 
-    FIFO scheduling, memory locked, no garbage collection. Yields what was granted and what not.
-    `fifo`: whether to ask for the scheduling class at all.
+    FIFO scheduling, memory locked, no garbage collection.
+
+    Parameters
+    ----------
+    fifo : bool
+        Whether to ask for the scheduling class at all.
+
+    Yields
+    ------
+    tuple of Grant
+        What was granted and what not.
     """
     grants = [_memory(), Grant("no garbage collection")]
     collecting, interval = gc.isenabled(), sys.getswitchinterval()

@@ -101,8 +101,16 @@ class Recorder(Protocol):
 class SessionEnd:
     """How a session ended.
 
-    ticks: of the test that were recorded; transitions: all of them, in order; peaks: greatest
-    magnitude of each measurement, and of the commands' voltage.
+    Parameters
+    ----------
+    cause : Cause
+        Why.
+    ticks : int
+        Of the test that were recorded.
+    transitions : tuple of Transition
+        All of them, in order.
+    peaks : dict
+        Greatest magnitude of each measurement, and of the commands' voltage.
     """
 
     cause: Cause
@@ -121,10 +129,36 @@ def supervise(
     updating: Update = update,
     progress: Callable[[int], object] = lambda _: None,
 ) -> SessionEnd:
-    """Runs a test, demands of shape (ticks, 3).
+    """Runs a test, ramped in and out.
 
-    stop: looked at in every tick; a text stops the session and is its reason. lateness: is filled,
-    if the rig runs in real time. Raises RigtwinError only before anything has moved.
+    Parameters
+    ----------
+    rig : DrivenRig
+        What is moved.
+    configuration : Configuration
+        With the limits that the card adds.
+    demands : Array
+        Columns of controllers.Demand, shape (ticks, 3).
+    recorder : Recorder
+        Keeps what happens.
+    stop : callable
+        Looked at in every tick; a text stops the session and is its reason.
+    lateness : Lateness, optional
+        Is filled, if the rig runs in real time.
+    updating : Update
+        The controller.
+    progress : callable
+        Called with the ticks done since its last call.
+
+    Returns
+    -------
+    SessionEnd
+        How it ended.
+
+    Raises
+    ------
+    RigtwinError
+        Only before anything has moved.
     """
     return _Session(
         rig,

@@ -30,9 +30,26 @@ BLOCK = 10_000
 
 
 def convert(data: Path, map_path: Path, out: Path) -> list[str]:
-    """Writes the recording; what was found, a line each.
+    """Converts another program's file to a recording.
 
-    Raises RigtwinError before anything is written.
+    Parameters
+    ----------
+    data : Path
+        The file.
+    map_path : Path
+        Which column is which channel, TOML.
+    out : Path
+        Of the recording.
+
+    Returns
+    -------
+    list of str
+        What was found on the way, a line each.
+
+    Raises
+    ------
+    RigtwinError
+        Before anything is written.
     """
     wanted, columns = load(map_path), read(data)
     report = [

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import SUSPENSION_RIG, topic_fields
+from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -57,10 +57,30 @@ _DAMAGE = (
 class Recording:
     """One test as recorded.
 
-    columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since
-    the start, shape (ticks,). controller: the operator's settings, empty if the recording does not
-    say. notes: what is wrong or missing, for people. transitions: of a supervised session, in
-    order; lateness: of a loop in real time.
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    machine, experiment : str
+        What was tested, and how.
+    period : float
+        s.
+    time : Array
+        s since the start, shape (ticks,).
+    columns : mapping
+        Topic → field → values, shape (ticks,), SI; all topics of one length.
+    controller : mapping
+        The operator's settings, empty if the recording does not say.
+    twin : mapping
+        How a twin made it, empty of a rig.
+    end : str
+        Why the test ended.
+    notes : tuple of str
+        What is wrong or missing, for people.
+    transitions : tuple of mapping
+        Of a supervised session, in order.
+    lateness : mapping
+        Of a loop in real time.
     """
 
     path: Path
@@ -128,7 +148,20 @@ class Recording:
 def load(path: Path) -> Recording:
     """Reads a recording.
 
-    Raises RigtwinError if it is none, is empty, or is of a format this version does not read.
+    Parameters
+    ----------
+    path : Path
+        An MCAP file, whole or damaged.
+
+    Returns
+    -------
+    Recording
+        What can be read of it.
+
+    Raises
+    ------
+    RigtwinError
+        If it is none, is empty, or is of a format this version does not read.
     """
     metadata: dict[str, dict[str, str]] = {}
     schemas: dict[int, Schema] = {}
@@ -167,7 +200,7 @@ def load(path: Path) -> Recording:
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period, machine = _period(path, about), about.get("machine", SUSPENSION_RIG)
+    period = _period(path, about)
     controller = _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
@@ -218,7 +251,20 @@ def load(path: Path) -> Recording:
 def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
     """Reads a supervised session's transitions, even if it ended before its test began.
 
-    Raises RigtwinError.
+    Parameters
+    ----------
+    path : Path
+        Of the recording.
+
+    Returns
+    -------
+    tuple of mapping
+        Those that can be read, in order of time.
+
+    Raises
+    ------
+    RigtwinError
+        If the file cannot be read at all.
     """
     found: list[Mapping[str, str]] = []
     try:

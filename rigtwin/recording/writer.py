@@ -352,7 +352,7 @@ class Writer:
             self._file.truncate(self._offset)
 
     def _put_into_room(self, record: bytes) -> None:
-        """Writes over the room kept, which needs no space, and over the rest of it a smaller one."""
+        """Writes over the room kept, which needs no space, and keeps the rest of it."""
         assert self._room is not None
         place, end = self._room
         rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))

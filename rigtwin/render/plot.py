@@ -114,7 +114,25 @@ def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
 
 
 def find_stretch(recording: Recording, start: float, until: float | None) -> slice:
-    """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
+    """Finds the ticks of a stretch of time.
+
+    Parameters
+    ----------
+    recording : Recording
+        Whose ticks.
+    start, until : float
+        s; to the end where `until` is None.
+
+    Returns
+    -------
+    slice
+        Two ticks at least.
+
+    Raises
+    ------
+    RigtwinError
+        If there are none.
+    """
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
         raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
@@ -128,9 +146,21 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
 
 
 def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
-    """Draws the recording into a png, svg or pdf file.
+    """Draws a recording: what moved, what pushed, what was commanded.
 
-    Raises RigtwinError for another ending or an empty stretch.
+    Parameters
+    ----------
+    recording : Recording
+        Of any machine.
+    out : Path
+        A png, svg or pdf file.
+    start, until : float
+        s; to the end where `until` is None.
+
+    Raises
+    ------
+    RigtwinError
+        For another ending or an empty stretch.
     """
     check_ending(out)
     ticks = find_stretch(recording, start, until)

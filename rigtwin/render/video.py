@@ -58,11 +58,29 @@ def film(
     magnify: float = 1.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> None:
-    """Films the stretch from `start` to `until` (s) in real time into an mp4 file.
+    """Films a stretch of a recording in real time.
 
-    magnify: how many times as large motions are drawn. progress is called with (frames done,
-    frames in all). Raises RigtwinError if the file's ending, the camera, the stretch or this
-    machine's rendering is at fault.
+    Parameters
+    ----------
+    recording : Recording
+        Of any machine.
+    out : Path
+        An mp4 file.
+    machine : Machine
+        What is seen.
+    camera : str, optional
+        One of the model's, or free; its first by default.
+    start, until : float
+        s; to the end where `until` is None.
+    magnify : float
+        How many times as large motions are drawn, at most 20.
+    progress : callable, optional
+        Called with frames done and frames in all.
+
+    Raises
+    ------
+    RigtwinError
+        If the file's ending, the camera, the stretch or this computer's rendering is at fault.
     """
     if out.suffix.lower() != ".mp4":
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")

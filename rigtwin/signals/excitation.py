@@ -68,9 +68,25 @@ def multisine(
     rms: float,
     random: np.random.Generator,
 ) -> Array:
-    """Random-phase multisine, amplitudes ∝ frequency^-slope, scaled to `rms`, faded in.
+    """Makes a random-phase multisine, faded in over the first second.
 
-    lowest, highest and spacing in Hz.
+    Parameters
+    ----------
+    time : Array
+        s, shape (ticks,).
+    lowest, highest, spacing : float
+        Of its frequencies, Hz.
+    slope : float
+        Amplitudes fall with frequency^-slope.
+    rms : float
+        Before the fading, in the unit that is wanted.
+    random : Generator
+        Draws the phases.
+
+    Returns
+    -------
+    Array
+        Shape (ticks,).
     """
     frequencies = np.arange(lowest, highest + spacing / 2, spacing)
     amplitudes = frequencies**-slope
@@ -80,7 +96,7 @@ def multisine(
 
 
 def schroeder(time: Array, frequencies: Array, amplitude: float) -> Array:
-    """Multisine of equal amplitudes with Schroeder's phases −π·k·(k−1)/n, of low peak (thesis §6.1.2)."""
+    """Sines of equal amplitudes with Schroeder's phases −π·k·(k−1)/n (thesis §6.1.2)."""
     number = np.arange(1, len(frequencies) + 1)
     phases = -math.pi * number * (number - 1) / len(frequencies)
     return sum_of_sines(time, frequencies, np.full(len(frequencies), amplitude), phases)

@@ -63,9 +63,21 @@ def rms(signal: Array) -> float:
 
 
 def remove_mains(signal: Array, period: float, frequency: float) -> Array:
-    """The signal less its mains line; its mean stays.
+    """Removes the mains line from a signal; its mean stays.
 
-    The line is looked for within ±0.5 Hz of `frequency` (Hz).
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    period : float
+        s.
+    frequency : float
+        Hz, nominal; the line is looked for within ±0.5 Hz of it.
+
+    Returns
+    -------
+    Array
+        Shape (ticks,).
     """
     count = len(signal)
     time = np.arange(count) * period
@@ -120,10 +132,16 @@ def band(signal: Array, period: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class EstimatedMotion:
-    """An estimated motion.
+    """A motion estimated beneath a noisy measurement.
 
-    position: shape (ticks,); correction: what of it is not as expected; velocity_error: standard
-    deviation of its rate of change, unit/s.
+    Parameters
+    ----------
+    position : Array
+        Shape (ticks,).
+    correction : Array
+        What of it is not as expected, shape (ticks,).
+    velocity_error : float
+        Standard deviation of its rate of change, unit/s.
     """
 
     position: Array
@@ -134,12 +152,26 @@ class EstimatedMotion:
 def estimate_motion(
     measured: Array, expected: Array, period: float, mains: float
 ) -> EstimatedMotion:
-    """The motion beneath a noisy measurement, given what a model expects of it.
+    """Estimates the motion beneath a noisy measurement, given what a model expects of it.
 
     Where measured − expected is noise, the expectation is the better estimate of the motion, plus
     a constant offset. What stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum
     at every frequency: of all linear estimates the one with the least error, in position and in
     velocity.
+
+    Parameters
+    ----------
+    measured, expected : Array
+        Shape (ticks,).
+    period : float
+        s.
+    mains : float
+        Nominal mains frequency, Hz.
+
+    Returns
+    -------
+    EstimatedMotion
+        In the unit of the measurement.
     """
     difference = remove_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
@@ -163,11 +195,21 @@ def estimate_motion(
 
 
 def smooth(signal: Array, period: float) -> tuple[Array, float]:
-    """Smooths a measured motion; gives it and the standard deviation of the error left.
+    """Smooths a measured motion: what is not to be told from its white noise is left out.
 
-    What is not to be told from its white noise is left out.
+    Where it stays within the error that is left it is taken to rest.
 
-    Where it stays within that error it is taken to rest.
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    period : float
+        s.
+
+    Returns
+    -------
+    tuple of Array and float
+        The motion, shape (ticks,), and the standard deviation of its error.
     """
     noise = white_noise(signal)
     count = len(signal)

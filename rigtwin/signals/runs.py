@@ -12,7 +12,20 @@ FLAT = 8
 
 
 def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
-    """Where the longest run of equal, counted samples starts, and its length."""
+    """Finds the longest run of equal samples.
+
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    counted : Array
+        Which samples count, shape (ticks,).
+
+    Returns
+    -------
+    tuple of int
+        Where it starts, and its length.
+    """
     same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
     edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
     starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]

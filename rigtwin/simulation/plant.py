@@ -61,10 +61,10 @@ class Contacts(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """All that compiled code needs to run one plant.
+    """All that compiled code needs to run one plant: its parts and their states.
 
-    plain: whether its commands act as they are and its contacts do not change with the motion, as
-    in the nominal rig.
+    `plain` says whether its commands act as they are and its contacts do not change with the
+    motion, as in the nominal rig.
     """
 
     mechanics: Handles
@@ -84,7 +84,20 @@ class PlantState(NamedTuple):
 
 
 def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
-    """The plant's contacts with the carriage and the travel at those positions, m."""
+    """Gives a plant's contacts before anything moves.
+
+    Parameters
+    ----------
+    plant : RigPlant
+        Whose.
+    carriage, travel : float
+        Where they are, m.
+
+    Returns
+    -------
+    Contacts
+        With states of their own.
+    """
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
     forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)

@@ -69,13 +69,22 @@ class Trip(IntEnum):
 
 
 class LimitMemory(NamedTuple):
-    """What the limits remember.
+    """What the limits remember of earlier ticks; changed in place.
 
-    measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
-    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples
-    and its place, shape (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now,
-    N, shape (1,). Changed in place. Arrays for compiled loops; lists, which Python reads faster,
-    for others.
+    Arrays for compiled loops; lists, which Python reads faster, for others.
+
+    Parameters
+    ----------
+    measured
+        Last measurements, shape (4,), not a number before the first tick.
+    repeats
+        Readings in a row that were the same, shape (4,).
+    commands
+        Last commands, shape (4,).
+    travel
+        A ring of VELOCITY_SPAN samples and its place, shape (VELOCITY_SPAN + 1,), m.
+    motor
+        Force that the voltage must have made by now, shape (1,), N.
     """
 
     measured: Array | list[float]
@@ -102,9 +111,23 @@ def empty_memory_arrays() -> LimitMemory:
 def judge_measurements(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements
 ) -> tuple[int, int]:
-    """Finds the first limit that the measurements violate.
+    """Finds the first limit that the measurements of this tick violate.
 
-    A Trip's number, and the column of Measurements.
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        Of the ticks before; changed in place.
+    measured : Measurements
+        Of this tick.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
     """
     for column in range(4):
         if not math.isfinite(measured[column]):
@@ -151,9 +174,27 @@ def judge_measurements(
 def judge_commands(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """Finds the first limit that the commands violate: a Trip's number, and 4 + column of Commands.
+    """Finds the first limit that the commands of this tick violate.
 
     Commands that pass are remembered as written.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        Of the ticks before; changed in place.
+    measured : Measurements
+        Of this tick.
+    commands : Commands
+        Before they are written.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
     """
     for column in range(4):
         if not math.isfinite(commands[column]):
@@ -229,9 +270,21 @@ def is_beyond(limits: Safety, measured: Measurements) -> bool:
 
 
 def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
-    """Why the rig may not be armed as it stands, or None.
+    """Finds why the rig may not be armed as it stands.
 
     After a trip everything must be back inside its limit by the hysteresis.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    measured : Measurements
+        As it stands.
+
+    Returns
+    -------
+    str or None
+        The reason; None if it may be armed.
     """
     share = 1.0 - limits.hysteresis
     for name, limit in zip(
@@ -241,12 +294,30 @@ def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
     ):
         value = getattr(measured, name)
         if not abs(value) <= share * limit:
-            return f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, {100 * share:.0f} % of its limit"
+            return (
+                f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, "
+                f"{100 * share:.0f} % of its limit"
+            )
     return None
 
 
 def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
-    """One line for the operator. column: of Measurements, from 4 on of Commands."""
+    """Explains a trip in one line for the operator.
+
+    Parameters
+    ----------
+    trip : Trip
+        What ended the test.
+    limits : Safety
+        Of the test.
+    column : int
+        Of Measurements, from 4 on of Commands.
+
+    Returns
+    -------
+    str
+        With limit and unit.
+    """
     name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
     lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)
     command, change = ("m", limits.command_rate) if column != 7 else ("V", limits.voltage_rate)

@@ -84,9 +84,22 @@ class Line(NamedTuple):
 class ChannelTable:
     """A card's channel table.
 
-    inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
-    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty
-    for this computer's driver.
+    Parameters
+    ----------
+    inputs, outputs : tuple of Line
+        In the order of Measurements and of OUTPUTS.
+    pressure : str
+        The digital line that lets the hydraulics have pressure while high.
+    plausible : Plausible
+        What its sensors cannot do.
+    device : str
+        The driver's name of the card.
+    address : str
+        Of a gRPC device server, empty for this computer's driver.
+    timing : str
+        hardware or software: whose clock the inputs follow.
+    calibrated, operator, note : str
+        When, by whom, and what they say.
     """
 
     inputs: tuple[Line, ...]
@@ -124,9 +137,22 @@ def load_table(path: Path) -> ChannelTable:
 
 
 def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
-    """The channel table of TOML's tables.
+    """Reads a channel table from TOML's tables.
 
-    Raises RigtwinError for anything missing, unknown or twice.
+    Parameters
+    ----------
+    tables : mapping
+        [card], [plausible], [inputs.NAME], [outputs.NAME].
+
+    Returns
+    -------
+    ChannelTable
+        Complete.
+
+    Raises
+    ------
+    RigtwinError
+        For anything missing, unknown or twice.
     """
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:

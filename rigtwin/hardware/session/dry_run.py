@@ -22,7 +22,20 @@ from rigtwin.simulation.peaks import Peak, peaks
 
 
 def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
-    """How near to every limit a session came that was recorded on the virtual card."""
+    """Predicts how near to every limit a session comes.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of its dry run.
+    configuration : Configuration
+        With the limits.
+
+    Returns
+    -------
+    tuple of Peak
+        One for each limit.
+    """
     commands = np.column_stack([recording.column("/command", name) for name in Commands._fields])
     measurements = np.column_stack(
         [recording.column("/sensor", name) for name in Measurements._fields]
@@ -33,9 +46,23 @@ def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[P
 def digest(
     experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
 ) -> str:
-    """What makes a session another one.
+    """Computes a key of all that makes a session another one.
 
-    Experiment, every setting, what is demanded, and the channel table.
+    Parameters
+    ----------
+    experiment : str
+        Its name.
+    configuration : Configuration
+        Every setting.
+    demands : Array
+        Shape (ticks, 3).
+    table : ChannelTable
+        Of the card.
+
+    Returns
+    -------
+    str
+        SHA-256, in hexadecimal.
     """
     told = json.dumps([experiment, flattened(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()

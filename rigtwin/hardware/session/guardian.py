@@ -37,7 +37,7 @@ ABSENT = 1.0
 
 
 class Guardian:
-    """The loop's side: a `rigtwin.hardware.supervision.Recorder` whose work another process does."""
+    """The loop's side: a `Recorder` of a session whose work another process does."""
 
     def __init__(self, settings: GuardianSettings) -> None:
         """Raises RigtwinError if the recording cannot be written or the process does not come."""
