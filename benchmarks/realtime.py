@@ -7,6 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from google.protobuf.message import Message
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
@@ -15,11 +16,11 @@ from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
-from rigtwin.hardware.daq.virtual import VirtualCard
+from rigtwin.hardware.daq.virtual import Response, VirtualCard
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import (
     Test,
-    on_virtual_card,
+    open_virtual_card,
     record_at_leisure,
     record_in_real_time,
 )
@@ -59,7 +60,7 @@ class _Timed:
         self._answer = device.answer
         device.answer = self._timed  # type: ignore[method-assign]
 
-    def _timed(self, call: str, request: object, response: type) -> object:
+    def _timed(self, call: str, request: Message, response: Response) -> Message:
         begun = perf_counter()
         try:
             return self._answer(call, request, response)
@@ -89,7 +90,9 @@ class _Timed:
 def _test(name: str) -> Test:
     """Without the class a shared computer may keep a loop waiting for longer than a rig could bear; here nothing moves."""
     experiment = EXPERIMENTS[name]
-    configuration = from_assignments(experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"])
+    configuration = from_assignments(
+        experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"]
+    )
     return Test(name, configuration, experiment.demands(configuration, 0), 0, load_table(CARD))
 
 
@@ -98,10 +101,10 @@ def compute(name: str, folder: Path, paced: bool) -> Array:
     not the card. paced: one tick a period, from a cold cache as on the rig, or one after the other."""
     test = _test(name)
     tape = _Taped(test.terminals())
-    card, _ = on_virtual_card(test, tape)
+    card, _ = open_virtual_card(test, tape)
     record_at_leisure(card, test, folder / "tape.mcap")
     tape.rewind()
-    card, device = on_virtual_card(test, tape)
+    card, device = open_virtual_card(test, tape)
     timed = _Timed(card, device, Pacer(test.configuration.timing.period) if paced else None)
     # Without a pause the kernel would stop a FIFO loop for 50 ms of each second.
     record_in_real_time(timed, test, folder / "timed.mcap", lambda: None, guarded=False, fifo=paced)
@@ -127,7 +130,10 @@ def main() -> None:
                 times = 1e6 * compute(test, folder, paced)
                 figures = (*np.percentile(times, [50, 99, 99.9]), times.max())
                 how = "one a ms" if paced else "without a pause"
-                print(f"{test:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures), flush=True)
+                print(
+                    f"{test:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures),
+                    flush=True,
+                )
         print("\nlateness of the twin in real time, us")
         print("scheduling    median  99.9 %    most  missed of 20 000")
         for fifo in (True, False):

@@ -23,7 +23,7 @@ from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.runner import Ran
-from rigtwin.simulation.safety import Trip, Watch, judged, watching_compiled
+from rigtwin.simulation.safety import LimitMemory, Trip, empty_memory_arrays, judge_limits
 
 
 @kernel
@@ -32,7 +32,7 @@ def _ticks(
     body: Body,
     controlling: Controller,
     limits: Safety,
-    watch: Watch,
+    watch: LimitMemory,
     memory: Array,
     demands: Array,
     noise: Array,
@@ -56,7 +56,7 @@ def _ticks(
         for signal in range(4):
             commands_out[tick, signal] = held[signal]
             truth_out[tick, signal] = values[signal]
-        trip, _ = judged(limits, controlling.period, watch, measured, Commands(held[0], held[1], held[2], held[3]))
+        trip, _ = judge_limits(limits, controlling.period, watch, measured, Commands(held[0], held[1], held[2], held[3]))
         if trip != Trip.NONE.value:
             return tick + 1, trip
         advance(truth, body, held, tick * controlling.period)
@@ -76,7 +76,7 @@ def driven(truth: Truth, configuration: Configuration, demands: Array, seed: int
         body,
         controlling,
         configuration.safety,
-        watching_compiled(),
+        empty_memory_arrays(),
         np.array(packed(initial_state(controlling))),
         np.ascontiguousarray(demands),
         noise,

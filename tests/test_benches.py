@@ -62,7 +62,11 @@ def answered(truth: ActuatorTruth | DamperTruth) -> Diagnosis:
     return diagnose(find(recording.machine), [recording])
 
 
-@pytest.mark.parametrize("name", SINGLE)
+CONTAINED = ("lag", "spring", "play")
+"""In another of them."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in CONTAINED else ()) for name in SINGLE])
 def test_what_is_in_a_bench_is_named_with_its_size(name: str):
     truth, effects = SINGLE[name]
     found = answered(truth)

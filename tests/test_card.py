@@ -15,10 +15,17 @@ from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration, Safety, read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.card import Card, CardFault, connected
+from rigtwin.hardware.daq.card import Card, CardFault, connect
 from rigtwin.hardware.daq.conversion import CODES, conversion, to_bits, to_values, to_volts
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.table import ChannelTable, fit, load_table, parsed, trusted, written
+from rigtwin.hardware.daq.table import (
+    ChannelTable,
+    load_table,
+    parse_table,
+    require_ranges,
+    require_trust,
+    to_toml,
+)
 from rigtwin.hardware.daq.terminals import Terminals, WiredTwin
 from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
@@ -50,7 +57,7 @@ def test_a_table_survives_being_written(tmp_path):
     turned = replace(
         TABLE, operator='a "b" \\ c', note="ø\n2", inputs=(TABLE.inputs[0]._replace(sign_checked=True), *TABLE.inputs[1:])
     )
-    path.write_text(written(turned), encoding="utf-8")
+    path.write_text(to_toml(turned), encoding="utf-8")
     assert load_table(path) == turned
 
 
@@ -97,7 +104,7 @@ def test_every_signal_must_be_there(name):
     for group in ("inputs", "outputs"):
         tables[group].pop(name, None)
     with pytest.raises(RigtwinError, match=rf"\.{name}\] is missing"):
-        parsed(tables)
+        parse_table(tables)
 
 
 @pytest.mark.parametrize(
@@ -110,9 +117,9 @@ def test_every_signal_must_be_there(name):
     ],
 )
 def test_a_limit_that_its_line_cannot_show(limit, said):
-    fit(TABLE, Safety())
+    require_ranges(TABLE, Safety())
     with pytest.raises(RigtwinError, match="range too small for the limit") as caught:
-        fit(TABLE, Safety()._replace(**limit))
+        require_ranges(TABLE, Safety()._replace(**limit))
     assert said in str(caught.value)
 
 
@@ -120,7 +127,7 @@ def test_a_real_rig_needs_a_table_that_somebody_answers_for():
     checked = tuple(line._replace(sign_checked=True) for line in TABLE.inputs)
     outputs = tuple(line._replace(sign_checked=True) for line in TABLE.outputs)
     good = replace(TABLE, inputs=checked, outputs=outputs, calibrated="2026-05-30", operator="A. Tester")
-    trusted(good, TODAY)
+    require_trust(good, TODAY)
     for change, said in (
         ({"inputs": (*checked[:3], TABLE.inputs[3])}, "sign not checked: load_cell"),
         ({"calibrated": "last week"}, "expected the date of calibration"),
@@ -128,7 +135,7 @@ def test_a_real_rig_needs_a_table_that_somebody_answers_for():
         ({"operator": " "}, "card.operator is missing"),
     ):
         with pytest.raises(RigtwinError, match=said):
-            trusted(replace(good, **change), TODAY)
+            require_trust(replace(good, **change), TODAY)
 
 
 # Volts
@@ -318,7 +325,7 @@ def test_through_a_socket_it_is_the_same_card():
     device = VirtualCard(Terminals(Configuration(), TABLE, 5), TABLE, OnDemand())
     server, port = serve(device, 0)
     try:
-        channel = connected(f"{LOCAL}:{port}")
+        channel = connect(f"{LOCAL}:{port}")
         assert channel is not None
         far = Card(TABLE, PERIOD, channel, clock=lambda: device.tick * PERIOD)
         near, _ = virtual(seed=5)
@@ -334,20 +341,20 @@ def test_through_a_socket_it_is_the_same_card():
             serve(device, port)
         # The owner dies without a word: its tasks are left, and are freed by name.
         with pytest.raises(CardFault, match="rigtwin card release"):
-            Card(TABLE, PERIOD, connected(f"{LOCAL}:{port}")).start()
+            Card(TABLE, PERIOD, connect(f"{LOCAL}:{port}")).start()
         assert device.outputs[0] > 0.9
         there = replace(TABLE, address=f"{LOCAL}:{port}")
         assert release(there)
         assert not device.pressure
         assert device.outputs[0] == 0.0
         assert not release(there)
-        Card(TABLE, PERIOD, connected(f"{LOCAL}:{port}")).start()
+        Card(TABLE, PERIOD, connect(f"{LOCAL}:{port}")).start()
     finally:
         server.stop(0.0).wait()
 
 
 def test_nobody_there_is_said():
-    card = Card(TABLE, PERIOD, connected("localhost:1"))
+    card = Card(TABLE, PERIOD, connect("localhost:1"))
     with pytest.raises(CardFault, match="card Dev1"):
         card.inspect()
 
@@ -365,7 +372,7 @@ def test_a_card_whose_clock_runs_goes_on_by_itself():
 @pytest.mark.skipif(sys.platform != "linux", reason="the driver may be installed")
 def test_without_the_driver_one_line_says_how_to_get_it():
     with pytest.raises(CardFault, match="driver is missing"):
-        Card(TABLE, PERIOD, connected("")).inspect()
+        Card(TABLE, PERIOD, connect("")).inspect()
 
 
 def test_a_table_that_is_no_table(tmp_path):
@@ -373,7 +380,7 @@ def test_a_table_that_is_no_table(tmp_path):
         path = Path(tmp_path / "t.toml")
         path.write_text(text)
         with pytest.raises(RigtwinError, match=said):
-            read_toml(path, parsed)
+            read_toml(path, parse_table)
 
 
 def test_measurements_are_the_inputs_in_their_order():

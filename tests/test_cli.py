@@ -20,8 +20,9 @@ import pytest
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.recording import load
-from tests.helpers.recordings import EXAMPLE
+from tests.helpers.recordings import SHIPPED
 
+RIG = SHIPPED["known-coulomb-motor"]
 QUICK = ["--set", "timing.duration=0.5"]
 
 
@@ -80,9 +81,9 @@ def bad(tmp_path: Path) -> dict[str, tuple[list[str], str]]:
         "foreign": (["info", str(text)], "is not an MCAP file"),
         "absent": (["plot", str(tmp_path / "absent.mcap")], "cannot read"),
         "folder": (["video", str(tmp_path)], "cannot read"),
-        "ending": (["export", str(EXAMPLE), "-o", str(tmp_path / "e.xyz")], ".csv or .mat"),
-        "json": (["compare", str(EXAMPLE), "--json", str(tmp_path / "absent" / "j.json")], "cannot write"),
-        "two and set": (["compare", str(EXAMPLE), str(EXAMPLE), "--set", "rail.coulomb=3"], "without one"),
+        "ending": (["export", str(RIG), "-o", str(tmp_path / "e.xyz")], ".csv or .mat"),
+        "json": (["compare", str(RIG), "--json", str(tmp_path / "absent" / "j.json")], "cannot write"),
+        "two and set": (["compare", str(RIG), str(RIG), "--set", "rail.coulomb=3"], "without one"),
         "study": (["reproduce", "table-9.9"], "there are chapters 3, 4, 5, 6, 7, A, B"),
         "seeds": (["reproduce", "table-3.5", "--seeds", "0"], "--seeds 0"),
         "workers": (["reproduce", "table-3.5", "--workers", "0"], "--workers 0"),
@@ -167,14 +168,14 @@ def test_help_imports_nothing_heavy():
 def test_no_command_overwrites_its_input(tmp_path, capsys, command):
     ending = {"plot": "png", "export": "csv", "video": "mp4", "compare": "json"}[command]
     path = tmp_path / f"in.{ending}"
-    path.write_bytes(EXAMPLE.read_bytes())
+    path.write_bytes(RIG.read_bytes())
     flag = "--json" if command == "compare" else "-o"
     assert main([command, str(path), flag, str(path)]) == 1
     assert "is the input" in capsys.readouterr().err
-    assert path.read_bytes() == EXAMPLE.read_bytes()
+    assert path.read_bytes() == RIG.read_bytes()
 
 
 @pytest.mark.parametrize("ignored", ["controller.kp=5", "timing.duration=1", "safety.force=100", "road.speed=3"])
 def test_compare_refuses_settings_that_it_would_ignore(capsys, ignored):
-    assert main(["compare", str(EXAMPLE), "--set", ignored]) == 1
+    assert main(["compare", str(RIG), "--set", ignored]) == 1
     assert "the recording's" in capsys.readouterr().err

@@ -7,7 +7,7 @@ import pytest
 
 from controllers import Measurements
 from rigtwin.components import RigPlant
-from rigtwin.signals.noise import white_noise, without_mains
+from rigtwin.signals.noise import remove_mains, white_noise
 from rigtwin.simulation.converters import Disturbance, converted, sensors
 
 
@@ -18,7 +18,7 @@ def test_disturbances_have_the_sizes_of_the_table_and_do_not_depend_on_the_block
     assert np.array_equal(whole, np.concatenate([parts.take(n) for n in (1, 249, 9750, 10_000)]))
     for column, sensor in enumerate(sensors(plant)):
         signal = whole[:, column]
-        left = without_mains(signal, 1e-3, 50.0)
+        left = remove_mains(signal, 1e-3, 50.0)
         assert np.std(left) == pytest.approx(sensor.white, rel=0.03)
         assert np.sqrt(2) * np.std(signal - left) == pytest.approx(sensor.hum, rel=0.03)
         assert white_noise(signal) == pytest.approx(sensor.white, rel=0.1)

@@ -14,7 +14,7 @@ from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.recording import Recording, load
 from rigtwin.signals.runs import longest_run
 from rigtwin.simulation.runner import record
-from tests.helpers.effects import text
+from tests.helpers.effects import once_a_sort, text
 from tests.helpers.recordings import BESIDE, SHIPPED, beside, replace_sensors, shipped
 from tests.helpers.twin import RIG
 
@@ -57,7 +57,7 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
     assert faults(beside(name)) == {}
 
 
-@pytest.mark.parametrize("name", [e.name for e in candidates(RigPlant())])
+@pytest.mark.parametrize("name", once_a_sort([e.name for e in candidates(RigPlant())]))
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
     configuration = experiment.configuration._replace(timing=Timing(duration=3.0))

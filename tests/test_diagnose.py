@@ -167,7 +167,10 @@ def deviation_of(recording: Recording) -> Deviation | None:
 SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}
 
 
-@pytest.mark.parametrize(("name", "value"), SETTINGS.items())
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [pytest.param(*item, marks=SLOW if item[0] in ("kff", "ki") else ()) for item in SETTINGS.items()],
+)
 def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     recording = recorded("road1.6", (f"setting@controller={name}:{value}",), 3.0)
     told = EXPERIMENTS["road1.6"].configuration.controller

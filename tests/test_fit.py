@@ -10,7 +10,6 @@ from rigtwin.components import KINDS, RigPlant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
-from rigtwin.signals.runs import cut_off
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
@@ -123,12 +122,11 @@ def test_spikes_go_and_steps_stay():
 
 
 def test_ticks_where_a_sensor_is_cut_off_do_not_count():
-    signal = np.sin(np.linspace(0, 20, 2000)) + 1e-3 * np.random.default_rng(0).standard_normal(
-        2000
-    )
-    assert not cut_off(signal).any()
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(2000)
+    signal = np.sin(np.linspace(0, 20, 2000)) + noise
+    assert not find_cut_off(signal).any()
     clipped = np.minimum(signal, 0.8)
-    assert np.array_equal(cut_off(clipped), clipped == 0.8)
+    assert np.array_equal(find_cut_off(clipped), clipped == 0.8)
 
 
 def test_two_effects_are_told_apart():

@@ -16,7 +16,7 @@ from rigtwin.models.choose import model_of
 from rigtwin.models.following import followed
 from rigtwin.models.guided import Inertia, carried
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smoothed
+from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
 
 PERIOD = 1e-3
@@ -210,7 +210,7 @@ def test_a_measured_motion_is_smoothed_to_below_its_noise():
     random = np.random.default_rng(1)
     time = np.arange(8000) * PERIOD
     true = 0.02 * np.sin(2 * np.pi * time) + 0.005 * np.sin(2 * np.pi * 2.3 * time)
-    found, error = smoothed(true + 1e-5 * random.standard_normal(8000), PERIOD)
+    found, error = smooth(true + 1e-5 * random.standard_normal(8000), PERIOD)
     left = (found - true)[300:-300]
     assert np.std(left) < 3e-6
     assert error < 3e-6

@@ -11,7 +11,7 @@ from scipy.io import savemat
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
-from rigtwin.importing.table import layout, read
+from rigtwin.importing.table import find_layout, read
 from rigtwin.importing.units import UNITS, unit_of
 from rigtwin.recording import load
 
@@ -228,6 +228,6 @@ def test_every_unit_has_an_si_unit_that_is_one_itself():
 
 
 def test_thousands_are_no_columns():
-    found = layout(["a;b", "1.234,5;2", "1.235,5;3", "1.236,5;4", "1.237,5;5", "1.238,5;6"])
+    found = find_layout(["a;b", "1.234,5;2", "1.235,5;3", "1.236,5;4", "1.237,5;5", "1.238,5;6"])
     assert found is not None
     assert (found.separator, found.decimal) == (";", ",")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.signals.noise import band, motion, rms, white_noise, without_mains
+from rigtwin.signals.noise import band, estimate_motion, remove_mains, rms, white_noise
 
 TIME = np.arange(20_000) * 1e-3
 
@@ -25,7 +25,7 @@ def test_white_noise_is_found_beneath_motion_hum_and_friction_jumps(deviation):
 @pytest.mark.parametrize("frequency", [49.97, 50.0, 50.03])
 def test_mains_is_taken_out_and_the_mean_stays(frequency):
     slow = 3.0 + np.sin(2 * np.pi * 0.7 * TIME)
-    left = without_mains(slow + 5.0 * np.sin(2 * np.pi * frequency * TIME + 1.0), 1e-3, 50.0)
+    left = remove_mains(slow + 5.0 * np.sin(2 * np.pi * frequency * TIME + 1.0), 1e-3, 50.0)
     assert rms(left - slow) < 0.05
     assert np.mean(left) == pytest.approx(np.mean(slow), abs=1e-2)
 
@@ -39,10 +39,10 @@ def test_band_holds_the_middle_of_the_power():
 def test_motion_trusts_the_model_where_it_is_right_and_the_data_where_it_is_not():
     truth = 0.01 * np.sin(2 * np.pi * 0.8 * TIME)
     measured = truth + noise(6e-5)
-    right = motion(measured, truth, 1e-3, 50.0)
+    right = estimate_motion(measured, truth, 1e-3, 50.0)
     assert rms(right.position - truth) < 2e-6
     assert right.velocity_error == 0.0
-    wrong = motion(measured, 0.9 * truth, 1e-3, 50.0)
+    wrong = estimate_motion(measured, 0.9 * truth, 1e-3, 50.0)
     assert rms(wrong.position - truth) < 1.5e-5
     actual = np.std(np.gradient(wrong.position - truth, 1e-3)[1000:-1000])
     assert 0.5 < wrong.velocity_error / actual < 4.0

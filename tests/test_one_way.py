@@ -71,9 +71,9 @@ COARSE = 9e-4
 """m, rms: fifteen times what is declared."""
 
 
-def pushed(machine: rigtwin.Machine, **effects: float) -> rigtwin.Recording:
+def pushed(machine: rigtwin.Machine, share: float = 1.0, **effects: float) -> rigtwin.Recording:
     def push(_: rigtwin.Configuration, seed: int) -> dict[str, np.ndarray]:  # noqa: ARG001
-        return {"force": PUSH}
+        return {"force": share * PUSH}
 
     given = {f"{kind}@encoder": value for kind, value in effects.items()}
     return rigtwin.run(machine, push, seed=2, effects=given)
@@ -87,13 +87,15 @@ def test_a_joints_sensor_of_declared_noise_is_no_finding(tmp_path: Path, toml: s
 
 
 @pytest.mark.parametrize(
-    ("sort", "unit", "toml"),
-    [("slide", "m", LVDT), ("slide", "m", PLAIN), ("pendulum", "rad", PLAIN)],
+    ("sort", "share", "unit", "toml"),
+    [("slide", 1.0, "m", LVDT), ("slide", 1.0, "m", PLAIN), ("pendulum", 0.04, "rad", PLAIN)],
     ids=["lvdt", "position sensor", "turning"],
 )
-def test_coarse_noise_of_a_joints_sensor_is_named(tmp_path: Path, sort: str, unit: str, toml: str):
+def test_coarse_noise_of_a_joints_sensor_is_named(
+    tmp_path: Path, sort: str, share: float, unit: str, toml: str
+):
     machine = described(tmp_path, sort, toml)
-    found = rigtwin.diagnose(pushed(machine, noise=COARSE))
+    found = rigtwin.diagnose(pushed(machine, share, noise=COARSE))
     assert names(found) == {"noise@encoder"}
     white = found.effects[0].parameters["white"]
     assert white.value == pytest.approx(COARSE, rel=0.1)

@@ -10,7 +10,14 @@ import pytest
 from controllers import Commands, Measurements
 from rigtwin.description.configuration import Safety
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.safety import Trip, explained, judged, watching, watching_compiled, within
+from rigtwin.simulation.safety import (
+    Trip,
+    empty_memory,
+    empty_memory_arrays,
+    explain_trip,
+    find_arming_obstacle,
+    judge_limits,
+)
 
 PERIOD = 1e-3
 REST = Measurements(0.0, -0.004, 0.0, 200.0)
@@ -20,7 +27,7 @@ AT = {name: column for column, name in enumerate((*Measurements._fields, *(f"com
 
 def verdict(measured: Measurements, commands: Commands, limits: Safety | None = None) -> tuple[Trip, int]:
     """Of a tick that comes first, so that nothing can have jumped."""
-    trip, column = judged(limits or Safety(), PERIOD, watching(), measured, commands)
+    trip, column = judge_limits(limits or Safety(), PERIOD, empty_memory(), measured, commands)
     return Trip(trip), column
 
 
@@ -57,20 +64,20 @@ def test_each_limit(measured, commands, trip, where):
     ],
 )
 def test_limits_on_what_a_tick_may_change(measured, commands, trip, where):
-    watch = watching()
-    assert judged(Safety(), PERIOD, watch, REST, STILL)[0] == Trip.NONE
-    assert judged(Safety(), PERIOD, watch, measured, commands) == (trip, AT[where])
+    watch = empty_memory()
+    assert judge_limits(Safety(), PERIOD, watch, REST, STILL)[0] == Trip.NONE
+    assert judge_limits(Safety(), PERIOD, watch, measured, commands) == (trip, AT[where])
 
 
 def test_travel_that_is_too_fast():
-    watch = watching()
+    watch = empty_memory()
     limits = Safety(velocity=1.5)
-    trips = [judged(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0] for tick in range(40)]
+    trips = [judge_limits(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0] for tick in range(40)]
     assert trips.index(Trip.VELOCITY) == 10
 
 
 def test_stuck_sensor_is_seen_at_the_last_of_the_readings_allowed():
-    watch, limits = watching(), Safety(stuck=7.0)
+    watch, limits = empty_memory(), Safety(stuck=7.0)
     noise = np.random.default_rng(0).normal(0.0, 1e-5, (30, 4))
     trips, last = [], REST
     for tick in range(30):
@@ -78,24 +85,24 @@ def test_stuck_sensor_is_seen_at_the_last_of_the_readings_allowed():
         if tick >= 11:
             measured = measured._replace(suspension_lvdt=last.suspension_lvdt)
         last = measured
-        trips.append(judged(limits, PERIOD, watch, measured, STILL))
+        trips.append(judge_limits(limits, PERIOD, watch, measured, STILL))
     assert trips.index((Trip.STUCK, AT["suspension_lvdt"])) == 16
 
 
 @kernel
 def _compiled(limits, watch, measured, commands):
-    return judged(limits, 1e-3, watch, measured, commands)
+    return judge_limits(limits, 1e-3, watch, measured, commands)
 
 
 def test_compiled_is_the_same():
     random = np.random.default_rng(1)
-    one, other = watching(), watching_compiled()
+    one, other = empty_memory(), empty_memory_arrays()
     limits = Safety(stuck=5.0, lvdt_rate=20.0, force_rate=2e6)
     seen = set()
     for _ in range(3000):
         measured = Measurements(*(random.normal(0.0, 1.0, 4) * [0.01, 0.01, 0.01, 700.0]).tolist())
         commands = Commands(*(random.normal(0.0, 1.0, 4) * [0.002, 0.002, 700.0, 3.0]).tolist())
-        verdicts = judged(limits, PERIOD, one, measured, commands), _compiled(limits, other, measured, commands)
+        verdicts = judge_limits(limits, PERIOD, one, measured, commands), _compiled(limits, other, measured, commands)
         assert verdicts[0] == verdicts[1]
         seen.add(verdicts[0][0])
     assert len(seen) > 3
@@ -104,16 +111,16 @@ def test_compiled_is_the_same():
 @pytest.mark.parametrize("trip", Trip)
 def test_every_trip_is_explained_with_its_place(trip):
     for column in range(8):
-        line = explained(trip, Safety(stuck=7.0), column)
+        line = explain_trip(trip, Safety(stuck=7.0), column)
         assert line
         assert "\n" not in line
 
 
 def test_arming_needs_every_signal_back_inside_by_the_hysteresis():
-    assert within(Safety(), REST) is None
-    refused = within(Safety(), REST._replace(structure_lvdt=0.14))
+    assert find_arming_obstacle(Safety(), REST) is None
+    refused = find_arming_obstacle(Safety(), REST._replace(structure_lvdt=0.14))
     assert refused is not None
     assert "structure_lvdt" in refused
     assert "0.135" in refused
-    assert within(Safety(hysteresis=0.0), REST._replace(structure_lvdt=0.14)) is None
-    assert "load_cell" in (within(Safety(), REST._replace(load_cell=math.nan)) or "")
+    assert find_arming_obstacle(Safety(hysteresis=0.0), REST._replace(structure_lvdt=0.14)) is None
+    assert "load_cell" in (find_arming_obstacle(Safety(), REST._replace(load_cell=math.nan)) or "")

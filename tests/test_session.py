@@ -15,24 +15,25 @@ import numpy as np
 import pytest
 
 from controllers import Measurements
+from experiments import find
 from rigtwin.cli import main
 from rigtwin.description.configuration import Configuration, from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.calibration import (
     FORCE,
-    at_rest,
-    bumps,
-    responses,
-    signed,
-    spanned,
-    zeroed,
+    correct_signs,
+    fit_responses,
+    measure_rest,
+    plan_bumps,
+    set_spans,
+    set_zeros,
 )
-from rigtwin.hardware.daq.table import load_table, written
+from rigtwin.hardware.daq.table import load_table, to_toml
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
-from rigtwin.hardware.realtime import Pacer, in_real_time, machine_lacks, monotonic, sleep_until
-from rigtwin.hardware.session.dry_run import digest, enter, ledger, passed, predicted
-from rigtwin.hardware.session.plan import planned
+from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
+from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
+from rigtwin.hardware.session.plan import parse_plan
 from rigtwin.hardware.session.record import Test, record_in_real_time
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
@@ -52,13 +53,11 @@ def card(tmp_path):
         operator="A. Tester",
     )
     path = tmp_path / "card.toml"
-    path.write_text(written(table), encoding="utf-8")
+    path.write_text(to_toml(table), encoding="utf-8")
     return path
 
 
 def session(*settings: str, seed: int = 0) -> Test:
-    from experiments import find
-
     experiment = find("imposed")
     configuration = from_assignments(experiment.configuration, ["timing.duration=1", "safety.ramp=0.3", *settings])
     return Test("imposed", configuration, experiment.demands(configuration, seed), seed, TABLE)
@@ -77,7 +76,7 @@ def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
     entries = json.loads(ledger(card).read_text())
     assert [entry["experiment"] for entry in entries.values()] == ["imposed"]
     recording = load(out)
-    figures = {figure.name: figure for figure in predicted(recording, Configuration())}
+    figures = {figure.name: figure for figure in predict_peaks(recording, Configuration())}
     force = np.abs(recording.column("/sensor", "load_cell"))
     assert figures["force"].peak == pytest.approx(float(force.max()))
     assert figures["force"].margin == pytest.approx(1.0 - float(force.max()) / 1500.0)
@@ -96,15 +95,15 @@ def test_another_setting_is_another_session(tmp_path):
     assert len(set(keys)) == len(keys)
     assert key(base) == key(session())
     path = tmp_path / "card.toml"
-    assert not passed(path, keys[0])
+    assert not has_passed(path, keys[0])
     enter(path, keys[0], {"experiment": "imposed"})
     enter(path, keys[1], {"experiment": "imposed"})
-    assert passed(path, keys[0])
-    assert passed(path, keys[1])
-    assert not passed(path, keys[2])
+    assert has_passed(path, keys[0])
+    assert has_passed(path, keys[1])
+    assert not has_passed(path, keys[2])
     ledger(path).write_text("[]")
     with pytest.raises(RigtwinError, match="not a list of dry runs"):
-        passed(path, keys[0])
+        has_passed(path, keys[0])
 
 
 @pytest.mark.parametrize(
@@ -141,7 +140,7 @@ def test_mistakes_are_said_before_anything_moves(card, capsys, arguments, said, 
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
     from rigtwin.cli import session_commands as commands
 
-    monkeypatch.setattr(commands, "on_card", lambda _: None)
+    monkeypatch.setattr(commands, "open_card", lambda _: None)
     monkeypatch.chdir(tmp_path)
     run = ["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]
     assert main(run) == 1
@@ -195,7 +194,7 @@ def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, mo
 )
 def test_mistakes_in_a_list(tables, said):
     with pytest.raises(RigtwinError, match=said):
-        planned(tables)
+        parse_plan(tables, find)
 
 
 def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):
@@ -236,14 +235,14 @@ def test_every_wrong_sign_is_found(signs):
     from rigtwin.hardware.daq.transport import InProcess
     from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
     from rigtwin.hardware.session.recorder import NUMBER, SENSORS
-    from rigtwin.hardware.supervised import supervise
+    from rigtwin.hardware.supervision import supervise
     from rigtwin.hardware.supervisor import COMPLETED
 
     turned = [
         line._replace(scaling=line.scaling._replace(sign=float(sign))) for line, sign in zip(TABLE.lines, signs, strict=True)
     ]
     wiring = replace(TABLE, inputs=tuple(turned[:4]), outputs=tuple(turned[4:]))
-    configuration, demands = bumps(0.005, FORCE, 1e-3)
+    configuration, demands = plan_bumps(0.005, FORCE, 1e-3)
     device = VirtualCard(Terminals(configuration, wiring, 0), wiring, OnDemand())
     rows = []
 
@@ -267,16 +266,16 @@ def test_every_wrong_sign_is_found(signs):
     assert ended.cause == COMPLETED
     measured = np.array(rows)[:, SENSORS]
     moved = {line.name: sign for line, sign in zip(TABLE.outputs, signs[4:], strict=True)}
-    found, _ = signed(TABLE, responses(measured, demands), moved)
+    found, _ = correct_signs(TABLE, fit_responses(measured, demands), moved)
     assert [line.scaling.sign for line in found.lines] == list(signs)
     assert all(line.sign_checked for line in found.lines)
 
 
 def test_a_dead_signal_is_no_sign():
-    demands = bumps(0.005, FORCE, 1e-3)[1]
+    demands = plan_bumps(0.005, FORCE, 1e-3)[1]
     noise = np.random.default_rng(0).normal(0.0, 1e-4, (len(demands), 4))
     with pytest.raises(RigtwinError, match="hardly answers"):
-        signed(TABLE, responses(noise, demands), {"ground": 1, "structure": 1, "voltage": 1})
+        correct_signs(TABLE, fit_responses(noise, demands), {"ground": 1, "structure": 1, "voltage": 1})
 
 
 class Standing:
@@ -292,32 +291,32 @@ class Standing:
 
 
 def test_zero_and_span():
-    still = at_rest(Standing([0.003, -0.002, 0.001, 12.5]), 500)  # type: ignore[arg-type]
-    table = zeroed(TABLE, still, {"structure_lvdt": 0.1})
+    still = measure_rest(Standing([0.003, -0.002, 0.001, 12.5]), 500)  # type: ignore[arg-type]
+    table = set_zeros(TABLE, still, {"structure_lvdt": 0.1})
     offsets = [line.scaling.offset for line in table.inputs]
     assert offsets == pytest.approx([-0.003, 0.102, -0.001, -12.5], abs=5e-5)
-    still = at_rest(Standing([0.0, 0.0, 0.105, 0.0]), 500)  # type: ignore[arg-type]
-    spread = spanned(TABLE, still, {"suspension_lvdt": 0.1})
+    still = measure_rest(Standing([0.0, 0.0, 0.105, 0.0]), 500)  # type: ignore[arg-type]
+    spread = set_spans(TABLE, still, {"suspension_lvdt": 0.1})
     assert spread.inputs[2].scaling.scale == pytest.approx(0.025 * 0.1 / 0.105, rel=1e-3)
     for name, said in (("ground_lvdt", "which is noise"),):
         with pytest.raises(RigtwinError, match=said):
-            spanned(TABLE, still, {name: 0.1})
+            set_spans(TABLE, still, {name: 0.1})
     with pytest.raises(RigtwinError, match="check signs first"):
-        spanned(TABLE, still, {"suspension_lvdt": -0.1})
+        set_spans(TABLE, still, {"suspension_lvdt": -0.1})
 
 
 def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
-    from rigtwin.hardware.daq.table import trusted
+    from rigtwin.hardware.daq.table import require_trust
 
     wiring = replace(TABLE, inputs=(*TABLE.inputs[:3], TABLE.inputs[3]._replace(
         scaling=TABLE.inputs[3].scaling._replace(sign=-1.0, offset=12.5))))  # fmt: skip
-    (tmp_path / "wiring.toml").write_text(written(wiring))
+    (tmp_path / "wiring.toml").write_text(to_toml(wiring))
     out = tmp_path / "checked.toml"
     check = ["card", "check", str(CARD), "--operator", "A. Tester", "--note", "first", "--signs", "--zero"]
     assert main([*check, "--virtual", str(tmp_path / "wiring.toml"), "-o", str(out)]) == 0
     assert "load_cell: reads the wrong way" in capsys.readouterr().out
     checked = load_table(out)
-    trusted(checked, date.today())
+    require_trust(checked, date.today())
     cell = checked.inputs[3].scaling
     assert cell.sign == -1.0
     assert cell.offset == pytest.approx(12.5, abs=0.5)
@@ -373,7 +372,7 @@ def test_what_was_taken_for_real_time_is_given_back():
     assert gc.isenabled()
     if before is not None:
         assert os.sched_getscheduler(0) == before
-    assert all(": " in line for line in machine_lacks())
+    assert all(": " in line for line in list_shortcomings())
 
 
 def patient() -> Test:
@@ -424,18 +423,18 @@ def test_without_its_guardian_the_session_stops(tmp_path, number, said):
 def test_the_live_view_is_served_on_this_computer_only():
     import socket
 
-    from rigtwin.hardware.session.live import live_view
+    from rigtwin.hardware.session.live import open_live_view
     from rigtwin.recording.channels import topic_fields
 
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    show = live_view(port)
+    show = open_live_view(port)
     show("/session", np.zeros((20, len(topic_fields("/session")))))
     with socket.create_connection(("127.0.0.1", port), 5.0):
         pass
     with pytest.raises(RigtwinError, match="no live view on port"):
-        live_view(port)
+        open_live_view(port)
     others = {str(address[4][0]) for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
     for address in others:
         with pytest.raises(OSError, match=r".*"), socket.create_connection((address, port), 1.0):

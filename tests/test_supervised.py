@@ -20,10 +20,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import WiredTwin
-from rigtwin.hardware.faults.campaign import drawn, last_words, tried
+from rigtwin.hardware.faults.campaign import draw_faults, last_words, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
-from rigtwin.hardware.faults.processes import tried as tried_apart
-from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure
+from rigtwin.hardware.faults.processes import try_process_fault
+from rigtwin.hardware.session.record import Test, open_virtual_card, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
 from rigtwin.recording import load
@@ -79,11 +79,12 @@ def test_motion_is_reached_and_left_through_every_state_between():
 # The same on the twin and on the card
 
 
-@pytest.mark.parametrize("name", ["road1.6", "imposed"])
-@pytest.mark.parametrize("seconds", [4, pytest.param(45, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "seconds"), [("road1.6", 4), ("imposed", 4), pytest.param("road1.6", 45, marks=pytest.mark.slow)]
+)
 def test_card_and_twin_give_the_same_recording(tmp_path, name, seconds):
     test = session(name, f"timing.duration={seconds}", seed=2)
-    card, _ = on_virtual_card(test)
+    card, _ = open_virtual_card(test)
     ended = record_at_leisure(card, test, tmp_path / "card.mcap")
     assert ended.cause == COMPLETED
     record_at_leisure(WiredTwin(test.terminals(), TABLE), test, tmp_path / "twin.mcap")
@@ -97,7 +98,7 @@ def test_a_software_timed_card_gives_the_same_too(tmp_path):
     records = []
     for timing in ("hardware", "software"):
         timed = replace(test, table=replace(TABLE, timing=timing))
-        card, _ = on_virtual_card(timed)
+        card, _ = open_virtual_card(timed)
         record_at_leisure(card, timed, tmp_path / f"{timing}.mcap")
         records.append(load(tmp_path / f"{timing}.mcap"))
     for topic, names in records[0].columns.items():
@@ -110,7 +111,7 @@ def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
     from mcap_protobuf.decoder import DecoderFactory
 
     test = session("drop")
-    card, device = on_virtual_card(test)
+    card, device = open_virtual_card(test)
     record_at_leisure(card, test, tmp_path / "r.mcap")
     with (tmp_path / "r.mcap").open("rb") as file:
         messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics=["/session"])
@@ -130,7 +131,7 @@ def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
 
 def test_the_rest_before_arming_may_be_ended_too(tmp_path):
     test = session("imposed")
-    card, _ = on_virtual_card(test)
+    card, _ = open_virtual_card(test)
     with pytest.raises(RigtwinError, match="not armed: stopped by the operator"):
         record_at_leisure(card, test, tmp_path / "r.mcap", lambda: "stopped by the operator: test")
     assert states(tmp_path / "r.mcap") == ["faulted"]
@@ -143,7 +144,7 @@ def test_the_rest_before_arming_may_be_ended_too(tmp_path):
 def test_the_operator_stops_in_every_state(tmp_path, seconds):
     """Armed, ramping, running, at the end, and while it is being ramped out."""
     test = session("imposed")
-    card, device = on_virtual_card(test)
+    card, device = open_virtual_card(test)
     at = device.tick + round(1000 * (seconds + 1.1))
     outputs = []
 
@@ -200,7 +201,7 @@ def test_a_rig_that_is_out_of_its_limits_is_not_armed(tmp_path):
     test = session("imposed")
     wrong = TABLE.inputs[1]._replace(scaling=TABLE.inputs[1].scaling._replace(offset=-0.14))
     wired = replace(test, table=replace(TABLE, inputs=(TABLE.inputs[0], wrong, *TABLE.inputs[2:])))
-    card, device = on_virtual_card(test, wired.terminals())
+    card, device = open_virtual_card(test, wired.terminals())
     with pytest.raises(RigtwinError, match=r"structure_lvdt is .*; arming needs it within 0\.135"):
         record_at_leisure(card, test, tmp_path / "r.mcap")
     assert states(tmp_path / "r.mcap") == ["faulted"]
@@ -209,9 +210,9 @@ def test_a_rig_that_is_out_of_its_limits_is_not_armed(tmp_path):
 
 
 def test_limits_of_the_card_reach_the_session():
-    assert session("imposed").limited.safety.stuck == 7.0
+    assert session("imposed").card_configuration.safety.stuck == 7.0
     with pytest.raises(RigtwinError, match="range too small"):
-        _ = session("single-mass-road").limited
+        _ = session("single-mass-road").card_configuration
 
 
 # Faults
@@ -220,16 +221,17 @@ def test_limits_of_the_card_reach_the_session():
 @pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", HERE, ids=lambda kind: kind.name)
 def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
-    [fault] = drawn(1, seed, [kind])
-    outcome = tried(fault, TABLE, tmp_path)
-    assert outcome.passed, outcome
+    [fault] = draw_faults(1, seed, [kind])
+    outcome = try_fault(fault, find(fault.experiment), TABLE, tmp_path)
+    assert outcome.ok, outcome
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="Linux")
 def test_a_dead_controller_process_is_stopped_for(tmp_path):
-    [fault] = drawn(1, 3, APART)
-    outcome = tried_apart(replace(fault, at=1300 + fault.at % 500), TABLE, tmp_path)
+    [fault] = draw_faults(1, 3, APART)
+    fault = replace(fault, at=1300 + fault.at % 500)
+    outcome = try_process_fault(fault, find(fault.experiment), TABLE, tmp_path)
     assert (outcome.cause, outcome.right, outcome.readable) == ("process", True, True)
     assert outcome.exceeded <= 1.1
     # In ticks of a card whose clock is slowed; a busy computer may add to them.
@@ -257,7 +259,7 @@ def slowed(device, ticks):
 )
 def test_a_loop_that_is_too_slow_is_called_late(tmp_path, ticks, said):
     test = session("road1.6", "timing.duration=3", "safety.ramp=0.4", "safety.hold=0.1")
-    card, device = on_virtual_card(test)
+    card, device = open_virtual_card(test)
     ended = record_at_leisure(card, test, tmp_path / "r.mcap", updating=slowed(device, ticks))
     assert said in ended.cause.reason
     recording = load(tmp_path / "r.mcap")
@@ -267,7 +269,7 @@ def test_a_loop_that_is_too_slow_is_called_late(tmp_path, ticks, said):
 
 def test_ticks_missed_in_the_ramp_do_not_cut_off_the_beginning(tmp_path):
     test = session("imposed")
-    card, device = on_virtual_card(test)
+    card, device = open_virtual_card(test)
 
     def stop() -> None:
         if device.tick % 50 == 0 and 450 < device.tick < 1000:
@@ -280,7 +282,7 @@ def test_ticks_missed_in_the_ramp_do_not_cut_off_the_beginning(tmp_path):
 
 
 def test_limits_closer_than_the_tables_are_kept():
-    limits = session("imposed", "safety.stuck=5", "safety.motor=80").limited.safety
+    limits = session("imposed", "safety.stuck=5", "safety.motor=80").card_configuration.safety
     assert (limits.stuck, limits.wheel, limits.motor) == (5.0, 0.02, 80.0)
 
 

@@ -13,7 +13,7 @@ from experiments.thesis.reproduction import Chapter, cut, document, gallery, pag
 from experiments.thesis.work import done
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.render.plot import checked_ending, save
+from rigtwin.render.plot import check_ending, save
 from rigtwin.studies.sweep import open_workers
 
 MOST_SEEDS = 1000
@@ -71,7 +71,7 @@ def _draw(chapters: list[Chapter], folder: Path) -> list[tuple[str, Path]]:
     for chapter in chapters:
         for drawing in chapter.conclusion.drawings:
             out = folder / f"{chapter.study.name}-{drawing.name}.png"
-            checked_ending(out)
+            check_ending(out)
             save(drawing.figure, out)
             drawn.append((drawing.covers, out))
     return drawn

@@ -18,7 +18,7 @@ from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, ideal
 from rigtwin.simulation.metrics import tracked
 from rigtwin.simulation.runner import Ran, simulated
-from rigtwin.simulation.safety import Trip, explained
+from rigtwin.simulation.safety import Trip, explain_trip
 
 BODY = 3.0
 """Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the twin's friction limit cycle,
@@ -64,7 +64,7 @@ def trial(name: str, seed: int, change: Callable[[Configuration], Configuration]
     ran = simulated(configuration, demands, seed)
     if ran.trip != Trip.NONE:
         raise RigtwinError(
-            f"{name} with seed {seed}: {explained(ran.trip, configuration.safety)} after {len(ran.commands)} ticks"
+            f"{name} with seed {seed}: {explain_trip(ran.trip, configuration.safety)} after {len(ran.commands)} ticks"
         )
     return Trial(configuration, ran, ideal(configuration, ran.commands[:, 0]))
 

@@ -19,17 +19,24 @@ from rigtwin.description.configuration import Configuration, applied
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,
-    at_rest,
-    bumps,
-    dated,
-    responses,
-    signed,
-    spanned,
-    zeroed,
+    correct_signs,
+    fit_responses,
+    measure_rest,
+    plan_bumps,
+    set_spans,
+    set_zeros,
+    sign_off,
 )
-from rigtwin.hardware.daq.card import Card, connected, require_client
+from rigtwin.hardware.daq.card import Card, connect, require_client
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible, fit, load_table, written
+from rigtwin.hardware.daq.table import (
+    OUTPUTS,
+    ChannelTable,
+    Plausible,
+    load_table,
+    require_ranges,
+    to_toml,
+)
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, RealTime, VirtualCard
 from rigtwin.hardware.realtime import Pacer
@@ -44,7 +51,7 @@ LEAST_STROKE, MOST_STROKE = 0.001, 0.02
 
 
 def serve(parsed: Namespace) -> int:
-    """A virtual card with the twin at its terminals, in real time, for any NI-DAQmx gRPC client on this computer."""
+    """Serves a virtual card with the twin at its terminals, in real time, on this computer."""
     require_client()
     from rigtwin.hardware.daq.transport import LOCAL
     from rigtwin.hardware.daq.transport import serve as listen
@@ -57,7 +64,8 @@ def serve(parsed: Namespace) -> int:
     card = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, port = listen(card, parsed.port)
     print(
-        f'virtual card {table.device}: set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.',
+        f"virtual card {table.device}: "
+        f'set address = "{LOCAL}:{port}" in the channel table. Ctrl-C ends it.',
         flush=True,
     )
     with stop_requests() as stop:
@@ -73,11 +81,13 @@ def free(parsed: Namespace) -> int:
     table = load_table(parsed.card)
     if not table.address:
         raise RigtwinError(
-            "card.address is empty: the driver of this computer frees a dead program's lines by itself"
+            "card.address is empty: "
+            "the driver of this computer frees a dead program's lines by itself"
         )
     left = release(table)
     print(
-        f"motor at zero, pressure off; {'what a dead program had is free' if left else 'nothing had been left'}"
+        "motor at zero, pressure off; "
+        f"{'what a dead program had is free' if left else 'nothing had been left'}"
     )
     return 0
 
@@ -90,15 +100,15 @@ def check(parsed: Namespace) -> int:
     if not parsed.operator.strip():
         raise RigtwinError("--operator is empty: expected who calibrates")
     spans, references = (
-        _named(parsed.span, "--span", table),
-        _named(parsed.reference, "--reference", table),
+        _parse_values(parsed.span, "--span", table),
+        _parse_values(parsed.reference, "--reference", table),
     )
     if not LEAST_STROKE <= parsed.stroke <= MOST_STROKE:
         raise RigtwinError(
             f"--stroke {parsed.stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m"
         )
-    told = _told(parsed.moved)
-    fit(table, Configuration().safety)
+    told = _parse_directions(parsed.moved)
+    require_ranges(table, Configuration().safety)
     if not (parsed.signs or parsed.zero or spans):
         raise RigtwinError("nothing to do: --zero, --span NAME=VALUE or --signs")
     wiring = load_table(parsed.virtual) if parsed.virtual is not None else None
@@ -108,7 +118,7 @@ def check(parsed: Namespace) -> int:
         rig = _rig(table, wiring)
         try:
             rig.start()
-            still = at_rest(rig)
+            still = measure_rest(rig)
         finally:
             rig.stop()
         rows: list[tuple[str, ...]] = [("signal", "mean", "noise", "same in a row")]
@@ -117,21 +127,22 @@ def check(parsed: Namespace) -> int:
         for signal in still:
             if signal.repeats >= table.plausible.stuck:
                 raise RigtwinError(
-                    f"{signal.name} gave {signal.repeats} times the same reading: stuck or not connected"
+                    f"{signal.name} gave {signal.repeats} times the same reading: "
+                    "stuck or not connected"
                 )
-        table = spanned(table, still, spans) if spans else table
-        table = zeroed(table, still, references) if parsed.zero else table
-    fit(table, Configuration().safety)
-    table = dated(table, parsed.operator, parsed.note, date.today())
+        table = set_spans(table, still, spans) if spans else table
+        table = set_zeros(table, still, references) if parsed.zero else table
+    require_ranges(table, Configuration().safety)
+    table = sign_off(table, parsed.operator, parsed.note, date.today())
     try:
-        parsed.out.write_text(written(table), encoding="utf-8")
+        parsed.out.write_text(to_toml(table), encoding="utf-8")
     except OSError as error:
         raise RigtwinError(f"cannot write {parsed.out}: {error.strerror}") from None
     print(f"channel table in {parsed.out}")
     return 0
 
 
-def _named(texts: Sequence[str], option: str, table: ChannelTable) -> dict[str, float]:
+def _parse_values(texts: Sequence[str], option: str, table: ChannelTable) -> dict[str, float]:
     """input → value of each NAME=VALUE. Raises RigtwinError."""
     names, found = [line.name for line in table.inputs], dict[str, float]()
     for text in texts:
@@ -154,7 +165,7 @@ def _rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
         card = Card(
             table,
             period,
-            connected(table.address),
+            connect(table.address),
             pacer=Pacer(period) if table.timing == "software" else None,
         )
     else:
@@ -173,11 +184,12 @@ def _signs(
     """Moves every output a little, under supervision, and turns the signs that are wrong."""
     if wiring is None and not parsed.arm:
         _ask(
-            "the check moves ground, structure and motor a little; everybody clear? type arm to go: ",
+            "the check moves ground, structure and motor a little; "
+            "everybody clear? type arm to go: ",
             ("arm",),
         )
     rig = _rig(table, wiring)
-    configuration, demands = bumps(parsed.stroke, FORCE, Configuration().timing.period)
+    configuration, demands = plan_bumps(parsed.stroke, FORCE, Configuration().timing.period)
     # Signals whose signs are unknown cannot be held against each other; each alone still can.
     alone = replace(table, plausible=Plausible(stuck=table.plausible.stuck, wheel=1e9, motor=1e9))
     test = Test("sign check", configuration, demands, 0, alone)
@@ -192,17 +204,18 @@ def _signs(
         recording = load(path)
     if recording.ticks != len(demands):
         raise RigtwinError(
-            f"{len(demands) - recording.ticks} ticks were missed; do it again, with less else on this computer"
+            f"{len(demands) - recording.ticks} ticks were missed; do it again, "
+            "with less else on this computer"
         )
     measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
-    moved = {output: _went(output, table, wiring, told) for output in OUTPUTS}
-    checked, said = signed(table, responses(measured, demands), moved)
+    moved = {output: _find_direction(output, table, wiring, told) for output in OUTPUTS}
+    checked, said = correct_signs(table, fit_responses(measured, demands), moved)
     for line in said or ("every sign is right",):
         print(line)
     return checked
 
 
-def _told(texts: Sequence[str]) -> dict[str, int]:
+def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
     """output → which way it went, of each OUTPUT=+ or OUTPUT=-. Raises RigtwinError."""
     told: dict[str, int] = {}
     for text in texts:
@@ -215,10 +228,10 @@ def _told(texts: Sequence[str]) -> dict[str, int]:
     return told
 
 
-def _went(
+def _find_direction(
     output: str, table: ChannelTable, wiring: ChannelTable | None, told: Mapping[str, int]
 ) -> int:
-    """Whether an output went the way of its command: told, asked, or, of the virtual card, known."""
+    """Says whether an output went the way of its command: told, asked, or known."""
     if output in told:
         return told[output]
     place = OUTPUTS.index(output)

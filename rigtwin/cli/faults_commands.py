@@ -13,9 +13,9 @@ from tqdm import tqdm
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.faults import processes
-from rigtwin.hardware.faults.campaign import Fault, Outcome, drawn, tried
-from rigtwin.hardware.faults.kinds import KINDS, Kind
+from rigtwin.hardware.faults.campaign import Fault, FaultResult, draw_faults, try_fault
+from rigtwin.hardware.faults.kinds import KINDS, FaultKind
+from rigtwin.hardware.faults.processes import try_process_fault
 
 HEADER = (
     "fault",
@@ -32,15 +32,33 @@ HEADER = (
 
 
 def faults(parsed: Namespace) -> int:
-    """Runs the campaign. Returns 0 if every session was stopped as it must be, else 4."""
+    """Runs the campaign.
+
+    Parameters
+    ----------
+    parsed : Namespace
+        The command line of `rigtwin faults`.
+
+    Returns
+    -------
+    int
+        The exit code: 0 if every session was stopped as it must be, else 4.
+
+    Raises
+    ------
+    RigtwinError
+        For a mistake in the command line.
+    """
+    from experiments import find
+
     if parsed.seed < 0 or not 0 <= parsed.each <= 1000 or not 0 <= parsed.processes <= 1000:
         raise RigtwinError("--seed: expected 0 or more; --each and --processes: 0 to 1000")
     for out in (parsed.out, parsed.json):
         if out is not None:
             writable(out)
     channels = load_table(parsed.card)
-    todo = _todo(parsed)
-    outcomes, undone = list[Outcome](), list[str]()
+    todo = _draw(parsed)
+    results, undone = list[FaultResult](), list[str]()
     with (
         TemporaryDirectory(prefix="rigtwin-faults-") as folder,
         tqdm(todo, unit="fault", disable=None, leave=False) as bar,
@@ -48,72 +66,77 @@ def faults(parsed: Namespace) -> int:
         try:
             for fault in bar:
                 bar.set_description(fault.kind.name)
-                run = processes.tried if fault.kind.place == "process" else tried
+                run = try_process_fault if fault.kind.place == "process" else try_fault
                 try:
-                    outcomes.append(run(fault, channels, Path(folder)))
+                    experiment = find(fault.experiment)
+                    results.append(run(fault, experiment, channels, Path(folder)))
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
-            print(f"interrupted after {len(outcomes)} of {len(todo)}")
+            print(f"interrupted after {len(results)} of {len(todo)}")
     rows = [
-        _row(kind, [outcome for outcome in outcomes if outcome.fault.kind == kind])
-        for kind in KINDS
+        _row(kind, [result for result in results if result.fault.kind == kind]) for kind in KINDS
     ]
     rows = [row for row in rows if row[2] != "0"]
-    failed = [outcome for outcome in outcomes if not outcome.passed]
-    passed = len(outcomes) - len(failed)
-    said = f"{len(outcomes)} faults of {len(rows)} kinds, seed {parsed.seed}: {passed} sessions ended as they must"
+    failed = [result for result in results if not result.ok]
+    passed = len(results) - len(failed)
+    kinds = f"{len(results)} faults of {len(rows)} kinds, seed {parsed.seed}"
+    said = f"{kinds}: {passed} sessions ended as they must"
     print(table([HEADER, *rows]))
-    for outcome in failed:
-        print(f"failed: {_described(outcome)}")
+    for result in failed:
+        print(f"failed: {_describe(result)}")
     for one in undone:
         print(f"not run: {one}")
     print(said)
     if parsed.out is not None:
         _write(parsed.out, said, rows, failed)
     if parsed.json is not None:
-        write_json(parsed.json, [asdict(outcome) for outcome in outcomes])
+        write_json(parsed.json, [asdict(result) for result in results])
     return 0 if not failed and not undone else 4
 
 
-def _todo(parsed: Namespace) -> list[Fault]:
+def _draw(parsed: Namespace) -> list[Fault]:
     here = [kind for kind in KINDS if kind.place != "process"]
     apart = [kind for kind in KINDS if kind.place == "process"]
-    todo = drawn(parsed.each * len(here), parsed.seed, here)
-    return todo + drawn(parsed.processes * len(apart), parsed.seed + 1, apart)
+    todo = draw_faults(parsed.each * len(here), parsed.seed, here)
+    return todo + draw_faults(parsed.processes * len(apart), parsed.seed + 1, apart)
 
 
-def _row(kind: Kind, outcomes: list[Outcome]) -> tuple[str, ...]:
+def _row(kind: FaultKind, results: list[FaultResult]) -> tuple[str, ...]:
     """One line of the table."""
-    seen = [outcome for outcome in outcomes if outcome.late is not None]
-    late = [outcome.late for outcome in seen if outcome.late is not None]
-    start = [outcome.from_start for outcome in seen]
+    seen = [result for result in results if result.late is not None]
+    late = [result.late for result in seen if result.late is not None]
+    start = [result.from_start for result in seen]
     return (
         kind.name,
         kind.place,
-        str(len(outcomes)),
+        str(len(results)),
         str(len(seen)),
-        str(len(outcomes) - len(seen)),
+        str(len(results) - len(seen)),
         f"at most {max(max(late), 0)}" if late else "",
         f"{sorted(start)[len(start) // 2]}, at most {max(start)}" if start else "",
-        f"{100 * max((outcome.exceeded for outcome in outcomes), default=0.0):.0f} %",
-        f"{sum(outcome.right for outcome in outcomes)} right",
-        str(sum(outcome.readable for outcome in outcomes)),
+        f"{100 * max((result.exceeded for result in results), default=0.0):.0f} %",
+        f"{sum(result.right for result in results)} right",
+        str(sum(result.readable for result in results)),
     )
 
 
-def _described(outcome: Outcome) -> str:
-    fault = outcome.fault
+def _describe(result: FaultResult) -> str:
+    fault = result.fault
     return (
-        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, seed {fault.seed}: safe "
-        f"{outcome.late} ticks late, {100 * outcome.exceeded:.0f} % of a limit, said {outcome.cause}: {outcome.reason}"
+        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, "
+        f"seed {fault.seed}: safe "
+        f"{result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, said {result.cause}: "
+        f"{result.reason}"
     )
 
 
-def _write(path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[Outcome]) -> None:
+def _write(
+    path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[FaultResult]
+) -> None:
     lines = [said + ".", "", "| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
-    lines += ["", *(f"- failed: {_described(outcome)}" for outcome in failed)]
+    lines += ["", *(f"- failed: {_describe(result)}" for result in failed)]
     try:
         old = path.read_text(encoding="utf-8") if path.exists() else ""
         before, mark, _ = old.partition(MARK)

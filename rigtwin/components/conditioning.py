@@ -28,7 +28,7 @@ from rigtwin.components.sensors import (
     VelocitySensor,
 )
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.delay import delayed, ring
+from rigtwin.numerics.delay import delay_sample, ring
 
 
 class Actuator(NamedTuple):
@@ -107,7 +107,7 @@ def conditioned(conditioning: Actuator, state: ActuatorState, command: float) ->
         state.memory[3] = command
         return command
     wanted = limited(
-        conditioning, state, delayed(state.history, state.memory, conditioning.delay, command)
+        conditioning, state, delay_sample(state.history, state.memory, conditioning.delay, command)
     )
     before = state.memory[2]
     state.memory[2] = before + min(max(wanted - before, -conditioning.rate), conditioning.rate)

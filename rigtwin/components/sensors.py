@@ -13,7 +13,7 @@ from controllers.compiled import compilable
 from rigtwin.components.quantity import NONE, Quantity
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.numerics.delay import delayed, ring
+from rigtwin.numerics.delay import delay_sample, ring
 
 INVERTIBLE = 80.0
 """Hz, up to which a sensor's lag is undone."""
@@ -139,7 +139,7 @@ def transduced(sensor: Transducer, state: TransducerState, value: float) -> floa
     if state.memory[0] < 0.0:
         state.history[:] = value
         state.memory[0], state.memory[1] = 0.0, value
-    late = delayed(state.history, state.memory, sensor.delay, value)
+    late = delay_sample(state.history, state.memory, sensor.delay, value)
     state.memory[1] += sensor.share * (late - state.memory[1])
     return sensor.gain * state.memory[1] + sensor.offset
 

@@ -17,7 +17,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, single
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import white_noise, without_mains
+from rigtwin.signals.noise import remove_mains, white_noise
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def compare_recordings(
                 raise RigtwinError(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
-            difference = without_mains(one - other, first.period, machine.plant.mains.frequency)
+            difference = remove_mains(one - other, first.period, machine.plant.mains.frequency)
             results[sensor.name] = single(
                 difference,
                 math.hypot(white_noise(one), white_noise(other)),

@@ -28,9 +28,9 @@ from rigtwin.simulation.plant import (
     Contacts,
     brace,
     contacts,
-    deflected,
     drive,
     motor_force,
+    start_deflection,
     touch,
     true_measurements,
 )
@@ -190,7 +190,7 @@ def replay_carriage(
     plant = configuration.plant
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
-    wheel = float(ground[0]) - deflected(plant, preload)
+    wheel = float(ground[0]) - start_deflection(plant, preload)
     return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
 
 
@@ -199,7 +199,7 @@ def replay_mechanics(
 ) -> Output:
     """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
     plant = configuration.plant
-    wheel = float(ground[0]) - deflected(plant, preload)
+    wheel = float(ground[0]) - start_deflection(plant, preload)
     return _run(
         plant,
         configuration,

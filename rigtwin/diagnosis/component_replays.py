@@ -22,9 +22,16 @@ from rigtwin.diagnosis.component import (
 from rigtwin.diagnosis.residual import Residual, rounding, single, together
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import Motion, band, motion, rms, white_noise, without_mains
+from rigtwin.signals.noise import (
+    EstimatedMotion,
+    band,
+    estimate_motion,
+    remove_mains,
+    rms,
+    white_noise,
+)
 from rigtwin.simulation.loop import run
-from rigtwin.simulation.plant import deflected
+from rigtwin.simulation.plant import start_deflection
 from rigtwin.simulation.replay import Replay
 from rigtwin.simulation.runner import simulated, unlimited
 
@@ -60,7 +67,7 @@ class ComponentReplays:
         return self.recording.column("/command", name)
 
     def _clean(self, signal: Array) -> Array:
-        return without_mains(signal, self.period, self.configuration.plant.mains.frequency)
+        return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
     def _seen(self, name: str, true: Array) -> Array:
         """What the twin's sensor of that name makes of a true signal."""
@@ -71,12 +78,12 @@ class ComponentReplays:
         plate = self.structure_motion.position
         return self._seen("structure_lvdt", plate) - self._seen("suspension_lvdt", plate - wheel)
 
-    def _motion(self, name: str, expected: Array) -> Motion:
+    def _motion(self, name: str, expected: Array) -> EstimatedMotion:
         """The true motion that a sensor measured, given what a replay expects of it."""
         sensor = getattr(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
-        found = motion(self._sensor(name), self._seen(name, expected), self.period, mains)
-        return Motion(
+        found = estimate_motion(self._sensor(name), self._seen(name, expected), self.period, mains)
+        return EstimatedMotion(
             expected + unseen(sensor, found.correction, self.period),
             found.correction,
             found.velocity_error / sensor.gain,
@@ -102,18 +109,18 @@ class ComponentReplays:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
         # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
-        uncompressed = self._ground_start - deflected(self.configuration.plant, self.preload)
+        uncompressed = self._ground_start - start_deflection(self.configuration.plant, self.preload)
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
         return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
 
     @cached_property
-    def ground_motion(self) -> Motion:
+    def ground_motion(self) -> EstimatedMotion:
         return self._motion("ground_lvdt", self.ground_cylinder_output)
 
     @cached_property
-    def structure_motion(self) -> Motion:
+    def structure_motion(self) -> EstimatedMotion:
         return self._motion("structure_lvdt", self.structure_cylinder_output)
 
     @cached_property
@@ -136,14 +143,14 @@ class ComponentReplays:
         return np.array([spring_force(spring, -stroke) for stroke in travel.tolist()])
 
     @cached_property
-    def travel_motion(self) -> Motion:
+    def travel_motion(self) -> EstimatedMotion:
         """Of plate against wheel, by the difference that the carriage's replay leaves between the LVDTs."""
         mains = self.configuration.plant.mains.frequency
-        found = motion(self.wheel, self._wheel_seen(self.carriage_output), self.period, mains)
+        found = estimate_motion(self.wheel, self._wheel_seen(self.carriage_output), self.period, mains)
         sensor = self.configuration.plant.suspension_lvdt
         wheel = self.carriage_output + unseen(sensor, found.correction, self.period)
         error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)
-        return Motion(self.structure_motion.position - wheel, found.correction, error)
+        return EstimatedMotion(self.structure_motion.position - wheel, found.correction, error)
 
     @cached_property
     def mechanics_output(self) -> Output:

@@ -15,7 +15,7 @@ from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, smallest_step, white_noise
-from rigtwin.signals.runs import cut_off, longest_run
+from rigtwin.signals.runs import find_cut_off, longest_run
 
 SHORTEST = 200
 """Ticks below which a noise floor cannot be estimated."""
@@ -224,7 +224,7 @@ def _rests(machine: Machine, row: Row, predicted: Array) -> bool:
 
 
 def _cut(where: str, signal: Array) -> Iterator[Fault]:
-    at_end = cut_off(signal)
+    at_end = find_cut_off(signal)
     for end, extreme in (("above", signal.max()), ("below", signal.min())):
         share = 100 * float(np.mean(at_end & (signal == extreme)))
         if share > 0.0:

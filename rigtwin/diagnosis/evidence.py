@@ -26,8 +26,8 @@ from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smallest_step, white_noise, without_mains
-from rigtwin.signals.runs import cut_off
+from rigtwin.signals.noise import remove_mains, smallest_step, white_noise
+from rigtwin.signals.runs import find_cut_off
 
 HIGHEST = 150.0
 """Hz; above it no component moves and lines would only add noise."""
@@ -85,7 +85,7 @@ def lines(
     noise = np.array([white_noise(row) for row in measured])
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
-    fade = np.stack([_fade(ticks, recording.period) * counted * ~cut_off(row) for row in measured])
+    fade = np.stack([_fade(ticks, recording.period) * counted * ~find_cut_off(row) for row in measured])
     if (carried := model.carried_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
@@ -193,7 +193,7 @@ class Evidence:
             self.lines, self.recordings, self.predicted(self.plant), strict=True
         ):
             for row, expected in zip(each.measured, predicted, strict=True):
-                row -= (row - expected) - without_mains(
+                row -= (row - expected) - remove_mains(
                     row - expected, recording.period, self.plant.mains.frequency
                 )
         self._loosen()

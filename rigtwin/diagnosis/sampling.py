@@ -13,7 +13,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
+from rigtwin.signals.noise import remove_mains, rms, smallest_step, white_noise
 
 OUTSTANDING = 1.6
 """Times its nominal value, and times what the other sensors have more than nominal, from which a
@@ -54,7 +54,7 @@ def properties(signal: Array, predicted: Array, period: float, mains: float) -> 
     White noise rms, amplitude of the mains line and size of a bit, in its unit.
     """
     difference = signal - predicted
-    line = difference - without_mains(difference, period, mains)
+    line = difference - remove_mains(difference, period, mains)
     bit = smallest_step(signal)
     # White noise as the bits leave it: a coarse bit adds a variance of its own.
     white = math.sqrt(max(white_noise(signal) ** 2 - bit**2 / 12.0, 0.0))
@@ -83,7 +83,7 @@ def outstanding(
     table: dict[str, dict[str, float]] = {}
     for number, row in enumerate(machine.rows):
         sensor = getattr(plant, row.name, None)
-        if not measures(sensor) or sensor.white == 0.0:
+        if sensor is None or not measures(sensor) or sensor.white == 0.0:
             continue
         each = [
             properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)

@@ -1,4 +1,8 @@
-"""Real time: deadlines that do not drift, what the system grants a loop that must meet them, and how late it was."""
+"""Real time.
+
+Deadlines that do not drift, what the system grants a loop that must meet them, and how late it
+was.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +22,13 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 SPIN = 200e-6
-"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by tens of microseconds."""
+"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by
+tens of microseconds."""
 PRIORITY = 80
-EDGES = tuple(1e-6 * value for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000))
+EDGES = tuple(
+    1e-6 * value
+    for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
+)
 """Upper edges of the lateness histogram, s; the last class is what is beyond."""
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
@@ -42,8 +50,8 @@ def sleep_until(deadline: float, spin: float = SPIN) -> None:
 class Pacer:
     """Ticks at absolute deadlines, so that a late one does not shift those after it.
 
-    late: s by which the last wait ended after its deadline. A tick that ends after the next deadline is missed, and the loop
-    goes on with the first one that is still ahead.
+    late: s by which the last wait ended after its deadline. A tick that ends after the next
+    deadline is missed, and the loop goes on with the first one that is still ahead.
     """
 
     def __init__(self, period: float) -> None:
@@ -75,24 +83,39 @@ class Lateness:
             self._count += 1
 
     def record(self, scheduling: str) -> dict[str, str]:
-        """What a recording keeps: the histogram (upper edges in s, ticks in each class), median, 99.9th percentile and maximum
-        of both, ticks missed, and what the system granted."""
+        """What a recording keeps.
+
+        The histogram (upper edges in s, ticks in each class), median, 99.9th percentile and
+        maximum of both, ticks missed, and what the system granted.
+        """
         figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
-        for name, values in (("late", self._late[: self._count]), ("work", self._work[: self._count])):
+        for name, values in (
+            ("late", self._late[: self._count]),
+            ("work", self._work[: self._count]),
+        ):
             if len(values):
-                figures |= {f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()}
+                figures |= {
+                    f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()
+                }
         counts, _ = np.histogram(self._late[: self._count], bins=[-np.inf, *EDGES, np.inf])
         figures["histogram"] = json.dumps({"edges": EDGES, "counts": counts.tolist()})
         return figures
 
 
 def _statistics(values: Array) -> dict[str, float]:
-    return {"median": float(np.median(values)), "999": float(np.percentile(values, 99.9)), "max": float(values.max())}
+    return {
+        "median": float(np.median(values)),
+        "999": float(np.percentile(values, 99.9)),
+        "max": float(values.max()),
+    }
 
 
 @dataclass(frozen=True)
 class Grant:
-    """One thing that a loop in real time wants of the system. lacking: why it is not there and how to get it, or empty."""
+    """One thing that a loop in real time wants of the system.
+
+    lacking: why it is not there and how to get it, or empty.
+    """
 
     name: str
     lacking: str = ""
@@ -100,8 +123,20 @@ class Grant:
 
 @contextmanager
 def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
-    """Takes what the system permits for the time of the loop, and gives it back: FIFO scheduling, memory locked, no garbage
-    collection. Yields what was granted and what not. `fifo`: whether to ask for the scheduling class at all."""
+    """Takes what the system permits for the time of the loop, and gives it back.
+
+    FIFO scheduling, memory locked, no garbage collection.
+
+    Parameters
+    ----------
+    fifo : bool
+        Whether to ask for the scheduling class at all.
+
+    Yields
+    ------
+    tuple of Grant
+        What was granted and what not.
+    """
     grants = [_memory(), Grant("no garbage collection")]
     collecting, interval = gc.isenabled(), sys.getswitchinterval()
     gc.collect()
@@ -131,7 +166,10 @@ def _memory() -> Grant:
     if not sys.platform.startswith("linux"):
         return Grant("locked memory", f"not known how on {sys.platform}")
     if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        return Grant("locked memory", f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited")
+        return Grant(
+            "locked memory",
+            f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited",
+        )
     return Grant("locked memory")
 
 
@@ -141,23 +179,30 @@ def _schedule() -> Grant:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except OSError as error:
-        return Grant("FIFO scheduling", f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE")
+        return Grant(
+            "FIFO scheduling",
+            f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE",
+        )
     return Grant("FIFO scheduling")
 
 
-def machine_lacks() -> list[str]:
+def list_shortcomings() -> list[str]:
     """What this computer lacks for a loop in real time, a line each; changes nothing."""
     lacks: list[str] = []
     with in_real_time() as grants:
         lacks += [f"{grant.name}: {grant.lacking}" for grant in grants if grant.lacking]
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     if cores < 2:
-        lacks.append("a core of its own: this computer has one, the loop shares it with everything else")
+        lacks.append(
+            "a core of its own: this computer has one, the loop shares it with everything else"
+        )
     resolution = time.get_clock_info("monotonic").resolution
     if resolution > 1e-6:
         lacks.append(f"a fine clock: its resolution is {resolution:g} s; expected 1 us or better")
     return lacks
 
 
-def described(grants: tuple[Grant, ...]) -> str:
+def describe_grants(grants: tuple[Grant, ...]) -> str:
     return "; ".join(f"{grant.name}: {grant.lacking or 'granted'}" for grant in grants)

@@ -1,8 +1,9 @@
 """The states of a session on a rig, and the only ways between them.
 
-    idle → armed → ramping → running → stopping → stopped | faulted
+idle → armed → ramping → running → stopping → stopped | faulted
 
-From armed on, `stopping` can be reached from every state, and nothing but `stopping` leads out of motion.
+From armed on, `stopping` can be reached from every state, and nothing but `stopping` leads out of
+motion.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from rigtwin.errors import RigtwinError
 
 
 class Phase(IntEnum):
-    """What the rig may do. IDLE, STOPPED, FAULTED: motor without force, no pressure. ARMED: pressure, nothing moves."""
+    """What the rig may do.
+
+    IDLE, STOPPED, FAULTED: motor without force, no pressure. ARMED: pressure, nothing moves.
+    """
 
     IDLE = 0
     ARMED = 1
@@ -39,8 +43,11 @@ NEXT = {
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a session leaves a state. name: one word, for programs; reason: one line, for the operator; fault: whether it must
-    not go on as if nothing had been."""
+    """Why a session leaves a state.
+
+    name: one word, for programs; reason: one line, for the operator; fault: whether it must not go
+    on as if nothing had been.
+    """
 
     name: str
     reason: str
@@ -80,7 +87,9 @@ class Supervisor:
         """Makes a transition. Raises RigtwinError for one that does not exist."""
         if phase not in NEXT[self.phase]:
             ways = " or ".join(after.name.lower() for after in NEXT[self.phase])
-            raise RigtwinError(f"no way from {self.phase.name.lower()} to {phase.name.lower()}; only to {ways}")
+            raise RigtwinError(
+                f"no way from {self.phase.name.lower()} to {phase.name.lower()}; only to {ways}"
+            )
         transition = Transition(time, self.phase, phase, cause)
         self.phase = phase
         self.transitions.append(transition)

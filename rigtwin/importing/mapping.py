@@ -18,7 +18,10 @@ TOPICS = ("/command", "/sensor")
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel's values come from: sign·scale·column + offset, after conversion to SI; or a constant."""
+    """Where a channel's values come from.
+
+    Sign·scale·column + offset, after conversion to SI; or a constant.
+    """
 
     column: str
     unit: str | None
@@ -30,8 +33,11 @@ class Source:
 
 @dataclass(frozen=True)
 class Map:
-    """period: s, None if the time column says it; resample: s, None if the data stay as they are; start, until: s of the data
-    that are taken."""
+    """period.
+
+    S, None if the time column says it; resample: s, None if the data stay as they are; start,
+    until: s of the data that are taken.
+    """
 
     machine: str
     experiment: str
@@ -59,7 +65,7 @@ def load(path: Path) -> Map:
         raise RigtwinError(f"{path}: {error}") from None
 
 
-def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
+def _require_keys(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{where}: expected a table")
     for key in table:
@@ -71,7 +77,9 @@ def _known(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, An
 
 
 def _number(where: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
-    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    number = (
+        float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    )
     if not (low <= number <= high and math.isfinite(number)):
         limits = f" from {low:g} to {high:g}" if math.isfinite(low) else ""
         shown = repr(value) if isinstance(value, str) else str(value)
@@ -80,35 +88,49 @@ def _number(where: str, value: object, low: float = -math.inf, high: float = mat
 
 
 def _map(document: Mapping[str, Any]) -> Map:
-    _known("the map", document, ("machine", "experiment", "time", "channels", "controller"))
+    _require_keys("the map", document, ("machine", "experiment", "time", "channels", "controller"))
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
-        raise RigtwinError('machine is missing; expected the name that its description has, such as machine = "emps"')
-    time = _known("[time]", document.get("time", {}), ("column", "unit", "period", "resample", "start", "until"))
+        raise RigtwinError(
+            "machine is missing; expected the name that its description has, "
+            'such as machine = "emps"'
+        )
+    time = _require_keys(
+        "[time]",
+        document.get("time", {}),
+        ("column", "unit", "period", "resample", "start", "until"),
+    )
     if ("column" in time) == ("period" in time):
         raise RigtwinError('[time]: expected either column = "NAME" or period = SECONDS')
     period = _number("[time] period", time["period"], 1e-6, 10.0) if "period" in time else None
-    resample = _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
+    resample = (
+        _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
+    )
     if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
         raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:
-        raise RigtwinError('[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", unit = "mm" }')
+        raise RigtwinError(
+            '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", '
+            'unit = "mm" }'
+        )
     found = {_channel(name): _source(name, table) for name, table in channels.items()}
     controller = document.get("controller", {})
-    if not isinstance(controller, Mapping) or not all(isinstance(v, int | float | str) for v in controller.values()):
+    if not isinstance(controller, Mapping) or not all(
+        isinstance(v, int | float | str) for v in controller.values()
+    ):
         raise RigtwinError("[controller]: expected a table of settings")
     return Map(
-        machine,
-        str(document.get("experiment", "")),
-        str(time["column"]) if "column" in time else None,
-        str(time["unit"]) if "unit" in time else None,
-        period,
-        resample,
-        _number("[time] start", time.get("start", 0.0)),
-        _number("[time] until", time.get("until", 1e12)),
-        found,
-        dict(controller),
+        machine=machine,
+        experiment=str(document.get("experiment", "")),
+        time=str(time["column"]) if "column" in time else None,
+        time_unit=str(time["unit"]) if "unit" in time else None,
+        period=period,
+        resample=resample,
+        start=_number("[time] start", time.get("start", 0.0)),
+        until=_number("[time] until", time.get("until", 1e12)),
+        channels=found,
+        controller=dict(controller),
     )
 
 
@@ -121,7 +143,7 @@ def _channel(name: str) -> tuple[str, str]:
 
 def _source(name: str, given: object) -> Source:
     where = f"[channels] {name!r}"
-    table = _known(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
+    table = _require_keys(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
     if ("column" in table) == ("constant" in table):
         raise RigtwinError(f'{where}: expected either column = "NAME" or constant = NUMBER')
     if "unit" in table:
@@ -133,10 +155,10 @@ def _source(name: str, given: object) -> Source:
     if scale == 0.0:
         raise RigtwinError(f"{where} scale = 0: expected anything else")
     return Source(
-        str(table.get("column", "")),
-        str(table["unit"]) if "unit" in table else None,
-        scale,
-        _number(f"{where} offset", table.get("offset", 0.0)),
-        float(sign),
-        _number(f"{where} constant", table["constant"]) if "constant" in table else None,
+        column=str(table.get("column", "")),
+        unit=str(table["unit"]) if "unit" in table else None,
+        scale=scale,
+        offset=_number(f"{where} offset", table.get("offset", 0.0)),
+        sign=float(sign),
+        constant=_number(f"{where} constant", table["constant"]) if "constant" in table else None,
     )

@@ -1,4 +1,7 @@
-"""Columns of numbers out of other programs' files: CSV however it was written, MATLAB v5 and v7.3, parquet."""
+"""Columns of numbers out of other programs' files.
+
+CSV however it was written, MATLAB v5 and v7.3, parquet.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,11 @@ HEADER = 400
 
 @dataclass(frozen=True)
 class Columns:
-    """values: name → numbers, not a number where a cell held none; units: name → as the file says; form: how it was read, for
-    people."""
+    """values.
+
+    Name → numbers, not a number where a cell held none; units: name → as the file says; form: how
+    it was read, for people.
+    """
 
     values: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=dict)
@@ -47,11 +53,24 @@ class Layout:
 
 
 def read(path: Path) -> Columns:
-    """All columns of a file; its kind follows the name's ending. Raises RigtwinError saying what is wrong and where."""
-    readers = {".csv": _text, ".txt": _text, ".tsv": _text, ".dat": _text, ".asc": _text, ".mat": _matlab, ".parquet": _parquet}
+    """All columns of a file; its kind follows the name's ending.
+
+    Raises RigtwinError saying what is wrong and where.
+    """
+    readers = {
+        ".csv": _text,
+        ".txt": _text,
+        ".tsv": _text,
+        ".dat": _text,
+        ".asc": _text,
+        ".mat": _matlab,
+        ".parquet": _parquet,
+    }
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise RigtwinError(f"{path}: cannot tell its kind; the name must end in {', '.join(readers)}")
+        raise RigtwinError(
+            f"{path}: cannot tell its kind; the name must end in {', '.join(readers)}"
+        )
     try:
         columns = reader(path)
     except OSError as error:
@@ -64,9 +83,13 @@ def read(path: Path) -> Columns:
 # Text.
 
 
-def _decoded(path: Path) -> str:
+def _decode(path: Path) -> str:
     raw = path.read_bytes()
-    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
+    for mark, name in (
+        (b"\xef\xbb\xbf", "utf-8-sig"),
+        (b"\xff\xfe", "utf-16"),
+        (b"\xfe\xff", "utf-16"),
+    ):
         if raw.startswith(mark):
             return raw.decode(name, errors="replace")
     try:
@@ -100,7 +123,9 @@ def _stamp(cell: str) -> float:
     """A date and time, or a time of day, in s. Raises ValueError."""
     text = cell.strip().replace(",", ".")
     if _CLOCK.fullmatch(text):
-        clock = time.fromisoformat(text.zfill(len(text) + (len(text.split(":")[0]) == 1)) if ":" in text else text)
+        clock = time.fromisoformat(
+            text.zfill(len(text) + (len(text.split(":")[0]) == 1)) if ":" in text else text
+        )
         return 3600.0 * clock.hour + 60.0 * clock.minute + clock.second + 1e-6 * clock.microsecond
     if not re.match(r"\d{4}-\d{2}-\d{2}[T ]\d", text):
         raise ValueError(cell)
@@ -117,7 +142,7 @@ def _value(cell: str, decimal: str) -> float:
         return _stamp(cell)
 
 
-def _counted(line: str, separator: str, decimal: str) -> int:
+def _count_numbers(line: str, separator: str, decimal: str) -> int:
     """How many numbers a line holds, 0 if anything else is in it or there are none."""
     cells = _cells(line, separator)
     while cells and not cells[-1]:
@@ -131,23 +156,30 @@ def _counted(line: str, separator: str, decimal: str) -> int:
     return len(cells) if numbers else 0
 
 
-def layout(lines: list[str]) -> Layout | None:
+def find_layout(lines: list[str]) -> Layout | None:
     """How a text is written; None if no lines of numbers are in it."""
     best: tuple[tuple[int, int], Layout] | None = None
     for separator in SEPARATORS:
         for decimal in (".", ","):
             if decimal == separator:
                 continue
-            counts = [_counted(line, separator, decimal) for line in lines[:HEADER]]
+            counts = [_count_numbers(line, separator, decimal) for line in lines[:HEADER]]
             first = next((n for n in range(len(counts)) if _begins(counts, n)), None)
             if first is None:
                 continue
             # The more columns the better; commas that are decimals would else part numbers.
             quality = (counts[first], -SEPARATORS.index(separator))
-            if separator == "," and all("." not in line for line in lines[first : first + SURE]) and counts[first] % 2 == 0:
+            if (
+                separator == ","
+                and all("." not in line for line in lines[first : first + SURE])
+                and counts[first] % 2 == 0
+            ):
                 quality = (counts[first] // 2, -SEPARATORS.index(separator))
             if best is None or quality > best[0]:
-                best = quality, _headed(lines, Layout(separator, decimal, first, (), ()), counts[first])
+                best = (
+                    quality,
+                    _read_header(lines, Layout(separator, decimal, first, (), ()), counts[first]),
+                )
     return None if best is None else best[1]
 
 
@@ -160,7 +192,7 @@ def _begins(counts: list[int], at: int) -> bool:
     )
 
 
-def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
+def _read_header(lines: list[str], found: Layout, columns: int) -> Layout:
     """The layout with names and units from the lines above the data."""
     above = []
     for line in reversed(lines[: found.first]):
@@ -179,11 +211,17 @@ def _headed(lines: list[str], found: Layout, columns: int) -> Layout:
             names, units = above[1], nearest
         else:
             names = nearest
-    pairs = [_named(name, unit) for name, unit in zip(names, units, strict=True)]
-    return Layout(found.separator, found.decimal, found.first, tuple(n for n, _ in pairs), tuple(u for _, u in pairs))
+    pairs = [_split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
+    return Layout(
+        found.separator,
+        found.decimal,
+        found.first,
+        tuple(n for n, _ in pairs),
+        tuple(u for _, u in pairs),
+    )
 
 
-def _named(name: str, unit: str) -> tuple[str, str]:
+def _split_unit(name: str, unit: str) -> tuple[str, str]:
     """A name and its unit, which may stand in brackets behind it."""
     match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     if match and not unit and match.group(1) and is_unit(match.group(2)):
@@ -192,10 +230,10 @@ def _named(name: str, unit: str) -> tuple[str, str]:
 
 
 def _text(path: Path) -> Columns:
-    lines = [line for line in _decoded(path).splitlines()]
+    lines = [line for line in _decode(path).splitlines()]
     while lines and not lines[-1].strip():
         lines.pop()
-    found = layout(lines)
+    found = find_layout(lines)
     if found is None:
         raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
     names = list(found.names)
@@ -217,7 +255,9 @@ def _rows(path: Path, lines: list[str], found: Layout) -> Iterator[list[float]]:
         while len(cells) > len(found.names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(found.names):
-            raise RigtwinError(f"{path}: line {number} has {len(cells)} cells; expected {len(found.names)}")
+            raise RigtwinError(
+                f"{path}: line {number} has {len(cells)} cells; expected {len(found.names)}"
+            )
         try:
             yield [_value(cell, found.decimal) for cell in cells]
         except ValueError as error:
@@ -241,23 +281,30 @@ def _matlab(path: Path) -> Columns:
     found: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith(("__", "#")):
-            found.update(_flat(name, value))
+            found.update(_flatten(name, value))
     longest = max((len(each) for each in found.values()), default=0)
     # Scalars are settings, not columns.
-    return Columns({name: value for name, value in found.items() if len(value) == longest or len(value) > 1}, {}, form)
+    return Columns(
+        {name: value for name, value in found.items() if len(value) == longest or len(value) > 1},
+        {},
+        form,
+    )
 
 
-def _flat(name: str, value: Any) -> dict[str, Array]:
-    """Columns of a variable: a vector, a matrix's columns as name:1, name:2, …, a structure's fields as name.field."""
+def _flatten(name: str, value: Any) -> dict[str, Array]:
+    """Columns of a variable.
+
+    A vector, a matrix's columns as name:1, name:2, …, a structure's fields as name.field.
+    """
     if hasattr(value, "_fieldnames"):
         found: dict[str, Array] = {}
         for each in value._fieldnames:
-            found.update(_flat(f"{name}.{each}", getattr(value, each)))
+            found.update(_flatten(f"{name}.{each}", getattr(value, each)))
         return found
     if isinstance(value, dict):
         found = {}
         for each, inner in value.items():
-            found.update(_flat(f"{name}.{each}", inner))
+            found.update(_flatten(f"{name}.{each}", inner))
         return found
     array = np.asarray(value)
     if array.dtype.kind not in "fiub":
@@ -268,7 +315,10 @@ def _flat(name: str, value: Any) -> dict[str, Array]:
     if array.ndim == 2:
         if array.shape[0] < array.shape[1]:
             array = array.T
-        return {f"{name}:{number + 1}": np.ascontiguousarray(array[:, number]) for number in range(array.shape[1])}
+        return {
+            f"{name}:{number + 1}": np.ascontiguousarray(array[:, number])
+            for number in range(array.shape[1])
+        }
     return {}
 
 
@@ -276,7 +326,9 @@ def _hdf(path: Path) -> dict[str, Any]:
     try:
         import h5py
     except ImportError:
-        raise RigtwinError(f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'") from None
+        raise RigtwinError(
+            f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'"
+        ) from None
 
     def content(group: Any) -> dict[str, Any]:
         found: dict[str, Any] = {}
@@ -295,7 +347,9 @@ def _parquet(path: Path) -> Columns:
         import pyarrow
         import pyarrow.parquet as parquet
     except ImportError:
-        raise RigtwinError(f"{path}: parquet needs pyarrow: pip install 'rigtwin[import]'") from None
+        raise RigtwinError(
+            f"{path}: parquet needs pyarrow: pip install 'rigtwin[import]'"
+        ) from None
     if not path.is_file():
         raise RigtwinError(f"cannot read {path}: No such file or directory")
     try:
@@ -306,7 +360,10 @@ def _parquet(path: Path) -> Columns:
     for name in table.column_names:
         column = table[name]
         if pyarrow.types.is_timestamp(column.type):
-            found[name] = column.cast(pyarrow.timestamp("ns")).cast(pyarrow.int64()).to_numpy().astype(float) * 1e-9
+            found[name] = (
+                column.cast(pyarrow.timestamp("ns")).cast(pyarrow.int64()).to_numpy().astype(float)
+                * 1e-9
+            )
         elif pyarrow.types.is_integer(column.type) or pyarrow.types.is_floating(column.type):
             found[name] = column.to_numpy().astype(float)
     return Columns(found, {}, "parquet")

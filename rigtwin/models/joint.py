@@ -27,7 +27,7 @@ from rigtwin.models.guided import RIGID, Inertia, Loop, carried, pushed
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smoothed, white_noise
+from rigtwin.signals.noise import smooth, white_noise
 
 KEPT = 24
 """Motions that are kept."""
@@ -80,7 +80,7 @@ class JointModel:
         kind = getattr(machine.plant, self._mover.name)
         self._integrated = measures(kind) == "velocity"
         if measures(kind) in ("position", "velocity"):
-            self._motion, self._error = smoothed(recording.column(topic, name), self._period)
+            self._motion, self._error = smooth(recording.column(topic, name), self._period)
         elif not replay.closed:
             self._command = recording.column(topic, name)
         self._inputs = {}
@@ -347,7 +347,7 @@ class JointModel:
         if self._motion is not None and self._error > 0.0 and not self._integrated:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
-            again, _ = smoothed(self._motion + level * random.standard_normal(ticks), self._period)
+            again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
             return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(
                 self.moved(plant)
             )

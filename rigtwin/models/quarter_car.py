@@ -38,7 +38,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import YIELDING, Contacts, contacts, deflected, stiffening
+from rigtwin.simulation.plant import YIELDING, Contacts, contacts, start_deflection, stiffening
 
 PLACES = (
     "motor",
@@ -364,7 +364,7 @@ class QuarterCarModel:
             plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
         )
         # The spring is uncompressed at the start, the tyre carries the preload.
-        start = float(ground.position[0]) - deflected(plant, self._preload)
+        start = float(ground.position[0]) - start_deflection(plant, self._preload)
         structure = self._plate(
             plant.structure_cylinder, plant.computer, self._structure, self._start, start
         )

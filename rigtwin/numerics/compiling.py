@@ -1,7 +1,7 @@
 """Compiled loops that call MuJoCo, kept on disk so that only the first run after a change compiles.
 
-numba's own cache looks at one file's date only; a loop here also depends on the controllers and on MuJoCo's version, so
-the folder is named by a digest of them all.
+numba's own cache looks at one file's date only; a loop here also depends on the controllers and on
+MuJoCo's version, so the folder is named by a digest of them all.
 """
 
 from __future__ import annotations
@@ -68,7 +68,10 @@ integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
 
 
 def kernel(function: Function) -> Function:
-    """Compiles a function for speed: no Python objects inside, the interpreter lock released, cached on disk."""
+    """Compiles a function for speed.
+
+    No Python objects inside, the interpreter lock released, cached on disk.
+    """
     if _CACHE is None:
         return cast(Function, numba.njit(nogil=True)(function))
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]

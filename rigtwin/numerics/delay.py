@@ -14,8 +14,11 @@ def ring(delay: float, value: float) -> Array:
 
 
 @compilable
-def delayed(history: Array, memory: Array, delay: float, sample: float) -> float:
-    """Takes a sample and returns the one `delay` samples ago, straight between neighbours. memory[0]: place in the ring."""
+def delay_sample(history: Array, memory: Array, delay: float, sample: float) -> float:
+    """Takes a sample and returns the one `delay` samples ago, straight between neighbours.
+
+    memory[0]: place in the ring.
+    """
     length = len(history)
     place = int(memory[0])
     history[place] = sample

@@ -1,4 +1,7 @@
-"""The channels of a recording: topic, field, unit, meaning. Defined once; the file format and every table follow them."""
+"""The channels of a recording: topic, field, unit, meaning.
+
+Defined once; the file format and every table follow them.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,12 @@ CHANNELS = (
 
 SESSION = (
     Channel("/session", "time", "s", "since the start of the test; negative before it"),
-    Channel("/session", "phase", "1", "0 idle, 1 armed, 2 ramping, 3 running, 4 stopping, 5 stopped, 6 faulted"),
+    Channel(
+        "/session",
+        "phase",
+        "1",
+        "0 idle, 1 armed, 2 ramping, 3 running, 4 stopping, 5 stopped, 6 faulted",
+    ),
     Channel("/session", "ground", "m", "ground cylinder position written to the rig"),
     Channel("/session", "structure", "m", "structure cylinder position written to the rig"),
     Channel("/session", "voltage", "V", "written to the motor amplifier"),
@@ -46,15 +54,21 @@ SESSION = (
     Channel("/session", "late", "s", "by which the tick began after it was due"),
     Channel("/session", "missed", "tick", "that passed unread before this one"),
 )
-"""Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis reads it."""
+"""Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis
+reads it."""
 
 
 def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
-    """The channels that a recording holds, those of the table first, with unit and meaning; then whatever else there is."""
+    """The channels that a recording holds, those of the table first, with unit and meaning.
+
+    Then whatever else there is.
+    """
     there = [(topic, name) for topic, names in columns.items() for name in names]
     known = [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
     named = {(channel.topic, channel.name) for channel in known}
-    return known + [Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named]
+    return known + [
+        Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named
+    ]
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:

@@ -13,10 +13,15 @@ from rigtwin.recording.reader import Recording
 
 
 def export(recording: Recording, path: Path) -> None:
-    """Writes every channel; the kind follows the name's ending, .csv or .mat. Raises RigtwinError for any other."""
+    """Writes every channel; the kind follows the name's ending, .csv or .mat.
+
+    Raises RigtwinError for any other.
+    """
     writers = {".csv": _csv, ".mat": _mat}
     if path.suffix.lower() not in writers:
-        raise RigtwinError(f"cannot export to {path.name!r}: the name must end in {' or '.join(writers)}")
+        raise RigtwinError(
+            f"cannot export to {path.name!r}: the name must end in {' or '.join(writers)}"
+        )
     try:
         writers[path.suffix.lower()](recording, path)
     except OSError as error:
@@ -33,11 +38,16 @@ def _csv(recording: Recording, path: Path) -> None:
 
 
 def _mat(recording: Recording, path: Path) -> None:
-    content: dict[str, object] = {"time": recording.time, "period": recording.period, "experiment": recording.experiment}
+    content: dict[str, object] = {
+        "time": recording.time,
+        "period": recording.period,
+        "experiment": recording.experiment,
+    }
     for topic, values in recording.columns.items():
         content[topic[1:]] = dict(values)
     units = {
-        f"{channel.topic[1:]}_{channel.name}": channel.unit for channel in channels_of(recording.columns)
+        f"{channel.topic[1:]}_{channel.name}": channel.unit
+        for channel in channels_of(recording.columns)
     }
     content["units"] = {name: unit for name, unit in units.items()}
     savemat(path, content, oned_as="column")

@@ -1,4 +1,7 @@
-"""Reads recordings, whoever wrote them: JSON or protobuf messages, whole files or what is left of them."""
+"""Reads recordings, whoever wrote them.
+
+JSON or protobuf messages, whole files or what is left of them.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,7 @@ from rigtwin.recording.schema import (
     TRANSITION_RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
-    known_topics,
+    list_topics,
     tags,
 )
 
@@ -54,9 +57,30 @@ _DAMAGE = (
 class Recording:
     """One test as recorded.
 
-    columns: topic → field → values, shape (ticks,), SI; all topics of one length. time: s since the start, shape (ticks,).
-    controller: the operator's settings, empty if the recording does not say. notes: what is wrong or missing, for people.
-    transitions: of a supervised session, in order; lateness: of a loop in real time.
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    machine, experiment : str
+        What was tested, and how.
+    period : float
+        s.
+    time : Array
+        s since the start, shape (ticks,).
+    columns : mapping
+        Topic → field → values, shape (ticks,), SI; all topics of one length.
+    controller : mapping
+        The operator's settings, empty if the recording does not say.
+    twin : mapping
+        How a twin made it, empty of a rig.
+    end : str
+        Why the test ended.
+    notes : tuple of str
+        What is wrong or missing, for people.
+    transitions : tuple of mapping
+        Of a supervised session, in order.
+    lateness : mapping
+        Of a loop in real time.
     """
 
     path: Path
@@ -77,7 +101,10 @@ class Recording:
         return len(self.time)
 
     def __getitem__(self, channel: str) -> Array:
-        """One channel by `/topic.field`, such as `/sensor.load_cell`. Raises RigtwinError if it is missing."""
+        """One channel by `/topic.field`, such as `/sensor.load_cell`.
+
+        Raises RigtwinError if it is missing.
+        """
         topic, _, name = channel.partition(".")
         return self.column(topic, name)
 
@@ -98,7 +125,9 @@ class Recording:
             import pandas
         except ImportError:
             raise RigtwinError("tables need pandas: pip install 'rigtwin[pandas]'") from None
-        return pandas.DataFrame({name: self[name] for name in self.channels}, index=pandas.Index(self.time, name="time"))
+        return pandas.DataFrame(
+            {name: self[name] for name in self.channels}, index=pandas.Index(self.time, name="time")
+        )
 
     def has(self, topic: str, name: str) -> bool:
         return name in self.columns.get(topic, {})
@@ -108,12 +137,32 @@ class Recording:
         try:
             return self.columns[topic][name]
         except KeyError:
-            there = ", ".join(f"{t}.{n}" for t, names in self.columns.items() for n in names) or "none"
-            raise RigtwinError(f"{self.path}: channel {topic}.{name} is missing; it has {there}") from None
+            there = (
+                ", ".join(f"{t}.{n}" for t, names in self.columns.items() for n in names) or "none"
+            )
+            raise RigtwinError(
+                f"{self.path}: channel {topic}.{name} is missing; it has {there}"
+            ) from None
 
 
 def load(path: Path) -> Recording:
-    """Reads a recording. Raises RigtwinError if it is none, is empty, or is of a format this version does not read."""
+    """Reads a recording.
+
+    Parameters
+    ----------
+    path : Path
+        An MCAP file, whole or damaged.
+
+    Returns
+    -------
+    Recording
+        What can be read of it.
+
+    Raises
+    ------
+    RigtwinError
+        If it is none, is empty, or is of a format this version does not read.
+    """
     metadata: dict[str, dict[str, str]] = {}
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -156,20 +205,30 @@ def load(path: Path) -> Recording:
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
         channel = channels.get(number)
-        if channel is None or channel.topic not in known_topics():
+        if channel is None or channel.topic not in list_topics():
             continue
         if channel.topic in tables:
             raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
         if max(times) >= 2**63:
-            raise RigtwinError(f"{path}: a message on {channel.topic} has time {max(times)} ns; expected ns since the start")
-        values = _decoded(path, channel, schemas.get(channel.schema_id), data)
+            raise RigtwinError(
+                f"{path}: a message on {channel.topic} has time {max(times)} ns; "
+                "expected ns since the start"
+            )
+        values = _decode(path, channel, schemas.get(channel.schema_id), data)
         tables[channel.topic] = (np.array(times, np.int64), values)
     if not tables:
-        said = f"; it ended: {metadata[END_RECORD].get('reason', '')}" if END_RECORD in metadata else ""
-        raise RigtwinError(f"{path} holds no ticks on {' or '.join(known_topics())}{said}")
-    time, columns = _aligned(tables, notes)
+        said = (
+            f"; it ended: {metadata[END_RECORD].get('reason', '')}"
+            if END_RECORD in metadata
+            else ""
+        )
+        raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
+    time, columns = _align(tables, notes)
     if not len(time):
-        raise RigtwinError(f"{path}: {' and '.join(tables)} have no tick in common; expected the same times on each")
+        raise RigtwinError(
+            f"{path}: {' and '.join(tables)} have no tick in common; "
+            "expected the same times on each"
+        )
     _look_at_times(path, time, period, notes)
     if notes and "cut off" in notes[0]:
         notes[0] += f"; readable up to {time[-1]:.3f} s"
@@ -184,13 +243,29 @@ def load(path: Path) -> Recording:
         twin=metadata.get(TWIN_RECORD, {}),
         end=metadata.get(END_RECORD, {}).get("reason", ""),
         notes=tuple(notes),
-        transitions=_in_order(states),
+        transitions=_sort(states),
         lateness=metadata.get(LATENESS_RECORD, {}),
     )
 
 
 def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
-    """Those of a supervised session, in order, even of a recording that ended before its test began. Raises RigtwinError."""
+    """Reads a supervised session's transitions, even if it ended before its test began.
+
+    Parameters
+    ----------
+    path : Path
+        Of the recording.
+
+    Returns
+    -------
+    tuple of mapping
+        Those that can be read, in order of time.
+
+    Raises
+    ------
+    RigtwinError
+        If the file cannot be read at all.
+    """
     found: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
@@ -201,11 +276,11 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except _DAMAGE:
         pass
-    return _in_order(found)
+    return _sort(found)
 
 
-def _in_order(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
-    """On a full disk the last ones stand where room had been kept for them, near the beginning of the file."""
+def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
+    """By time: on a full disk the last ones stand in the room kept near the file's beginning."""
     return tuple(sorted(transitions, key=_moment))
 
 
@@ -218,13 +293,17 @@ def _moment(transition: Mapping[str, str]) -> float:
 
 def _period(path: Path, about: Mapping[str, str]) -> float:
     if about.get("format") != WRITTEN_FORMAT:
-        raise RigtwinError(f"{path}: format {about.get('format')!r}; this version reads {WRITTEN_FORMAT!r}")
+        raise RigtwinError(
+            f"{path}: format {about.get('format')!r}; this version reads {WRITTEN_FORMAT!r}"
+        )
     try:
         period = float(about.get("period", ""))
     except ValueError:
         period = math.nan
     if not 0.0 < period < 10.0:
-        raise RigtwinError(f"{path}: period {about.get('period')!r}; expected seconds above 0 and below 10")
+        raise RigtwinError(
+            f"{path}: period {about.get('period')!r}; expected seconds above 0 and below 10"
+        )
     return period
 
 
@@ -235,11 +314,15 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         if not isinstance(controller, dict):
             raise ValueError
     except (ValueError, AttributeError, RecursionError):
-        raise RigtwinError(f"{path}: metadata config is not a JSON object with an object 'controller'") from None
+        raise RigtwinError(
+            f"{path}: metadata config is not a JSON object with an object 'controller'"
+        ) from None
     return controller
 
 
-def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[bytes]) -> dict[str, Array]:
+def _decode(
+    path: Path, channel: Channel, schema: Schema | None, data: list[bytes]
+) -> dict[str, Array]:
     """The columns of a topic: every number in it, those that the channel table names first."""
     names = topic_fields(channel.topic)
     if channel.message_encoding == "json":
@@ -249,13 +332,22 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
         present, numbers, decode = _protobuf(path, schema)
         block = b"".join(data)
-        ours = [*(name for name in names if name in present), *(n for n in present if n not in names)]
-        if numbers == list(range(1, len(present) + 1)) and len(block) == len(data) * len(present) * FIELD.itemsize:
+        ours = [
+            *(name for name in names if name in present),
+            *(n for n in present if n not in names),
+        ]
+        if (
+            numbers == list(range(1, len(present) + 1))
+            and len(block) == len(data) * len(present) * FIELD.itemsize
+        ):
             fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
             if (fields["tag"] == tags(len(present))).all():
                 return {name: fields["value"][:, present.index(name)].copy() for name in ours}
     else:
-        raise RigtwinError(f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; expected json or protobuf")
+        raise RigtwinError(
+            f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; "
+            "expected json or protobuf"
+        )
     rows: list[Mapping[str, Any]] = []
     for number, item in enumerate(data):
         try:
@@ -263,18 +355,28 @@ def _decoded(path: Path, channel: Channel, schema: Schema | None, data: list[byt
         except (ValueError, RecursionError, DecodeError):
             row = None
         if not isinstance(row, Mapping):
-            raise RigtwinError(f"{path}: message {number} on {channel.topic} cannot be read; expected an object of numbers")
+            raise RigtwinError(
+                f"{path}: message {number} on {channel.topic} cannot be read; "
+                "expected an object of numbers"
+            )
         rows.append(row)
     ours = [name for name in names if any(name in row for row in rows)]
     ours += [name for name in _numbers(rows) if name not in ours]
     if not ours:
         raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
-    return {name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows]) for name in ours}
+    return {
+        name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows])
+        for name in ours
+    }
 
 
 def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
     """Fields that hold numbers throughout."""
-    return [name for name in rows[0] if all(isinstance(row.get(name), int | float) for row in rows)] if rows else []
+    return (
+        [name for name in rows[0] if all(isinstance(row.get(name), int | float) for row in rows)]
+        if rows
+        else []
+    )
 
 
 def _column(path: Path, channel: str, values: list[Any]) -> Array:
@@ -282,14 +384,18 @@ def _column(path: Path, channel: str, values: list[Any]) -> Array:
     for number, value in enumerate(values):
         if isinstance(value, bool) or not isinstance(value, int | float):
             shown = "missing" if value is None else f"{value!r:.40}"
-            raise RigtwinError(f"{path}: {channel} of message {number} is {shown}; expected a number")
+            raise RigtwinError(
+                f"{path}: {channel} of message {number} is {shown}; expected a number"
+            )
     try:
         return np.array(values, np.float64)
     except OverflowError:
         raise RigtwinError(f"{path}: {channel} holds a number too large to be read") from None
 
 
-def _protobuf(path: Path, schema: Schema) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
+def _protobuf(
+    path: Path, schema: Schema
+) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
     """Field names and numbers of a message type, and a decoder that takes anything of that type."""
     try:
         files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
@@ -310,7 +416,7 @@ def _protobuf(path: Path, schema: Schema) -> tuple[list[str], list[int], Callabl
     return names, [item.number for item in found.fields] if doubles else [], decode
 
 
-def _aligned(
+def _align(
     tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
 ) -> tuple[Array, dict[str, dict[str, Array]]]:
     """The ticks that every topic has, in order."""
@@ -323,7 +429,8 @@ def _aligned(
         keep = first[np.isin(times[first], common)]
         if len(keep) < len(times):
             notes.append(
-                f"{len(times) - len(keep)} messages on {topic} left out: repeated, or without their like on another topic"
+                f"{len(times) - len(keep)} messages on {topic} left out: repeated, "
+                "or without their like on another topic"
             )
         columns[topic] = {name: column[keep] for name, column in values.items()}
     return common * 1e-9, columns
@@ -332,7 +439,12 @@ def _aligned(
 def _look_at_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
     spacing = float(np.median(np.diff(time))) if len(time) > 1 else period
     if abs(spacing - period) > 0.1 * period:
-        raise RigtwinError(f"{path}: its period is said to be {period:g} s, but messages come every {spacing:g} s")
+        raise RigtwinError(
+            f"{path}: its period is said to be {period:g} s, but messages come every {spacing:g} s"
+        )
     gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
     if len(gaps):
-        notes.append(f"{len(gaps)} gaps in time, the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s")
+        notes.append(
+            f"{len(gaps)} gaps in time, "
+            f"the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s"
+        )

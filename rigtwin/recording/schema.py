@@ -1,5 +1,8 @@
-"""Protobuf message types of the topics, made from the channel table. All fields are doubles, so every message of a topic
-has the same length and whole blocks are encoded and decoded at once."""
+"""Protobuf message types of the topics, made from the channel table.
+
+All fields are doubles, so every message of a topic has the same length and whole blocks are
+encoded and decoded at once.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,8 @@ TWIN_RECORD = "rigtwin.twin"
 END_RECORD = "rigtwin.end"
 """Name of the metadata record that says why the test ended."""
 TRANSITION_RECORD = "rigtwin.transition"
-"""Name of the metadata records that say when and why a session went from one state to the next, one for each."""
+"""Name of the metadata records that say when and why a session went from one state to the next,
+one for each."""
 CARD_RECORD = "rigtwin.card"
 """Name of the metadata record that holds the channel table."""
 LATENESS_RECORD = "rigtwin.lateness"
@@ -35,8 +39,23 @@ def type_name(topic: str) -> str:
 
 
 def descriptor(topic: str, names: Sequence[str]) -> bytes:
-    """Serialized FileDescriptorSet of a topic's message type with fields of those names, as an MCAP schema holds it."""
-    file = descriptor_pb2.FileDescriptorProto(name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3")
+    """Describes a topic's message type as an MCAP schema holds it.
+
+    Parameters
+    ----------
+    topic : str
+        Its name, with the slash.
+    names : sequence of str
+        Of the fields, all of them doubles.
+
+    Returns
+    -------
+    bytes
+        A serialized FileDescriptorSet.
+    """
+    file = descriptor_pb2.FileDescriptorProto(
+        name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3"
+    )
     message = file.message_type.add(name=type_name(topic).partition(".")[2])
     for number, name in enumerate(names, start=1):
         message.field.add(
@@ -57,12 +76,12 @@ def tags(count: int) -> NDArray[np.uint8]:
     return ((np.arange(1, count + 1) << 3) | _DOUBLE_WIRE_TYPE).astype(np.uint8)
 
 
-def known_topics() -> tuple[str, ...]:
+def list_topics() -> tuple[str, ...]:
     """Topics of the channel table, in order."""
     return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))
 
 
-def encoded(values: NDArray[np.float64]) -> bytes:
+def encode(values: NDArray[np.float64]) -> bytes:
     """One message of a topic, of its fields' values."""
     message = np.empty(len(values), FIELD)
     message["tag"], message["value"] = tags(len(values)), values

@@ -1,7 +1,10 @@
-"""Writes a recording block by block; what a block holds is on its way to the disk when `append` returns.
+"""Writes a recording block by block.
 
-The mcap package's own writer takes one message at a time, which costs half as much as simulating the test. Here a block's
-messages are laid out at once by numpy; every record around them is the mcap package's.
+What a block holds is on its way to the disk when `append` returns.
+
+The mcap package's own writer takes one message at a time, which costs half as much as simulating
+the test. Here a block's messages are laid out at once by numpy; every record around them is the
+mcap package's.
 """
 
 from __future__ import annotations
@@ -65,21 +68,31 @@ _PREFIX = 9
 """Bytes of a record's opcode and length."""
 
 
-def _encoded(record: McapRecord) -> bytes:
+def _encode(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
 
 
-def twin_values(seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str) -> dict[str, str]:
+def twin_values(
+    seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str
+) -> dict[str, str]:
     """What a recording keeps of a twin that makes it, as metadata TWIN_RECORD."""
-    return {"seed": str(seed), "parameters": json.dumps(parameters), "effects": json.dumps(effects), "version": version}
+    return {
+        "seed": str(seed),
+        "parameters": json.dumps(parameters),
+        "effects": json.dumps(effects),
+        "version": version,
+    }
 
 
 class Writer:
-    """A recording in the making. Use as a context manager; leaving it finishes the file, also after an exception.
+    """A recording in the making.
 
-    A process that dies without leaving it (kill -9, power) loses at most the block it was about to append.
+    Use as a context manager; leaving it finishes the file, also after an exception.
+
+    A process that dies without leaving it (kill -9, power) loses at most the block it was about to
+    append.
     """
 
     def __init__(
@@ -91,8 +104,11 @@ class Writer:
         machine: str = DEFAULT_MACHINE,
         fields: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
-        """period in s; controller: the operator's settings as `config.controller` holds them; fields: of each topic, by default
-        those of the channel table. Raises RigtwinError."""
+        """period in s.
+
+        Controller: the operator's settings as `config.controller` holds them; fields: of each
+        topic, by default those of the channel table. Raises RigtwinError.
+        """
         self._fields = dict(fields or {})
         try:
             self._file: BinaryIO = path.open("wb", buffering=0)
@@ -110,7 +126,7 @@ class Writer:
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
-        self._put(MCAP0_MAGIC + _encoded(Header(profile="", library="rigtwin")))
+        self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
         config = json.dumps({"controller": controller})
         self.add_metadata(
             RECORD,
@@ -123,19 +139,24 @@ class Writer:
             },
         )
 
-    def add_twin(self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str) -> None:
+    def add_twin(
+        self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str
+    ) -> None:
         """Says how a twin makes this recording, so that it can be made again."""
         self.add_metadata(TWIN_RECORD, twin_values(seed, parameters, effects, version))
 
     def reserve(self) -> None:
-        """Keeps room in the file for what has to be said when the disk is full: metadata that still fits is put there."""
+        """Keeps room in the file for what has to be said when the disk is full.
+
+        Metadata that still fits is put there.
+        """
         place = self._offset
         self.add_metadata(_RESERVE, {"": " " * _RESERVED})
         self._room = (place, self._offset)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record now."""
-        record = _encoded(Metadata(name=name, metadata=dict(values)))
+        record = _encode(Metadata(name=name, metadata=dict(values)))
         if self._full:
             self._put_into_room(record)
             return
@@ -143,7 +164,10 @@ class Writer:
         self._put(record)
 
     def append(self, **topics: Array | None) -> None:
-        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields). None is left out."""
+        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields).
+
+        None is left out.
+        """
         ticks = next((len(values) for values in topics.values() if values is not None), 0)
         self.append_at(np.arange(self._next, self._next + ticks), topics)
 
@@ -158,22 +182,36 @@ class Writer:
             return
         self._next = int(sequence[-1]) + 1
         self._ticks += ticks
-        self._put_messages(columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence)
+        self._put_messages(
+            columns, np.round(sequence * self._nanoseconds).astype(np.uint64), sequence
+        )
 
     def append_beside(self, topic: str, values: Array, times: Array) -> None:
-        """Adds messages on a topic that has ticks of its own, such as those before the test begins. values: shape (messages,
-        fields); times: s since the start of the test, rising, shape (messages,); what was before it is put at its start."""
+        """Adds messages on a topic that has ticks of its own, such as those before the test begins.
+
+        values: shape (messages, fields); times: s since the start of the test, rising, shape
+        (messages,); what was before it is put at its start.
+        """
         if topic not in self._topics:
             self._register(topic)
         if len(values):
             stamps = np.round(np.maximum(times, 0.0) * 1e9).astype(np.uint64)
-            self._put_messages({topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0))
+            self._put_messages(
+                {topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0)
+            )
 
-    def _put_messages(self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]) -> None:
+    def _put_messages(
+        self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]
+    ) -> None:
         ticks = len(times)
         for topic in columns:
             self._counts[topic] = self._counts.get(topic, 0) + ticks
-        layout = np.dtype([(topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])]) for topic, values in columns.items()])
+        layout = np.dtype(
+            [
+                (topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])])
+                for topic, values in columns.items()
+            ]
+        )
         messages = np.zeros(ticks, layout)
         for topic, values in columns.items():
             message = messages[topic]
@@ -187,7 +225,10 @@ class Writer:
         self._put_chunk(messages, times)
 
     def finish(self, reason: str) -> None:
-        """Says why the test ended, writes the index, closes the file. Does nothing the second time."""
+        """Says why the test ended, writes the index, closes the file.
+
+        Does nothing the second time.
+        """
         if self._file.closed:
             return
         if self._full:
@@ -195,7 +236,7 @@ class Writer:
             self._file.close()
             return
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
-        self._put(_encoded(DataEnd(data_section_crc=0)))
+        self._put(_encode(DataEnd(data_section_crc=0)))
         start = self._offset
         summary = bytearray()
         offsets = bytearray()
@@ -207,11 +248,17 @@ class Writer:
             (Opcode.METADATA_INDEX, [*self._metadata]),
         ]
         for opcode, records in groups:
-            encoded = b"".join(_encoded(record) for record in records)
-            offsets += _encoded(SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(encoded)))
+            encoded = b"".join(_encode(record) for record in records)
+            offsets += _encode(
+                SummaryOffset(
+                    group_opcode=opcode, group_start=start + len(summary), group_length=len(encoded)
+                )
+            )
             summary += encoded
-        footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
-        self._put(bytes(summary + offsets) + _encoded(footer) + MCAP0_MAGIC)
+        footer = Footer(
+            summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
+        )
+        self._put(bytes(summary + offsets) + _encode(footer) + MCAP0_MAGIC)
         self._file.close()
 
     def _register(self, topic: str) -> None:
@@ -219,17 +266,21 @@ class Writer:
         self._topics[topic] = number
         names = self._fields.get(topic) or topic_fields(topic)
         assert names, f"no channels defined for {topic}"
-        schema = Schema(id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic, names))
-        channel = Channel(id=number, schema_id=number, topic=topic, message_encoding="protobuf", metadata={})
+        schema = Schema(
+            id=number, name=type_name(topic), encoding="protobuf", data=descriptor(topic, names)
+        )
+        channel = Channel(
+            id=number, schema_id=number, topic=topic, message_encoding="protobuf", metadata={}
+        )
         self._schemas.append(schema)
         self._channels.append(channel)
-        self._put(_encoded(schema) + _encoded(channel))
+        self._put(_encode(schema) + _encode(channel))
 
     def _put_chunk(self, messages: NDArray[np.void], times: NDArray[np.uint64]) -> None:
         content = messages.tobytes()
         packed = zstandard.ZstdCompressor(level=1).compress(content)
         start = self._offset
-        chunk = _encoded(
+        chunk = _encode(
             Chunk(
                 compression="zstd",
                 data=packed,
@@ -268,7 +319,9 @@ class Writer:
         return Statistics(
             attachment_count=0,
             channel_count=len(self._channels),
-            channel_message_counts={number: self._counts.get(topic, 0) for topic, number in self._topics.items()},
+            channel_message_counts={
+                number: self._counts.get(topic, 0) for topic, number in self._topics.items()
+            },
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
             message_start_time=0,
@@ -284,7 +337,9 @@ class Writer:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             self._give_up()
-            raise RigtwinError(f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks") from None
+            raise RigtwinError(
+                f"cannot write {self._path}: {error.strerror}; it holds {self._ticks} ticks"
+            ) from None
         self._offset += len(data)
 
     def _give_up(self) -> None:
@@ -297,13 +352,13 @@ class Writer:
             self._file.truncate(self._offset)
 
     def _put_into_room(self, record: bytes) -> None:
-        """Writes over the room kept, which needs no space, and over the rest of it a smaller one."""
+        """Writes over the room kept, which needs no space, and keeps the rest of it."""
         assert self._room is not None
         place, end = self._room
-        rest = end - place - len(record) - len(_encoded(Metadata(name=_RESERVE, metadata={"": ""})))
+        rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))
         if rest < 0:
             return
-        filling = _encoded(Metadata(name=_RESERVE, metadata={"": " " * rest}))
+        filling = _encode(Metadata(name=_RESERVE, metadata={"": " " * rest}))
         with suppress(OSError):
             self._file.seek(place)
             self._file.write(record + filling)
@@ -312,7 +367,12 @@ class Writer:
     def __enter__(self) -> Writer:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.finish("completed" if kind is None else f"interrupted: {kind.__name__}")
 
 

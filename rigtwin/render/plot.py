@@ -67,10 +67,20 @@ PANELS = (
             Trace("commanded", ASKED, (("/command", "structure"),), _millimetres),
         ),
     ),
-    Panel("suspension travel, mm", (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),)),
+    Panel(
+        "suspension travel, mm",
+        (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),),
+    ),
     Panel(
         "wheel, mm",
-        (Trace("plate − travel", SENSED, (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")), _wheel),),
+        (
+            Trace(
+                "plate − travel",
+                SENSED,
+                (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")),
+                _wheel,
+            ),
+        ),
     ),
     Panel(
         "suspension force, N",
@@ -84,36 +94,91 @@ PANELS = (
 """What is drawn, from top to bottom; a panel without data is left out."""
 
 
-def _plainly(recording: Recording) -> tuple[Panel, ...]:
-    """A panel for every channel name of another machine: what was commanded and what was sensed under one name together."""
+def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
+    """A panel for every channel name of another machine.
+
+    What was commanded and what was sensed under one name together.
+    """
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
     return tuple(
-        Panel(name, tuple(Trace(label, colour, ((topic, name),), _plain) for topic, (label, colour) in labels.items()))
+        Panel(
+            name,
+            tuple(
+                Trace(label, colour, ((topic, name),), _plain)
+                for topic, (label, colour) in labels.items()
+            ),
+        )
         for name in names
     )
 
 
-def stretch(recording: Recording, start: float, until: float | None) -> slice:
-    """The ticks from `start` to `until` (s). Raises RigtwinError if there are none."""
+def find_stretch(recording: Recording, start: float, until: float | None) -> slice:
+    """Finds the ticks of a stretch of time.
+
+    Parameters
+    ----------
+    recording : Recording
+        Whose ticks.
+    start, until : float
+        s; to the end where `until` is None.
+
+    Returns
+    -------
+    slice
+        Two ticks at least.
+
+    Raises
+    ------
+    RigtwinError
+        If there are none.
+    """
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
         raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:
         span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
-        raise RigtwinError(f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}")
+        raise RigtwinError(
+            f"{recording.path}: nothing between {start:g} and {end:g} s; it has {span}"
+        )
     return slice(int(first), int(last))
 
 
 def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
-    """Draws the recording into a png, svg or pdf file. Raises RigtwinError for another ending or an empty stretch."""
-    checked_ending(out)
-    ticks = stretch(recording, start, until)
+    """Draws a recording: what moved, what pushed, what was commanded.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of any machine.
+    out : Path
+        A png, svg or pdf file.
+    start, until : float
+        s; to the end where `until` is None.
+
+    Raises
+    ------
+    RigtwinError
+        For another ending or an empty stretch.
+    """
+    check_ending(out)
+    ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]
-    panels = PANELS if all(recording.has("/sensor", name) for name in RIG_SENSORS) else _plainly(recording)
+    panels = (
+        PANELS
+        if all(recording.has("/sensor", name) for name in RIG_SENSORS)
+        else _plain_panels(recording)
+    )
     there = [
-        (panel.title, [trace for trace in panel.traces if all(recording.has(*channel) for channel in trace.needs)])
+        (
+            panel.title,
+            [
+                trace
+                for trace in panel.traces
+                if all(recording.has(*channel) for channel in trace.needs)
+            ],
+        )
         for panel in panels
     ]
     there = [(title, traces) for title, traces in there if traces]
@@ -126,7 +191,14 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
             axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
         axis.set_ylabel(title, fontsize=9)
         axis.grid(alpha=0.3)
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), fontsize=8, frameon=False, ncols=2, borderpad=0.1)
+        axis.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 0.97),
+            fontsize=8,
+            frameon=False,
+            ncols=2,
+            borderpad=0.1,
+        )
         axis.margins(x=0)
     axes[-1].set_xlabel("time, s")
     ending = f" · {recording.end}" if recording.end else ""
@@ -134,7 +206,7 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     save(figure, out)
 
 
-def checked_ending(out: Path) -> None:
+def check_ending(out: Path) -> None:
     """Raises RigtwinError unless a figure can be written to that name."""
     if out.suffix.lower() not in KINDS:
         raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")

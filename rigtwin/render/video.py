@@ -1,4 +1,7 @@
-"""Films a recording offscreen: the rig in motion, and its force and travel drawn beneath with a line that marks the time."""
+"""Films a recording offscreen.
+
+The rig in motion, and its force and travel drawn beneath with a line that marks the time.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.render.plot import ASKED, SENSED, stretch
+from rigtwin.render.plot import ASKED, SENSED, find_stretch
 from rigtwin.simulation.mechanics import SCENE
 from rigtwin.simulation.structure_motion import recorded_wing
 
@@ -39,7 +42,8 @@ BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 SMOOTHING = 20.0
 """Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
 NO_RENDERING = (
-    "cannot render without a display; on Debian or Ubuntu: sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
+    "cannot render without a display; on Debian or Ubuntu: "
+    "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
     "elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
 )
 
@@ -54,10 +58,29 @@ def film(
     magnify: float = 1.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> None:
-    """Films the stretch from `start` to `until` (s) in real time, 30 frames a second, into an mp4 file.
+    """Films a stretch of a recording in real time.
 
-    magnify: how many times as large motions are drawn. progress is called with (frames done, frames in all). Raises
-    RigtwinError if the file's ending, the camera, the stretch or this machine's rendering is at fault.
+    Parameters
+    ----------
+    recording : Recording
+        Of any machine.
+    out : Path
+        An mp4 file.
+    machine : Machine
+        What is seen.
+    camera : str, optional
+        One of the model's, or free; its first by default.
+    start, until : float
+        s; to the end where `until` is None.
+    magnify : float
+        How many times as large motions are drawn, at most 20.
+    progress : callable, optional
+        Called with frames done and frames in all.
+
+    Raises
+    ------
+    RigtwinError
+        If the file's ending, the camera, the stretch or this computer's rendering is at fault.
     """
     if out.suffix.lower() != ".mp4":
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
@@ -70,7 +93,7 @@ def film(
                 f"{recording.path}: the position of {joint} has values that are no numbers; "
                 "nothing can be drawn of it"
             )
-    ticks = stretch(recording, start, until)
+    ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in motions.items()}
     traces = _Traces(_curves(recording, machine), recording.time, ticks)
@@ -79,14 +102,27 @@ def film(
     frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
-        with _renderer(machine, camera) as render, av.open(str(temporary), "w", format="mp4") as container:
-            stream = container.add_stream("libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"})
-            stream.width, stream.height, stream.pix_fmt = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT, "yuv420p"
+        with (
+            _renderer(machine, camera) as render,
+            av.open(str(temporary), "w", format="mp4") as container,
+        ):
+            stream = container.add_stream(
+                "libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"}
+            )
+            stream.width, stream.height, stream.pix_fmt = (
+                WIDTH,
+                SCENE_HEIGHT + TRACE_HEIGHT,
+                "yuv420p",
+            )
             for number, tick in enumerate(frames):
                 at = {name: float(values[tick]) for name, values in motions.items()}
                 scene = render(at, None if bent is None else bent[tick])
                 picture = np.vstack([scene, traces.at(float(time[tick]))])
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")))
+                container.mux(
+                    stream.encode(
+                        av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+                    )
+                )
                 if progress is not None:
                     progress(number + 1, len(frames))
             container.mux(stream.encode())
@@ -99,7 +135,7 @@ def film(
 
 
 def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
-    """Joint → position at every tick, m or rad, from what was recorded alone, so that any recording can be filmed."""
+    """Joint → position at every tick, m or rad, from what was recorded alone."""
     if machine.structure is Structure.QUARTER_CAR:
         structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
         travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
@@ -120,7 +156,9 @@ def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
                 summed = np.cumsum(signal - np.mean(signal)) * recording.period
                 found[component.joint] = summed if wanted == "velocity" else signal
     if not found:
-        raise RigtwinError(f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it")
+        raise RigtwinError(
+            f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it"
+        )
     return found
 
 
@@ -170,8 +208,13 @@ def _smooth(signal: Array, period: float) -> Array:
 
 
 def _context() -> Any:
-    """An offscreen GL context: of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere."""
-    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or ("egl" if sys.platform == "linux" else "glfw")
+    """An offscreen GL context.
+
+    Of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere.
+    """
+    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or (
+        "egl" if sys.platform == "linux" else "glfw"
+    )
     try:
         context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
         context.make_current()
@@ -184,7 +227,7 @@ def _context() -> Any:
 def _renderer(
     machine: Machine, camera: str | None
 ) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
-    """A function from joint positions, and the beams' heights over their centre where there are any, to a picture."""
+    """A function from joint positions, and the beams' heights if there are any, to a picture."""
     quarter_car = machine.structure is Structure.QUARTER_CAR
     model = mujoco.MjModel.from_xml_path(str(SCENE if quarter_car else machine.model))
     cameras = [model.camera(number).name for number in range(model.ncam)]
@@ -224,11 +267,17 @@ def _renderer(
         context.free()
 
 
-def _draw_beams(scene: Any, plate: Array, bent: Array) -> None:
-    """Adds the cross of beams to a scene, its centre at the plate; its arms are drawn across the rig and far shorter than they
-    are, what they do along it in full size."""
+def _draw_beams(scene: mujoco.MjvScene, plate: Array, bent: Array) -> None:
+    """Adds the cross of beams to a scene, its centre at the plate.
+
+    Its arms are drawn across the rig and far shorter than they are, what they do along it in full
+    size.
+    """
     for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
-        points = [plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm) for n, height in enumerate(bent)]
+        points = [
+            plate + np.array([height, 0.0, 0.0]) + BEAM_DRAWN * n * np.array(arm)
+            for n, height in enumerate(bent)
+        ]
         for inner, outer in pairwise(points):
             geom = scene.geoms[scene.ngeom]
             kind = mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -248,10 +297,14 @@ class _Traces:
         axes = figure.subplots(max(len(titles), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, title in zip(axes, titles, strict=False):
             for curve in (each for each in curves if each.axis == title):
-                axis.plot(time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label)
+                axis.plot(
+                    time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label
+                )
             axis.set_ylabel(title, fontsize=8)
             if len(axis.lines) > 1:
-                axis.legend(loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2)
+                axis.legend(
+                    loc="upper right", fontsize=7, framealpha=0.85, edgecolor="none", ncols=2
+                )
         upper, lower = axes[0], axes[-1]
         lower.set_xlabel("time, s", fontsize=8)
         for axis in axes:

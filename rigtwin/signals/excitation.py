@@ -1,4 +1,7 @@
-"""What excites a test: pseudo-random roads and multisines. Sums of sines whose phases come from a seed."""
+"""What excites a test: pseudo-random roads and multisines.
+
+Sums of sines whose phases come from a seed.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,9 @@ def sum_of_sines(time: Array, frequencies: Array, amplitudes: Array, phases: Arr
 
 
 def road_spectrum(road: Road) -> tuple[Array, Array]:
-    """Frequencies (Hz) and amplitudes (m) of the road's sines: sqrt(2·S(f/v)·Δf/v), S(γ) = k/γⁿ (thesis Eq. 6.3).
+    """Frequencies (Hz) and amplitudes (m) of the road's sines.
+
+    Sqrt(2·S(f/v)·Δf/v), S(γ) = k/γⁿ (thesis Eq. 6.3).
 
     Raises RigtwinError if the band is empty.
     """
@@ -45,7 +50,8 @@ def road_spectrum(road: Road) -> tuple[Array, Array]:
 def road_profile(road: Road, time: Array, random: np.random.Generator) -> Array:
     """Ground position in m over `time` (s), with random phases.
 
-    Measured from where it starts, since the cylinder starts at its zero, and faded in over the first second.
+    Measured from where it starts, since the cylinder starts at its zero, and faded in over the
+    first second.
     """
     frequencies, amplitudes = road_spectrum(road)
     phases = random.uniform(0.0, 2 * math.pi, len(frequencies))
@@ -62,9 +68,25 @@ def multisine(
     rms: float,
     random: np.random.Generator,
 ) -> Array:
-    """Random-phase multisine, amplitudes ∝ frequency^-slope, scaled to `rms`, faded in over the first second.
+    """Makes a random-phase multisine, faded in over the first second.
 
-    lowest, highest and spacing in Hz.
+    Parameters
+    ----------
+    time : Array
+        s, shape (ticks,).
+    lowest, highest, spacing : float
+        Of its frequencies, Hz.
+    slope : float
+        Amplitudes fall with frequency^-slope.
+    rms : float
+        Before the fading, in the unit that is wanted.
+    random : Generator
+        Draws the phases.
+
+    Returns
+    -------
+    Array
+        Shape (ticks,).
     """
     frequencies = np.arange(lowest, highest + spacing / 2, spacing)
     amplitudes = frequencies**-slope
@@ -74,7 +96,7 @@ def multisine(
 
 
 def schroeder(time: Array, frequencies: Array, amplitude: float) -> Array:
-    """Multisine of equal amplitudes with Schroeder's phases −π·k·(k−1)/n, whose peak is low (thesis §6.1.2)."""
+    """Sines of equal amplitudes with Schroeder's phases −π·k·(k−1)/n (thesis §6.1.2)."""
     number = np.arange(1, len(frequencies) + 1)
     phases = -math.pi * number * (number - 1) / len(frequencies)
     return sum_of_sines(time, frequencies, np.full(len(frequencies), amplitude), phases)

@@ -1,4 +1,7 @@
-"""Noise estimated from the data: the white part of a signal, the mains line, and the motion beneath a noisy sensor."""
+"""Noise estimated from the data.
+
+The white part of a signal, the mains line, and the motion beneath a noisy sensor.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +32,9 @@ HIGHEST_MOTION = 200.0
 def white_noise(signal: Array) -> float:
     """Standard deviation of a signal's white noise.
 
-    From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz, and their median, which
-    ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse bits make most of them zero, their rms is taken.
+    From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz,
+    and their median, which ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse
+    bits make most of them zero, their rms is taken.
     """
     third = np.diff(signal, 3)
     typical = float(np.median(np.abs(third))) / NORMAL_MEDIAN
@@ -38,7 +42,10 @@ def white_noise(signal: Array) -> float:
 
 
 def smallest_step(signal: Array) -> float:
-    """The signal's bit: the smallest difference of two of its values, rounding apart; 0 if it shows none."""
+    """The signal's bit.
+
+    The smallest difference of two of its values, rounding apart; 0 if it shows none.
+    """
     values = np.unique(signal)
     steps = np.diff(values)
     steps = steps[steps > 1e-9 * max(float(np.ptp(signal)), 1e-300)]
@@ -55,8 +62,23 @@ def rms(signal: Array) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
-def without_mains(signal: Array, period: float, frequency: float) -> Array:
-    """The signal less its mains line; its mean stays. The line is looked for within ±0.5 Hz of `frequency` (Hz)."""
+def remove_mains(signal: Array, period: float, frequency: float) -> Array:
+    """Removes the mains line from a signal; its mean stays.
+
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    period : float
+        s.
+    frequency : float
+        Hz, nominal; the line is looked for within ±0.5 Hz of it.
+
+    Returns
+    -------
+    Array
+        Shape (ticks,).
+    """
     count = len(signal)
     time = np.arange(count) * period
     centred = signal - np.mean(signal)
@@ -64,7 +86,7 @@ def without_mains(signal: Array, period: float, frequency: float) -> Array:
     grid = np.fft.rfftfreq(count, period)
     near = np.abs(grid - frequency) <= MAINS_SEARCH
     if near.sum() < 3:
-        return _less_line(signal, centred, window, time, frequency)
+        return _remove_line(signal, centred, window, time, frequency)
     peak = grid[near][np.argmax(np.abs(np.fft.rfft(window * centred))[near])]
     width = grid[1]
 
@@ -77,10 +99,10 @@ def without_mains(signal: Array, period: float, frequency: float) -> Array:
         method="bounded",
         options={"xatol": width * 1e-3},
     )
-    return _less_line(signal, centred, window, time, float(found.x))
+    return _remove_line(signal, centred, window, time, float(found.x))
 
 
-def _less_line(
+def _remove_line(
     signal: Array, centred: Array, window: Array, time: Array, frequency: float
 ) -> Array:
     basis = np.column_stack(
@@ -96,7 +118,10 @@ def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
 
 
 def band(signal: Array, period: float) -> tuple[float, float]:
-    """The band in Hz that holds the middle 80 % of the signal's power, mean included; (0, 0) for no signal."""
+    """The band in Hz that holds the middle 80 % of the signal's power, mean included.
+
+    (0, 0) for no signal.
+    """
     frequencies, density = spectrum(signal, period)
     if not density.any():
         return 0.0, 0.0
@@ -106,23 +131,49 @@ def band(signal: Array, period: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """An estimated motion. position: shape (ticks,); correction: what of it is not as expected; velocity_error: standard
-    deviation of its rate of change, unit/s."""
+class EstimatedMotion:
+    """A motion estimated beneath a noisy measurement.
+
+    Parameters
+    ----------
+    position : Array
+        Shape (ticks,).
+    correction : Array
+        What of it is not as expected, shape (ticks,).
+    velocity_error : float
+        Standard deviation of its rate of change, unit/s.
+    """
 
     position: Array
     correction: Array
     velocity_error: float
 
 
-def motion(measured: Array, expected: Array, period: float, mains: float) -> Motion:
-    """The motion beneath a noisy measurement, given what a model expects of it.
+def estimate_motion(
+    measured: Array, expected: Array, period: float, mains: float
+) -> EstimatedMotion:
+    """Estimates the motion beneath a noisy measurement, given what a model expects of it.
 
-    Where measured − expected is noise, the expectation is the better estimate of the motion, plus a constant offset. What
-    stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum at every frequency: of all linear estimates the
-    one with the least error, in position and in velocity.
+    Where measured − expected is noise, the expectation is the better estimate of the motion, plus
+    a constant offset. What stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum
+    at every frequency: of all linear estimates the one with the least error, in position and in
+    velocity.
+
+    Parameters
+    ----------
+    measured, expected : Array
+        Shape (ticks,).
+    period : float
+        s.
+    mains : float
+        Nominal mains frequency, Hz.
+
+    Returns
+    -------
+    EstimatedMotion
+        In the unit of the measurement.
     """
-    difference = without_mains(measured - expected, period, mains)
+    difference = remove_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
     padding = min(PADDING, len(difference) - 1)
     start, end = (
@@ -140,12 +191,26 @@ def motion(measured: Array, expected: Array, period: float, mains: float) -> Mot
     grid = np.fft.rfftfreq(len(extended), period)
     kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))
     correction = offset + kept[padding : padding + len(difference)]
-    return Motion(expected + correction, correction, error)
+    return EstimatedMotion(expected + correction, correction, error)
 
 
-def smoothed(signal: Array, period: float) -> tuple[Array, float]:
-    """A measured motion without what is not to be told from its white noise, and the standard deviation of the error left.
-    Where it stays within that error it is taken to rest."""
+def smooth(signal: Array, period: float) -> tuple[Array, float]:
+    """Smooths a measured motion: what is not to be told from its white noise is left out.
+
+    Where it stays within the error that is left it is taken to rest.
+
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    period : float
+        s.
+
+    Returns
+    -------
+    tuple of Array and float
+        The motion, shape (ticks,), and the standard deviation of its error.
+    """
     noise = white_noise(signal)
     count = len(signal)
     line = signal[0] + (signal[-1] - signal[0]) * np.arange(count) / max(count - 1, 1)
@@ -162,10 +227,10 @@ def smoothed(signal: Array, period: float) -> tuple[Array, float]:
         ]
     )
     error = noise * math.sqrt(float(np.mean(gain)))
-    return _rested(kept, error, max(3, round(REST / period))), error
+    return _straighten_rests(kept, error, max(3, round(REST / period))), error
 
 
-def _rested(motion: Array, error: float, window: int) -> Array:
+def _straighten_rests(motion: Array, error: float, window: int) -> Array:
     """The motion with stretches in which it stays within its error straightened."""
     span = maximum_filter1d(motion, window) - minimum_filter1d(motion, window)
     still = np.diff(np.concatenate([[0], (span < STILL * error).astype(np.int8), [0]]))
@@ -176,8 +241,11 @@ def _rested(motion: Array, error: float, window: int) -> Array:
 
 
 def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
-    """1 − noise/density up to the highest frequency below which the density, averaged over a fifth of an octave or nine
-    lines, stands out of the noise density; 0 above."""
+    """Gives the gain of a Wiener filter: 1 − noise/density where there is motion, 0 above.
+
+    Motion goes up to the highest frequency at which the density, averaged over a fifth of an octave
+    or nine lines, stands out of the noise's density.
+    """
     smooth = np.empty_like(density)
     for line in range(len(density)):
         half = max(4, line // 10)

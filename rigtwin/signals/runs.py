@@ -12,7 +12,20 @@ FLAT = 8
 
 
 def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
-    """Where the longest run of equal, counted samples starts, and its length."""
+    """Finds the longest run of equal samples.
+
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    counted : Array
+        Which samples count, shape (ticks,).
+
+    Returns
+    -------
+    tuple of int
+        Where it starts, and its length.
+    """
     same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
     edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
     starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
@@ -22,8 +35,8 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
     return int(starts[longest]), int(ends[longest] - starts[longest]) + 1
 
 
-def cut_off(signal: Array) -> np.ndarray:
-    """Where a sensor is cut off at an end of its range, which says nothing of the plant, shape (ticks,)."""
+def find_cut_off(signal: Array) -> np.ndarray:
+    """Finds where a sensor is cut off at an end of its range, shape (ticks,)."""
     found = np.zeros(len(signal), bool)
     if white_noise(signal) >= smallest_step(signal):
         # Bits coarser than the noise stand still at rest too.

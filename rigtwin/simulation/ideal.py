@@ -14,7 +14,7 @@ from controllers.skyhook import semi_active_damping
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import deflected
+from rigtwin.simulation.plant import start_deflection
 
 SUBSTEPS = 4
 """Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear suspension is exact with one."""
@@ -120,7 +120,7 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     start = np.zeros(size)
     start[:count] = body.start
     if on_wheel:
-        start[-2] = ground[0] - deflected(plant, settings.preload)
+        start[-2] = ground[0] - start_deflection(plant, settings.preload)
     substeps = (
         SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
     )

@@ -32,9 +32,15 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sampled
-from rigtwin.simulation.plant import Machine, advance, sense
+from rigtwin.simulation.plant import PlantState, advance, sense
 from rigtwin.simulation.rig import Rig
-from rigtwin.simulation.safety import Trip, Watch, judged, watching, watching_compiled
+from rigtwin.simulation.safety import (
+    LimitMemory,
+    Trip,
+    empty_memory,
+    empty_memory_arrays,
+    judge_limits,
+)
 from rigtwin.simulation.twin import Twin
 
 BLOCK = 250
@@ -113,7 +119,7 @@ def run(
         If a controller of one's own gives anything but four finite commands.
     """
     own = tick is not None
-    tick, watch = tick or RigController(configuration).tick, watching()
+    tick, limit_memory = tick or RigController(configuration).tick, empty_memory()
     rig.start()
     try:
         for first in range(0, len(demands), BLOCK):
@@ -131,8 +137,8 @@ def run(
                     if own:
                         commands = check_commands(commands)
                 rows.append((commands, measured))
-                number, column = judged(
-                    configuration.safety, configuration.timing.period, watch, measured, commands
+                number, column = judge_limits(
+                    configuration.safety, configuration.timing.period, limit_memory, measured, commands
                 )
                 trip = Trip(number)
                 if trip != Trip.NONE:
@@ -154,10 +160,10 @@ def run(
 
 @kernel
 def _ticks(
-    machine: Machine,
+    plant: PlantState,
     controlling: Controller,
     limits: Safety,
-    watch: Watch,
+    limit_memory: LimitMemory,
     sensing: Sensing,
     memory: Array,
     held: Commands,
@@ -173,7 +179,7 @@ def _ticks(
     state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
-        true = sense(machine)
+        true = sense(plant)
         measured = sampled(sensing, true, disturbance[tick])
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
         commands = held
@@ -184,10 +190,10 @@ def _ticks(
             measured_out[tick, signal] = measured[signal]
             truth_out[tick, signal] = true[signal]
         done = tick + 1
-        trip, column = judged(limits, controlling.period, watch, measured, commands)
+        trip, column = judge_limits(limits, controlling.period, limit_memory, measured, commands)
         if trip != Trip.NONE.value:
             break
-        advance(machine, commands.ground, commands.structure, commands.voltage)
+        advance(plant, commands.ground, commands.structure, commands.voltage)
         held = commands
     numbers = packed(state)
     for number in range(SIZE):
@@ -200,15 +206,15 @@ def run_compiled(
 ) -> Iterator[Block]:
     """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
     controlling = controller(configuration.controller, configuration.timing.period)
-    memory, watch = np.array(packed(initial_state(controlling))), watching_compiled()
+    memory, limit_memory = np.array(packed(initial_state(controlling))), empty_memory_arrays()
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
         done, number, column = _ticks(
-            twin.simulation.machine,
+            twin.simulation.state,
             controlling,
             configuration.safety,
-            watch,
+            limit_memory,
             twin.sensing,
             memory,
             twin.held,

@@ -1,4 +1,7 @@
-"""The running plant: MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code."""
+"""The running plant.
+
+MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +31,16 @@ from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
 
 YIELDING = 5e-3
-"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
+"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no
+common solution."""
 
 
 class Contacts(NamedTuple):
-    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape (1,) each; yielded: of
-    the ground and structure plate under load, m, shape (2,)."""
+    """What changes with the motion in the mechanics, and its states.
+
+    gaps: of the backlashes, shape (1,) each; yielded: of the ground and structure plate under
+    load, m, shape (2,).
+    """
 
     changing: bool
     rail: Friction
@@ -53,9 +60,12 @@ class Contacts(NamedTuple):
     yielded: Array
 
 
-class Machine(NamedTuple):
-    """All that compiled code needs to run one plant. plain: whether its commands act as they are and its contacts do not
-    change with the motion, as in the nominal rig."""
+class PlantState(NamedTuple):
+    """All that compiled code needs to run one plant: its parts and their states.
+
+    `plain` says whether its commands act as they are and its contacts do not change with the
+    motion, as in the nominal rig.
+    """
 
     mechanics: Handles
     substeps: int
@@ -74,37 +84,57 @@ class Machine(NamedTuple):
 
 
 def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
-    """The plant's contacts with the carriage and the travel at those positions, m."""
+    """Gives a plant's contacts before anything moves.
+
+    Parameters
+    ----------
+    plant : RigPlant
+        Whose.
+    carriage, travel : float
+        Where they are, m.
+
+    Returns
+    -------
+    Contacts
+        With states of their own.
+    """
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
     forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
     return Contacts(
-        rail.changing or motor.changing or any(forces),
-        rail,
-        gap_at(carriage),
-        motor,
-        gap_at(travel),
-        plant.motor.cogging,
-        plant.motor.cogging_pitch,
-        plant.motor.cogging_phase,
-        tyre.stiffness,
-        tyre.damping,
-        tyre.hardening,
-        tyre.hardening_power,
-        *compliances,
-        plant.gas_spring,
-        np.zeros(2),
+        changing=rail.changing or motor.changing or any(forces),
+        rail=rail,
+        rail_gap=gap_at(carriage),
+        motor=motor,
+        motor_gap=gap_at(travel),
+        cogging=plant.motor.cogging,
+        cogging_pitch=plant.motor.cogging_pitch,
+        cogging_phase=plant.motor.cogging_phase,
+        stiffness=tyre.stiffness,
+        damping=tyre.damping,
+        hardening=tyre.hardening,
+        hardening_power=tyre.hardening_power,
+        ground_compliance=compliances[0],
+        structure_compliance=compliances[1],
+        gas=plant.gas_spring,
+        yielded=np.zeros(2),
     )
 
 
-def deflected(plant: RigPlant, preload: float) -> float:
-    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
+def start_deflection(plant: RigPlant, preload: float) -> float:
+    """The tyre's deflection at the start, m.
+
+    It carries the motor's preload (N) and the extended gas spring.
+    """
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 class Simulation:
-    """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
-    at rest. Owns the MuJoCo structures that `machine` looks into."""
+    """One plant at its start.
+
+    Ground at its first command, spring uncompressed, tyre and motor carrying the preload, all at
+    rest. Owns the MuJoCo structures that `state` looks into.
+    """
 
     def __init__(
         self,
@@ -115,7 +145,10 @@ class Simulation:
         structure: float,
         preload: float,
     ) -> None:
-        """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
+        """timestep s.
+
+        Ground and structure: commands at the start, m; preload: motor force at the start, N.
+        """
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
@@ -130,26 +163,26 @@ class Simulation:
         ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - start_deflection(
             plant, preload
         )
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
-        self.machine = Machine(
-            view,
-            substeps,
-            not touching.changing and all(each.neutral for each in drives),
-            sampled(plant.ground_cylinder, timestep),
-            settled(plant.ground_cylinder, here),
-            drives[0],
-            held[0],
-            sampled(plant.structure_cylinder, timestep),
-            settled(plant.structure_cylinder, carriage),
-            drives[1],
-            held[1],
-            drives[2],
-            held[2],
-            touching,
+        self.state = PlantState(
+            mechanics=view,
+            substeps=substeps,
+            plain=not touching.changing and all(each.neutral for each in drives),
+            ground=sampled(plant.ground_cylinder, timestep),
+            ground_state=settled(plant.ground_cylinder, here),
+            ground_drive=drives[0],
+            ground_command=held[0],
+            structure=sampled(plant.structure_cylinder, timestep),
+            structure_state=settled(plant.structure_cylinder, carriage),
+            structure_drive=drives[1],
+            structure_command=held[1],
+            motor_drive=drives[2],
+            motor_command=held[2],
+            contacts=touching,
         )
 
 
@@ -184,7 +217,10 @@ def stiffening(now: Contacts, deflection: float) -> float:
 
 @compilable
 def touch(mechanics: Handles, now: Contacts) -> None:
-    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
+    """Writes into the mechanics what depends on the motion.
+
+    Dry friction, cogging, the tyre's slope.
+    """
     if not now.changing:
         return
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
@@ -228,24 +264,25 @@ def true_measurements(mechanics: Handles) -> Measurements:
 
 
 @compilable
-def sense(machine: Machine) -> Measurements:
+def sense(state: PlantState) -> Measurements:
     """Ideal measurements now, under the commands held until now.
 
-    The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
-    that accelerates the carriage with the plate, which a velocity one timestep old would not show.
+    The plates move over the coming timestep as those commands would move them: a motor that sticks
+    passes on the force that accelerates the carriage with the plate, which a velocity one timestep
+    old would not show.
     """
-    mechanics, yielded = machine.mechanics, machine.contacts.yielded
+    mechanics, yielded = state.mechanics, state.contacts.yielded
     ground, structure = (
-        machine.ground_state.position[0] + yielded[0],
-        machine.structure_state.position[0] + yielded[1],
+        state.ground_state.position[0] + yielded[0],
+        state.structure_state.position[0] + yielded[1],
     )
-    onward = next_position(machine.ground, machine.ground_state, machine.ground_command.memory[3])
+    onward = next_position(state.ground, state.ground_state, state.ground_command.memory[3])
     drive(mechanics, mechanics.ground, ground, onward + yielded[0])
     onward = next_position(
-        machine.structure, machine.structure_state, machine.structure_command.memory[3]
+        state.structure, state.structure_state, state.structure_command.memory[3]
     )
     drive(mechanics, mechanics.structure, structure, onward + yielded[1])
-    touch(mechanics, machine.contacts)
+    touch(mechanics, state.contacts)
     brace(mechanics)
     forward(mechanics.model, mechanics.data, 0, 0)
     return true_measurements(mechanics)
@@ -253,45 +290,45 @@ def sense(machine: Machine) -> Measurements:
 
 @compilable
 def advance(
-    machine: Machine, ground_command: float, structure_command: float, voltage: float
+    state: PlantState, ground_command: float, structure_command: float, voltage: float
 ) -> None:
     """One control period with the commands held."""
-    if machine.plain:
+    if state.plain:
         advance_plain(
-            machine.mechanics,
-            machine.substeps,
-            machine.ground,
-            machine.ground_state,
-            machine.structure,
-            machine.structure_state,
+            state.mechanics,
+            state.substeps,
+            state.ground,
+            state.ground_state,
+            state.structure,
+            state.structure_state,
             ground_command,
             structure_command,
             voltage,
         )
-        machine.ground_command.memory[3] = ground_command
-        machine.structure_command.memory[3] = structure_command
+        state.ground_command.memory[3] = ground_command
+        state.structure_command.memory[3] = structure_command
         return
-    mechanics, yielded = machine.mechanics, machine.contacts.yielded
-    for _ in range(machine.substeps):
+    mechanics, yielded = state.mechanics, state.contacts.yielded
+    for _ in range(state.substeps):
         ground, structure = (
-            machine.ground_state.position[0] + yielded[0],
-            machine.structure_state.position[0] + yielded[1],
+            state.ground_state.position[0] + yielded[0],
+            state.structure_state.position[0] + yielded[1],
         )
-        asked = conditioned(machine.ground_drive, machine.ground_command, ground_command)
-        advance_cylinder(machine.ground, machine.ground_state, asked)
-        asked = conditioned(machine.structure_drive, machine.structure_command, structure_command)
-        advance_cylinder(machine.structure, machine.structure_state, asked)
-        mechanics.control[0] = conditioned(machine.motor_drive, machine.motor_command, voltage)
-        if machine.contacts.changing:
-            give_way(mechanics, machine.contacts)
-        drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])
+        asked = conditioned(state.ground_drive, state.ground_command, ground_command)
+        advance_cylinder(state.ground, state.ground_state, asked)
+        asked = conditioned(state.structure_drive, state.structure_command, structure_command)
+        advance_cylinder(state.structure, state.structure_state, asked)
+        mechanics.control[0] = conditioned(state.motor_drive, state.motor_command, voltage)
+        if state.contacts.changing:
+            give_way(mechanics, state.contacts)
+        drive(mechanics, mechanics.ground, ground, state.ground_state.position[0] + yielded[0])
         drive(
             mechanics,
             mechanics.structure,
             structure,
-            machine.structure_state.position[0] + yielded[1],
+            state.structure_state.position[0] + yielded[1],
         )
-        touch(mechanics, machine.contacts)
+        touch(mechanics, state.contacts)
         brace(mechanics)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)
@@ -309,7 +346,10 @@ def advance_plain(
     structure_command: float,
     voltage: float,
 ) -> None:
-    """The same for a machine whose commands act as they are and whose contacts do not change: a third faster."""
+    """The same for a plant whose commands act as they are and whose contacts do not change.
+
+    A third faster.
+    """
     mechanics.control[0] = voltage
     for _ in range(substeps):
         ground_here, structure_here = ground_state.position[0], structure_state.position[0]

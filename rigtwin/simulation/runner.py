@@ -15,7 +15,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.simulation.loop import Tick, run, run_compiled
-from rigtwin.simulation.safety import Trip, explained
+from rigtwin.simulation.safety import Trip, explain_trip
 from rigtwin.simulation.twin import Twin
 
 
@@ -116,6 +116,6 @@ def record(
             writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
             progress(len(block.commands))
-        reason = explained(trip, configuration.safety, column)
+        reason = explain_trip(trip, configuration.safety, column)
         writer.finish(reason)
     return RunResult(path, ticks, reason, trip != Trip.NONE)

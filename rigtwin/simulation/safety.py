@@ -1,8 +1,9 @@
-"""Limits: what ends a test at once. Looks at raw measurements and at commands before they are written, on twin and rig
-alike.
+"""Limits: what ends a test at once.
 
-A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled loop and the rig's loop
-call the same one.
+Looks at raw measurements and at commands before they are written, on twin and rig alike.
+
+A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled
+loop and the rig's loop call the same one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ MOTOR_LAG = RigPlant().motor.time_constant
 LEADING = 1.5
 """Times its cylinder's limit that a command may be."""
 VELOCITY_SPAN = 10
-"""Ticks over which a velocity is averaged before it is held against its limit: noise of single samples is no motion."""
+"""Ticks over which a velocity is averaged before it is held against its limit: noise of single
+samples is no motion."""
 
 
 class Trip(IntEnum):
@@ -66,11 +68,24 @@ class Trip(IntEnum):
 """Plain numbers: looking up an enumeration's value takes longer than the comparison."""
 
 
-class Watch(NamedTuple):
-    """What the limits remember. measured: last, shape (4,), not a number before the first tick; repeats: readings in a row that
-    were the same, shape (4,); commands: last, shape (4,); travel: a ring of VELOCITY_SPAN samples and its place, shape
-    (VELOCITY_SPAN + 1,); motor: force that the voltage must have made by now, N, shape (1,). Changed in place. Arrays for
-    compiled loops; lists, which Python reads faster, for others."""
+class LimitMemory(NamedTuple):
+    """What the limits remember of earlier ticks; changed in place.
+
+    Arrays for compiled loops; lists, which Python reads faster, for others.
+
+    Parameters
+    ----------
+    measured
+        Last measurements, shape (4,), not a number before the first tick.
+    repeats
+        Readings in a row that were the same, shape (4,).
+    commands
+        Last commands, shape (4,).
+    travel
+        A ring of VELOCITY_SPAN samples and its place, shape (VELOCITY_SPAN + 1,), m.
+    motor
+        Force that the voltage must have made by now, shape (1,), N.
+    """
 
     measured: Array | list[float]
     repeats: Array | list[float]
@@ -79,39 +94,58 @@ class Watch(NamedTuple):
     motor: Array | list[float]
 
 
-def watching() -> Watch:
+def empty_memory() -> LimitMemory:
     """Before the first tick, for a loop in Python."""
     unknown = [math.nan]
-    return Watch(4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown)
+    return LimitMemory(
+        4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown
+    )
 
 
-def watching_compiled() -> Watch:
+def empty_memory_arrays() -> LimitMemory:
     """Before the first tick, for a compiled loop."""
-    return Watch(*(np.array(values) for values in watching()))
+    return LimitMemory(*(np.array(values) for values in empty_memory()))
 
 
 @compilable
-def sensed_wrong(
-    limits: Safety, period: float, watch: Watch, measured: Measurements
+def judge_measurements(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements
 ) -> tuple[int, int]:
-    """The first limit that the measurements of this tick violate, a Trip's number, and the column of Measurements."""
+    """Finds the first limit that the measurements of this tick violate.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        Of the ticks before; changed in place.
+    measured : Measurements
+        Of this tick.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+    """
     for column in range(4):
         if not math.isfinite(measured[column]):
             return _NOT_A_NUMBER, column
     trip, at = _NONE, 0
     for column in range(4):
-        change = abs(measured[column] - watch.measured[column])
+        change = abs(measured[column] - memory.measured[column])
         rate = limits.force_rate if column == 3 else limits.lvdt_rate
         if change > rate * period and trip == _NONE:
             trip, at = _JUMP, column
-        watch.repeats[column] = watch.repeats[column] + 1.0 if change == 0.0 else 1.0
-        if watch.repeats[column] >= limits.stuck and trip == _NONE:
+        memory.repeats[column] = memory.repeats[column] + 1.0 if change == 0.0 else 1.0
+        if memory.repeats[column] >= limits.stuck and trip == _NONE:
             trip, at = _STUCK, column
-        watch.measured[column] = measured[column]
-    place = int(watch.travel[VELOCITY_SPAN]) if watch.travel[VELOCITY_SPAN] >= 0.0 else 0
-    moved = abs(measured.suspension_lvdt - watch.travel[place])
-    watch.travel[place] = measured.suspension_lvdt
-    watch.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
+        memory.measured[column] = measured[column]
+    place = int(memory.travel[VELOCITY_SPAN]) if memory.travel[VELOCITY_SPAN] >= 0.0 else 0
+    moved = abs(measured.suspension_lvdt - memory.travel[place])
+    memory.travel[place] = measured.suspension_lvdt
+    memory.travel[VELOCITY_SPAN] = (place + 1) % VELOCITY_SPAN
     if trip != _NONE:
         return trip, at
     if abs(measured.structure_lvdt) > limits.structure:
@@ -124,23 +158,44 @@ def sensed_wrong(
         return _GROUND, 0
     if moved > limits.velocity * VELOCITY_SPAN * period:
         return _VELOCITY, 2
-    # What two sensors or a command say of the same thing: the wheel stands on the ground plate, the motor pushes as told.
+    # What two sensors or a command say of the same thing: the wheel stands on the ground plate,
+    # the motor pushes as told.
     if (
         abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt)
         > limits.wheel
     ):
         return _WHEEL, 2
-    if abs(measured.load_cell - watch.motor[0]) > limits.motor:
+    if abs(measured.load_cell - memory.motor[0]) > limits.motor:
         return _MOTOR, 3
     return _NONE, 0
 
 
 @compilable
-def commanded_wrong(
-    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+def judge_commands(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """The first limit that the commands of this tick violate, a Trip's number, and the column of Commands. Commands that pass
-    are remembered as written."""
+    """Finds the first limit that the commands of this tick violate.
+
+    Commands that pass are remembered as written.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        Of the ticks before; changed in place.
+    measured : Measurements
+        Of this tick.
+    commands : Commands
+        Before they are written.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+    """
     for column in range(4):
         if not math.isfinite(commands[column]):
             return _NOT_A_NUMBER, 4 + column
@@ -151,7 +206,7 @@ def commanded_wrong(
         return _COMMAND, 5
     for column in (0, 1, 3):
         rate = limits.voltage_rate if column == 3 else limits.command_rate
-        if abs(commands[column] - watch.commands[column]) > rate * period:
+        if abs(commands[column] - memory.commands[column]) > rate * period:
             return _COMMAND_RATE, 4 + column
     if abs(commands.ground - measured.ground_lvdt) > limits.following:
         return _FOLLOWING, 0
@@ -160,32 +215,52 @@ def commanded_wrong(
     if abs(commands.force - measured.load_cell) > limits.following_force:
         return _FOLLOWING, 3
     for column in range(4):
-        watch.commands[column] = commands[column]
+        memory.commands[column] = commands[column]
     share = 1.0 - math.exp(-period / MOTOR_LAG)
-    force = watch.motor[0] if math.isfinite(watch.motor[0]) else measured.load_cell
-    watch.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
+    force = memory.motor[0] if math.isfinite(memory.motor[0]) else measured.load_cell
+    memory.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
     return _NONE, 0
 
 
 @compilable
-def judged(
-    limits: Safety, period: float, watch: Watch, measured: Measurements, commands: Commands
+def judge_limits(
+    limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """Both of one tick: a Trip's number and the column, of Measurements or, from 4 on, of Commands."""
-    trip, column = sensed_wrong(limits, period, watch, measured)
+    """Judges one tick.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    period : float
+        s since the tick before.
+    memory : LimitMemory
+        What was seen before; changed in place.
+    measured, commands
+        Of this tick; commands before they are written.
+
+    Returns
+    -------
+    tuple of int
+        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+    """
+    trip, column = judge_measurements(limits, period, memory, measured)
     if trip == _NONE:
-        trip, column = commanded_wrong(limits, period, watch, measured, commands)
+        trip, column = judge_commands(limits, period, memory, measured, commands)
     return trip, column
 
 
-def held(limits: Safety, commands: Commands) -> Commands:
-    """The stop state after commands: no force, cylinders where they were told to be, but not beyond their limits."""
+def stop_state(limits: Safety, commands: Commands) -> Commands:
+    """The stop state after commands.
+
+    No force, cylinders where they were told to be, but not beyond their limits.
+    """
     ground = min(max(commands.ground, -limits.ground), limits.ground)
     structure = min(max(commands.structure, -limits.structure), limits.structure)
     return Commands(ground, structure, 0.0, 0.0)
 
 
-def beyond(limits: Safety, measured: Measurements) -> bool:
+def is_beyond(limits: Safety, measured: Measurements) -> bool:
     """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
     ground, structure = (
         abs(measured.ground_lvdt) <= limits.ground,
@@ -194,9 +269,23 @@ def beyond(limits: Safety, measured: Measurements) -> bool:
     return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
-def within(limits: Safety, measured: Measurements) -> str | None:
-    """Why the rig may not be armed as it stands, or None: after a trip everything must be back inside its limit by the
-    hysteresis."""
+def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
+    """Finds why the rig may not be armed as it stands.
+
+    After a trip everything must be back inside its limit by the hysteresis.
+
+    Parameters
+    ----------
+    limits : Safety
+        Of the test.
+    measured : Measurements
+        As it stands.
+
+    Returns
+    -------
+    str or None
+        The reason; None if it may be armed.
+    """
     share = 1.0 - limits.hysteresis
     for name, limit in zip(
         Measurements._fields,
@@ -205,12 +294,30 @@ def within(limits: Safety, measured: Measurements) -> str | None:
     ):
         value = getattr(measured, name)
         if not abs(value) <= share * limit:
-            return f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, {100 * share:.0f} % of its limit"
+            return (
+                f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, "
+                f"{100 * share:.0f} % of its limit"
+            )
     return None
 
 
-def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
-    """One line for the operator. column: of Measurements, from 4 on of Commands."""
+def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
+    """Explains a trip in one line for the operator.
+
+    Parameters
+    ----------
+    trip : Trip
+        What ended the test.
+    limits : Safety
+        Of the test.
+    column : int
+        Of Measurements, from 4 on of Commands.
+
+    Returns
+    -------
+    str
+        With limit and unit.
+    """
     name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
     lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)
     command, change = ("m", limits.command_rate) if column != 7 else ("V", limits.voltage_rate)
@@ -223,11 +330,15 @@ def explained(trip: Trip, limits: Safety, column: int = 0) -> str:
         Trip.NOT_A_NUMBER: f"trip: {name} is not a finite number",
         Trip.GROUND: f"trip: |ground_lvdt| above {limits.ground:g} m",
         Trip.VELOCITY: f"trip: suspension_lvdt moves faster than {limits.velocity:g} m/s",
-        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: sensor or cable",
-        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: sensor stuck or cable off",
+        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: "
+        "sensor or cable",
+        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: "
+        "sensor stuck or cable off",
         Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
         Trip.COMMAND: f"trip: {name} is beyond its limit",
-        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground plate: one of them is wrong",
-        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's voltage: sensor or amplifier",
+        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground "
+        "plate: one of them is wrong",
+        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's "
+        "voltage: sensor or amplifier",
         Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
     }[trip]

@@ -18,14 +18,11 @@ from controllers import (
     unpacked,
     update,
 )
-from controllers.beam import MODES
+from controllers.mil import PLACES
 from rigtwin.description.configuration import Configuration, overridden
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
-
-MODAL = slice(7, 7 + MODES)
-"""The modal displacements within a packed state."""
 
 
 @kernel
@@ -46,8 +43,11 @@ def _states(
 
 
 def states(settings: Settings, period: float, measured: Array, demands: Array) -> Array:
-    """The controller's packed state after every tick, shape (ticks, SIZE). measured: shape (ticks, 4), columns of
-    controllers.Measurements; demands: shape (ticks, 3), of controllers.Demand; period: s."""
+    """The controller's packed state after every tick, shape (ticks, SIZE).
+
+    measured: shape (ticks, 4), columns of controllers.Measurements; demands: shape (ticks, 3), of
+    controllers.Demand; period: s.
+    """
     controlling = controller(settings, period)
     out = np.empty((len(measured), SIZE))
     start = np.array(packed(initial_state(controlling)))
@@ -56,8 +56,11 @@ def states(settings: Settings, period: float, measured: Array, demands: Array) -
 
 
 def wing(settings: Settings, period: float, packed_states: Array) -> Array:
-    """Of the cross of beams: height over its centre at 0, 1, 2 and 3 beams from it, m, shape (ticks, 4)."""
-    heights = packed_states[:, MODAL] @ controller(settings, period).modes.wing
+    """Of the cross of beams.
+
+    Height over its centre at 0, 1, 2 and 3 beams from it, m, shape (ticks, 4).
+    """
+    heights = packed_states[:, PLACES["modal"]] @ controller(settings, period).modes.wing
     return heights - heights[:, :1]
 
 

@@ -11,26 +11,31 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Disturbance, sampled, sensing
-from rigtwin.simulation.plant import Machine, Simulation, advance, sense
+from rigtwin.simulation.plant import PlantState, Simulation, advance, sense
 
 _advance = kernel(advance)
 
 
 @kernel
-def _sense(machine: Machine, out: Array) -> None:
-    true = sense(machine)
+def _sense(plant: PlantState, out: Array) -> None:
+    true = sense(plant)
     for number in range(4):
         out[number] = true[number]
 
 
 class Twin:
-    """A simulated rig. The same configuration, first ground command and seed give the same measurements to the bit.
+    """A simulated rig.
+
+    The same configuration, first ground command and seed give the same measurements to the bit.
 
     `truth` holds the last measurements before noise and quantisation.
     """
 
     def __init__(self, configuration: Configuration, ground: float, seed: int) -> None:
-        """ground: the first ground command, m. Raises RigtwinError unless the period is a multiple of the timestep."""
+        """ground: the first ground command, m.
+
+        Raises RigtwinError unless the period is a multiple of the timestep.
+        """
         controller = configuration.controller
         self.simulation = Simulation(
             configuration.plant,
@@ -54,16 +59,19 @@ class Twin:
 
     def read(self) -> Measurements:
         true = np.empty(4)
-        _sense(self.simulation.machine, true)
+        _sense(self.simulation.state, true)
         self.truth = Measurements(*true.tolist())
         return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
 
     def misses(self, ticks: int) -> NDArray[np.bool_]:
-        """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as they are."""
+        """Which of the next ticks the computer misses, shape (ticks,).
+
+        Its outputs then stay as they are.
+        """
         return self._missed.random(ticks) < self._share_missed
 
     def write(self, commands: Commands) -> None:
-        _advance(self.simulation.machine, commands.ground, commands.structure, commands.voltage)
+        _advance(self.simulation.state, commands.ground, commands.structure, commands.voltage)
         self.held = commands
 
     def stop(self) -> None:

@@ -34,7 +34,7 @@ from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.safety import Trip, judged, watching
+from rigtwin.simulation.safety import Trip, empty_memory, judge_limits
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.actions import Actions, suspension
 
@@ -206,7 +206,7 @@ class Environment(dm_env.Environment):
         """
         twin = self._begin(self._next_seed) if self._twin is None or self.seed != self._next_seed else self._twin
         self._next_seed += 1
-        self._state, self._watch = initial_state(self._controlling), watching()
+        self._state, self._memory = initial_state(self._controlling), empty_memory()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
         self._measured = Measurements(float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload)
@@ -269,7 +269,7 @@ class Environment(dm_env.Environment):
             self._state, commands = self.actions.act(self._controlling, self._state, measured, demand, action)
         self._measured = measured
         self._tick += 1
-        number, _ = judged(self.configuration.safety, period, self._watch, measured, commands)
+        number, _ = judge_limits(self.configuration.safety, period, self._memory, measured, commands)
         self.trip = Trip(number)
         if self.trip == Trip.NONE:
             twin.write(commands)

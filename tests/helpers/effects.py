@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import pytest
+
 NOTICEABLE = {
     "coulomb@rail": "90", "viscous@rail": "400", "stribeck@rail": "30", "asymmetry@rail": "30", "backlash@rail": "0.002",
     "coulomb@motor": "24", "viscous@motor": "60", "stribeck@motor": "12", "asymmetry@motor": "12", "backlash@motor": "0.002",
@@ -24,3 +28,17 @@ def text(name: str) -> str:
     for ending in ("cylinder", "lvdt"):
         component = ending if component.endswith(ending) else component
     return f"{name}={NOTICEABLE[f'{kind}@{component}']}"
+
+
+ALIKE = {"structure_lvdt": "suspension_lvdt", "ground_lvdt": "suspension_lvdt", "structure_cylinder": "ground_cylinder"}
+"""Component → another one of the same sort."""
+
+
+def once_a_sort(names: Sequence[str]) -> list[object]:
+    """Parameters of a test: what the same kind shows at another component of the sort is left to the slow tests."""
+
+    def repeats(name: str) -> bool:
+        kind, _, component = name.partition("@")
+        return f"{kind}@{ALIKE.get(component)}" in names
+
+    return [pytest.param(name, marks=pytest.mark.slow if repeats(name) else ()) for name in names]

@@ -1,4 +1,7 @@
-"""The rig behind a data acquisition card: which signal is on which line, volts, the card itself, and a virtual one."""
+"""The rig behind a data acquisition card.
+
+Which signal is on which line, volts, the card itself, and a virtual one.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,7 @@
-"""A rig behind an NI card, through the nidaqmx package: the driver of this computer, or a gRPC device server."""
+"""A rig behind an NI card, through the nidaqmx package.
+
+The driver of this computer, or a gRPC device server.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,9 @@ if TYPE_CHECKING:
 
 TIMEOUT = 0.1
 """s that a sample may be awaited: a card that stays silent so long is not there."""
-DRIVER = "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
+DRIVER = (
+    "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
+)
 PACKAGE = "the nidaqmx package is missing; pip install 'rigtwin[daq]'"
 INPUTS, OUTPUTS, PRESSURE = "rigtwin-inputs", "rigtwin-outputs", "rigtwin-pressure"
 """Names of the tasks, by which a guardian finds the outputs when their owner is dead."""
@@ -30,7 +35,7 @@ class CardFault(RigtwinError):
 
 
 @contextmanager
-def translated(doing: str) -> Iterator[None]:
+def translate_errors(doing: str) -> Iterator[None]:
     """Gives what nidaqmx raises as a CardFault of one line."""
     from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
 
@@ -46,12 +51,13 @@ def translated(doing: str) -> Iterator[None]:
     except (AssertionError, ValueError, TypeError) as error:
         # The client's own checks of what a card has answered.
         raise CardFault(
-            f"{doing}: it answered what the driver's client does not take: {error or type(error).__name__}"
+            f"{doing}: it answered what the driver's client does not take: "
+            f"{error or type(error).__name__}"
         ) from None
 
 
 def require_client() -> None:
-    """Raises CardFault unless the driver's client is installed, with what it needs to speak to a virtual card."""
+    """Raises CardFault unless the driver's client is installed, with what a virtual card needs."""
     try:
         import grpc  # noqa: F401
         import nidaqmx  # noqa: F401
@@ -59,23 +65,34 @@ def require_client() -> None:
         raise CardFault(PACKAGE) from None
 
 
-def connected(address: str) -> grpc.Channel | None:
-    """The connection to a gRPC device server, or None for this computer's driver. Raises CardFault."""
+def connect(address: str) -> grpc.Channel | None:
+    """The connection to a gRPC device server, or None for this computer's driver.
+
+    Raises CardFault.
+    """
     require_client()
     if not address:
         return None
     import grpc
 
-    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have no end of their own.
-    alive = (("grpc.keepalive_time_ms", 1000), ("grpc.keepalive_timeout_ms", 1000), ("grpc.http2.max_pings_without_data", 0))
+    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have
+    # no end of their own.
+    alive = (
+        ("grpc.keepalive_time_ms", 1000),
+        ("grpc.keepalive_timeout_ms", 1000),
+        ("grpc.http2.max_pings_without_data", 0),
+    )
     return grpc.insecure_channel(address, options=alive)
 
 
 class Card:
-    """A `DrivenRig` on a card. Inputs are clocked by the card where the table says so, else by this computer; outputs act at
+    """A `DrivenRig` on a card.
+
+    Inputs are clocked by the card where the table says so, else by this computer; outputs act at
     once. Nothing moves before `write` or `pressure`.
 
-    missed: ticks whose samples came too late to be answered. late: s by which the last sample was read after it was due.
+    missed: ticks whose samples came too late to be answered. late: s by which the last sample was
+    read after it was due.
     """
 
     def __init__(
@@ -86,43 +103,61 @@ class Card:
         clock: Callable[[], float] = monotonic,
         pacer: Pacer | None = None,
     ) -> None:
-        """period in s; channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer: waits for the
-        ticks of a card that has no clock of its own."""
+        """period in s.
+
+        Channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer:
+        waits for the ticks of a card that has no clock of its own.
+        """
         self._table, self._period, self._channel = table, period, channel
         # A tick converts seven numbers: handing them to compiled code would take longer.
-        self._inputs, self._outputs = rows(conversion(table.inputs)), rows(conversion(table.outputs))
+        self._inputs, self._outputs = (
+            rows(conversion(table.inputs)),
+            rows(conversion(table.outputs)),
+        )
         self._volts, self._asked = np.zeros(4), np.zeros(3)
         self._pacer, self._clock = pacer, clock
         self._start, self._count, self.missed, self.late = -1.0, 0, 0, 0.0
         self._tasks: list[Any] = []
 
     def inspect(self) -> None:
-        """Looks whether the card is there and has what the table asks of it. Raises CardFault; moves nothing."""
+        """Looks whether the card is there and has what the table asks of it.
+
+        Raises CardFault; moves nothing.
+        """
         from nidaqmx.system import System
 
         table = self._table
-        with translated(f"card {table.device}"):
+        with translate_errors(f"card {table.device}"):
             options = self._options("")
             system = System.local() if options is None else System.remote(options)
             names = [device.name for device in system.devices]
             if table.device not in names:
-                raise CardFault(f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}")
+                raise CardFault(
+                    f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}"
+                )
             device = system.devices[table.device]
             there = {
                 "inputs": [channel.name for channel in device.ai_physical_chans],
                 "outputs": [channel.name for channel in device.ao_physical_chans],
             }
             if table.physical(table.pressure) not in [line.name for line in device.do_lines]:
-                raise CardFault(f"card.pressure: {device.product_type} has no line {table.pressure}")
+                raise CardFault(
+                    f"card.pressure: {device.product_type} has no line {table.pressure}"
+                )
             ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
             for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
                 for line in lines:
                     if table.physical(line.line) not in there[group]:
-                        raise CardFault(f"{group}.{line.name}: {device.product_type} has no line {line.line}")
-                    if line.scaling.range not in ranges[group]:
-                        known = ", ".join(f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]}))
                         raise CardFault(
-                            f"{group}.{line.name}.range = {line.scaling.range:g} V: {device.product_type} has {known} V"
+                            f"{group}.{line.name}: {device.product_type} has no line {line.line}"
+                        )
+                    if line.scaling.range not in ranges[group]:
+                        known = ", ".join(
+                            f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]})
+                        )
+                        raise CardFault(
+                            f"{group}.{line.name}.range = {line.scaling.range:g} V: "
+                            f"{device.product_type} has {known} V"
                         )
 
     def start(self) -> None:
@@ -132,14 +167,20 @@ class Card:
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         table = self._table
-        with translated(f"card {table.device}"):
-            inputs, outputs, pressure = (self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE))
+        with translate_errors(f"card {table.device}"):
+            inputs, outputs, pressure = (
+                self._task(Task, name) for name in (INPUTS, OUTPUTS, PRESSURE)
+            )
             for line in table.inputs:
                 volts = line.scaling.range
-                inputs.ai_channels.add_ai_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+                inputs.ai_channels.add_ai_voltage_chan(
+                    table.physical(line.line), min_val=-volts, max_val=volts
+                )
             for line in table.outputs:
                 volts = line.scaling.range
-                outputs.ao_channels.add_ao_voltage_chan(table.physical(line.line), min_val=-volts, max_val=volts)
+                outputs.ao_channels.add_ao_voltage_chan(
+                    table.physical(line.line), min_val=-volts, max_val=volts
+                )
             pressure.do_channels.add_do_chan(table.physical(table.pressure))
             if table.timing == "hardware":
                 inputs.timing.cfg_samp_clk_timing(
@@ -153,7 +194,10 @@ class Card:
             self._writer.auto_start = False
             for task in (outputs, pressure, inputs):
                 task.start()
-            self._stream, self._pressure = inputs.in_stream, DigitalSingleChannelWriter(pressure.out_stream)
+            self._stream, self._pressure = (
+                inputs.in_stream,
+                DigitalSingleChannelWriter(pressure.out_stream),
+            )
             self._pressure.auto_start = False
 
     def read(self) -> Measurements:
@@ -165,7 +209,7 @@ class Card:
             if self._pacer is None:
                 self._drop_what_is_old()
         except Exception as error:
-            with translated(f"card {self._table.device} gives no sample"):
+            with translate_errors(f"card {self._table.device} gives no sample"):
                 raise error
         samples = zip(self._inputs, self._volts.tolist(), strict=True)
         return Measurements(*[factor * volts + offset for (factor, offset, _), volts in samples])
@@ -184,31 +228,40 @@ class Card:
                 self._volts[:] = waiting[:, -1]
             self._count += self.missed
         elif self.late < 0.0:
-            # The card's clock is ahead of the computer's, or the first tick was late: its ticks are the measure.
+            # The card's clock is ahead of the computer's, or the first tick was late: its ticks
+            # are the measure.
             self._start, self.late = now - self._count * self._period, 0.0
         self._count += 1
 
     def write(self, commands: Commands) -> None:
-        self._asked[:] = self._in_volts(commands)
+        self._asked[:] = self._to_volts(commands)
         try:
             self._writer.write_one_sample(self._asked)
         except Exception as error:
-            with translated(f"card {self._table.device} takes no output"):
+            with translate_errors(f"card {self._table.device} takes no output"):
                 raise error
 
-    def _in_volts(self, commands: Commands) -> list[float]:
-        asked = zip(self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True)
-        return [min(max((value - offset) / factor, -reach), reach) for (factor, offset, reach), value in asked]
+    def _to_volts(self, commands: Commands) -> list[float]:
+        asked = zip(
+            self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True
+        )
+        return [
+            min(max((value - offset) / factor, -reach), reach)
+            for (factor, offset, reach), value in asked
+        ]
 
     def pressure(self, on: bool) -> None:
-        with translated(f"card {self._table.device}: pressure line {self._table.pressure}"):
+        with translate_errors(f"card {self._table.device}: pressure line {self._table.pressure}"):
             self._pressure.write_one_sample_one_line(on)
 
     def stop(self) -> None:
-        """Motor to zero, pressure off, the card's lines given back; a card that takes no output any more is reset, which sets
-        them to zero. Never raises: there is nobody left to hear it."""
+        """Motor to zero, pressure off, the card's lines given back.
+
+        A card that takes no output any more is reset, which sets them to zero. Never raises: there
+        is nobody left to hear it.
+        """
         if len(self._tasks) == 3:
-            self._asked[2] = self._in_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
+            self._asked[2] = self._to_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
             refused = False
             try:
                 self._writer.write_one_sample(self._asked)
@@ -230,7 +283,9 @@ class Card:
         from nidaqmx.system import System
 
         options = self._options("")
-        return (System.local() if options is None else System.remote(options)).devices[self._table.device]
+        return (System.local() if options is None else System.remote(options)).devices[
+            self._table.device
+        ]
 
     def _options(self, name: str) -> Any:
         if self._channel is None:
@@ -242,9 +297,16 @@ class Card:
 
     def _task(self, kind: Any, name: str) -> Any:
         try:
-            task = kind(name, grpc_options=self._options(name)) if self._channel is not None else kind(name)
+            task = (
+                kind(name, grpc_options=self._options(name))
+                if self._channel is not None
+                else kind(name)
+            )
         except Exception as error:
-            with translated(f"card {self._table.device}: {name} is in use; if by a program that died, rigtwin card release"):
+            with translate_errors(
+                f"card {self._table.device}: {name} is in use; if by a program that died, "
+                "rigtwin card release"
+            ):
                 raise error
         self._tasks.append(task)
         return task

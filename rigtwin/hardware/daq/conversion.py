@@ -1,4 +1,7 @@
-"""Values to volts and back, and the card's 16 bits in between; the same for client, twin and virtual card."""
+"""Values to volts and back, and the card's 16 bits in between.
+
+The same for client, twin and virtual card.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,10 @@ CODES = 65536
 
 
 class Conversion(NamedTuple):
-    """Scalings of several lines, each of shape (lines,): factor = sign · scale in unit/V, offset in the unit, range in V."""
+    """Scalings of several lines, each of shape (lines,).
+
+    Factor = sign · scale in unit/V, offset in the unit, range in V.
+    """
 
     factor: Array
     offset: Array
@@ -35,7 +41,9 @@ def conversion(lines: Sequence[Line]) -> Conversion:
 
 def rows(lines: Conversion) -> list[tuple[float, float, float]]:
     """Factor, offset and range of each line, as Python reads them fastest."""
-    return list(zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True))
+    return list(
+        zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True)
+    )
 
 
 @compilable
@@ -54,7 +62,7 @@ def values_of(lines: Conversion, volts: Array, out: Array) -> None:
 
 
 @compilable
-def digitised(lines: Conversion, volts: Array, out: Array) -> None:
+def digitise(lines: Conversion, volts: Array, out: Array) -> None:
     """Voltages as 16 bits hold them, both of shape (lines,)."""
     for line in range(len(out)):
         bit = 2.0 * lines.range[line] / CODES
@@ -64,4 +72,4 @@ def digitised(lines: Conversion, volts: Array, out: Array) -> None:
 
 to_volts = kernel(volts_of)
 to_values = kernel(values_of)
-to_bits = kernel(digitised)
+to_bits = kernel(digitise)

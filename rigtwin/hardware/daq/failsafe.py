@@ -8,14 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.hardware.daq.card import INPUTS, OUTPUTS, PRESSURE, CardFault, connected, translated
+from rigtwin.hardware.daq.card import (
+    INPUTS,
+    OUTPUTS,
+    PRESSURE,
+    CardFault,
+    connect,
+    translate_errors,
+)
 from rigtwin.hardware.daq.conversion import conversion, to_volts
 from rigtwin.hardware.daq.table import ChannelTable
 
 
 class LastResort:
-    """On a gRPC device server the owner's outputs are found by their name, which can be done beforehand. A driver on this
-    computer gives them back when it sees that their owner is dead; then they are taken anew."""
+    """Sets a card's outputs to their safe state in place of their owner.
+
+    On a gRPC device server they are found by their name, which can be done beforehand.
+
+    A driver on this computer gives them back when it sees that their owner is dead; then they are
+    taken anew.
+    """
 
     def __init__(self, table: ChannelTable) -> None:
         self._table, self._conversion = table, conversion(table.outputs)
@@ -25,19 +37,22 @@ class LastResort:
         self._values, self._volts = np.zeros(3), np.empty(3)
         to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
 
-        connected(table.address)  # loads the driver's client, which takes a while
+        connect(table.address)  # loads the driver's client, which takes a while
 
     def prepare(self) -> None:
         """Called once the owner has its outputs. Raises CardFault."""
         if self._table.address:
-            with translated(f"card {self._table.device}: watching it"):
+            with translate_errors(f"card {self._table.device}: watching it"):
                 self._attach()
 
     def force_off(self, positions: Sequence[float]) -> None:
-        """Motor to zero force, cylinders at positions of ground and structure, m, where they are held. Raises CardFault."""
+        """Sets the motor to zero force and holds the cylinders at positions, m.
+
+        Raises CardFault.
+        """
         self._values[:2] = positions
         to_volts(self._conversion, self._values, self._volts)
-        with translated(f"card {self._table.device}: stopping it"):
+        with translate_errors(f"card {self._table.device}: stopping it"):
             if self._outputs is None:
                 self._take()
             assert self._outputs is not None
@@ -45,7 +60,7 @@ class LastResort:
 
     def pressure_off(self) -> None:
         """Raises CardFault."""
-        with translated(f"card {self._table.device}: taking its pressure off"):
+        with translate_errors(f"card {self._table.device}: taking its pressure off"):
             if self._pressure is None:
                 self._take()
             assert self._pressure is not None
@@ -64,33 +79,40 @@ class LastResort:
         from nidaqmx import Task
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
-        channel, attach = connected(self._table.address), SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
+        channel, attach = (
+            connect(self._table.address),
+            SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
+        )
         assert channel is not None
         for name in (OUTPUTS, PRESSURE, INPUTS):
             options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
             self._tasks.append(Task(name, grpc_options=options))
-        self._writers(started=True)
+        self._open_writers(started=True)
 
     def _take(self) -> None:
         from nidaqmx import Task
 
         self.close()
-        channel = connected(self._table.address)
+        channel = connect(self._table.address)
         names = (f"{OUTPUTS}-again", f"{PRESSURE}-again")
         if channel is None:
             outputs, pressure = (Task(name) for name in names)
         else:
             from nidaqmx.grpc_session_options import GrpcSessionOptions
 
-            outputs, pressure = (Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names)
+            outputs, pressure = (
+                Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names
+            )
         self._tasks = [outputs, pressure]
         for line in self._table.outputs:
             volts = line.scaling.range
-            outputs.ao_channels.add_ao_voltage_chan(self._table.physical(line.line), min_val=-volts, max_val=volts)
+            outputs.ao_channels.add_ao_voltage_chan(
+                self._table.physical(line.line), min_val=-volts, max_val=volts
+            )
         pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
-        self._writers(started=False)
+        self._open_writers(started=False)
 
-    def _writers(self, started: bool) -> None:
+    def _open_writers(self, started: bool) -> None:
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)
@@ -100,8 +122,11 @@ class LastResort:
 
 
 def release(table: ChannelTable) -> bool:
-    """Frees what a program that died has left on a gRPC device server: motor to zero, pressure off, its tasks ended. Returns
-    whether there was anything. Raises CardFault if the outputs could not be set."""
+    """Frees what a program that died has left on a gRPC device server.
+
+    Motor to zero, pressure off, its tasks ended. Returns whether there was anything. Raises
+    CardFault if the outputs could not be set.
+    """
     resort = LastResort(table)
     try:
         resort.prepare()

@@ -1,4 +1,6 @@
-"""The channel table: which signal is on which line of the card, and what a volt means there. One TOML file a card.
+"""The channel table: which signal is on which line of the card, and what a volt means there.
+
+One TOML file a card.
 
 value = sign · scale · volts + offset, in both directions.
 """
@@ -20,10 +22,12 @@ from rigtwin.recording.channels import CHANNELS
 
 Group = TypeVar("Group")
 OUTPUTS = ("ground", "structure", "voltage")
-"""Commands that go to the card, in the order of its writes. The force demanded stays inside the controller."""
+"""Commands that go to the card, in the order of its writes. The force demanded stays inside the
+controller."""
 UNITS = {(channel.topic, channel.name): channel.unit for channel in CHANNELS}
 HEADROOM = 1.05
-"""A signal must be readable this far beyond its limit: one that stops at its limit can never be seen to exceed it."""
+"""A signal must be readable this far beyond its limit: one that stops at its limit can never be
+seen to exceed it."""
 _ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
 _DIGITAL = re.compile(r"port\d/line\d{1,2}")
 _FREE_TEXT = ("device", "address", "timing", "calibrated", "operator", "note")
@@ -40,17 +44,29 @@ class Scaling(NamedTuple):
 
 
 class Plausible(NamedTuple):
-    """What living sensors of one rig cannot do; see rigtwin.simulation.safety. stuck: same readings in a row. Greatest seen on the twin
-    in all experiments: 4 readings, 9.5 mm, 34 N."""
+    """What living sensors of one rig cannot do; see rigtwin.simulation.safety.
 
-    stuck: Annotated[float, Quantity("tick", 3.0, 1e9, "by chance in none of 1800 simulated tests of 45 s")] = 7.0
-    wheel: Annotated[float, Quantity("m", 1e-4, 1e9, "twice what the tyre gives in the experiments")] = 0.02
-    motor: Annotated[float, Quantity("N", 1.0, 1e9, "3 times friction, hum and noise in the experiments")] = 100.0
+    stuck: same readings in a row. Greatest seen on the twin in all experiments: 4 readings, 9.5
+    mm, 34 N.
+    """
+
+    stuck: Annotated[
+        float, Quantity("tick", 3.0, 1e9, "by chance in none of 1800 simulated tests of 45 s")
+    ] = 7.0
+    wheel: Annotated[
+        float, Quantity("m", 1e-4, 1e9, "twice what the tyre gives in the experiments")
+    ] = 0.02
+    motor: Annotated[
+        float, Quantity("N", 1.0, 1e9, "3 times friction, hum and noise in the experiments")
+    ] = 100.0
 
 
 class Line(NamedTuple):
-    """One signal of the rig. line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen the
-    signal move the way that it should."""
+    """One signal of the rig.
+
+    line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen
+    the signal move the way that it should.
+    """
 
     name: str
     line: str
@@ -66,9 +82,25 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """A card's channel table. inputs: in the order of Measurements; outputs: in the order of OUTPUTS; pressure: the digital
-    line that lets the hydraulics have pressure while high; address: of a gRPC device server, empty for this computer's
-    driver."""
+    """A card's channel table.
+
+    Parameters
+    ----------
+    inputs, outputs : tuple of Line
+        In the order of Measurements and of OUTPUTS.
+    pressure : str
+        The digital line that lets the hydraulics have pressure while high.
+    plausible : Plausible
+        What its sensors cannot do.
+    device : str
+        The driver's name of the card.
+    address : str
+        Of a gRPC device server, empty for this computer's driver.
+    timing : str
+        hardware or software: whose clock the inputs follow.
+    calibrated, operator, note : str
+        When, by whom, and what they say.
+    """
 
     inputs: tuple[Line, ...]
     outputs: tuple[Line, ...]
@@ -89,49 +121,88 @@ class ChannelTable:
         """The driver's name of a line."""
         return f"{self.device}/{line}"
 
-    def of(self, safety: Safety) -> Safety:
-        """The limits with what the card knows of its sensors, or those asked for, if they are closer."""
-        return safety._replace(**{name: min(value, getattr(safety, name)) for name, value in self.plausible._asdict().items()})
+    def tighten(self, safety: Safety) -> Safety:
+        """Gives the limits with what the card knows of its sensors, where that is closer."""
+        return safety._replace(
+            **{
+                name: min(value, getattr(safety, name))
+                for name, value in self.plausible._asdict().items()
+            }
+        )
 
 
 def load_table(path: Path) -> ChannelTable:
     """Reads a channel table. Raises RigtwinError naming file and fault."""
-    return read_toml(path, parsed)
+    return read_toml(path, parse_table)
 
 
-def parsed(tables: Mapping[str, Any]) -> ChannelTable:
-    """The channel table of TOML's tables. Raises RigtwinError for anything missing, unknown or twice."""
+def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
+    """Reads a channel table from TOML's tables.
+
+    Parameters
+    ----------
+    tables : mapping
+        [card], [plausible], [inputs.NAME], [outputs.NAME].
+
+    Returns
+    -------
+    ChannelTable
+        Complete.
+
+    Raises
+    ------
+    RigtwinError
+        For anything missing, unknown or twice.
+    """
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:
         if name not in known:
             raise RigtwinError(
-                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], [outputs.NAME]"
+                f"unknown table [{name}]; a channel table has [card], [plausible], [inputs.NAME], "
+                "[outputs.NAME]"
             )
     card = tables.get("card", {})
     if not isinstance(card, Mapping):
         raise RigtwinError("card: expected a table, [card]")
     for key, value in card.items():
         if key not in (*_FREE_TEXT, "pressure"):
-            raise RigtwinError(f"unknown setting card.{key}; [card] has {', '.join((*_FREE_TEXT, 'pressure'))}")
+            raise RigtwinError(
+                f"unknown setting card.{key}; [card] has {', '.join((*_FREE_TEXT, 'pressure'))}"
+            )
         if not isinstance(value, str):
             raise RigtwinError(f"card.{key} = {value!r}: expected text")
     pressure = card.get("pressure", "")
     if not _DIGITAL.fullmatch(pressure):
-        raise RigtwinError(f"card.pressure = {pressure!r}: expected the hydraulics' digital line, such as 'port0/line0'")
+        raise RigtwinError(
+            f"card.pressure = {pressure!r}: expected the hydraulics' digital line, "
+            "such as 'port0/line0'"
+        )
     timing = card.get("timing", "hardware")
     if timing not in _TIMINGS:
         raise RigtwinError(f"card.timing = {timing!r}: expected {' or '.join(_TIMINGS)}")
     if not re.fullmatch(r"[A-Za-z][\w-]*", card.get("device", "Dev1")):
-        raise RigtwinError(f"card.device = {card['device']!r}: expected the driver's name of the card, such as 'Dev1'")
+        raise RigtwinError(
+            f"card.device = {card['device']!r}: expected the driver's name of the card, "
+            "such as 'Dev1'"
+        )
     inputs = _lines("inputs", tables.get("inputs", {}), Measurements._fields, "/sensor")
     outputs = _lines("outputs", tables.get("outputs", {}), OUTPUTS, "/command")
     taken: dict[str, str] = {}
     for line in inputs + outputs:
         if line.line in taken:
-            raise RigtwinError(f"{taken[line.line]} and {line.name} are both on line {line.line}; expected a line each")
+            raise RigtwinError(
+                f"{taken[line.line]} and {line.name} are both on line {line.line}; "
+                "expected a line each"
+            )
         taken[line.line] = line.name
     texts = {key: card[key] for key in _FREE_TEXT if key in card}
-    return ChannelTable(inputs, outputs, pressure, _numbers("plausible", tables.get("plausible", {}), Plausible), **texts)
+    return ChannelTable(
+        inputs,
+        outputs,
+        pressure,
+        _numbers("plausible", tables.get("plausible", {}), Plausible),
+        **texts,
+    )
 
 
 def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
@@ -141,7 +212,9 @@ def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
     for key in table:
         if key not in meanings:
             raise RigtwinError(f"unknown setting {where}.{key}; there are {', '.join(meanings)}")
-    return kind(**{key: checked(f"{where}.{key}", value, meanings[key]) for key, value in table.items()})
+    return kind(
+        **{key: checked(f"{where}.{key}", value, meanings[key]) for key, value in table.items()}
+    )
 
 
 def _lines(group: str, tables: Any, names: tuple[str, ...], topic: str) -> tuple[Line, ...]:
@@ -152,7 +225,9 @@ def _lines(group: str, tables: Any, names: tuple[str, ...], topic: str) -> tuple
             raise RigtwinError(f"unknown signal [{group}.{name}]; there are {', '.join(names)}")
     for name in names:
         if name not in tables:
-            raise RigtwinError(f"[{group}.{name}] is missing; each of {', '.join(names)} needs its line")
+            raise RigtwinError(
+                f"[{group}.{name}] is missing; each of {', '.join(names)} needs its line"
+            )
     return tuple(_line(group, name, tables[name], UNITS[topic, name]) for name in names)
 
 
@@ -163,12 +238,19 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
     texts = ("line", "unit", "sign_checked")
     line = table.get("line")
     if not isinstance(line, str) or not _ANALOG[group].fullmatch(line):
-        raise RigtwinError(f"{where}.line = {line!r}: expected one such as {'ai0' if group == 'inputs' else 'ao0'!r}")
+        raise RigtwinError(
+            f"{where}.line = {line!r}: "
+            f"expected one such as {'ai0' if group == 'inputs' else 'ao0'!r}"
+        )
     if table.get("unit", unit) != unit:
-        raise RigtwinError(f"{where}.unit = {table['unit']!r}: expected {unit!r}; scale is {unit}/V, offset {unit}")
+        raise RigtwinError(
+            f"{where}.unit = {table['unit']!r}: expected {unit!r}; scale is {unit}/V, offset {unit}"
+        )
     if "scale" not in table:
         raise RigtwinError(f"{where}.scale is missing: expected {unit} a volt")
-    scaling = _numbers(where, {key: value for key, value in table.items() if key not in texts}, Scaling)
+    scaling = _numbers(
+        where, {key: value for key, value in table.items() if key not in texts}, Scaling
+    )
     if abs(scaling.sign) != 1.0:
         raise RigtwinError(f"{where}.sign = {scaling.sign:g}: expected 1 or -1")
     sign_checked = table.get("sign_checked", False)
@@ -177,7 +259,7 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
     return Line(name, line, unit, scaling, sign_checked)
 
 
-def fit(table: ChannelTable, safety: Safety) -> None:
+def require_ranges(table: ChannelTable, safety: Safety) -> None:
     """Raises RigtwinError unless every limit lies within what its line can carry."""
     limits = {
         "ground_lvdt": ("safety.ground", safety.ground),
@@ -191,46 +273,70 @@ def fit(table: ChannelTable, safety: Safety) -> None:
         key, limit = limits.get(line.name, ("", 0.0))
         if line.reach < HEADROOM * limit and line.name in Measurements._fields:
             raise RigtwinError(
-                f"range too small for the limit: {line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
-                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, or a smaller limit"
+                "range too small for the limit: "
+                f"{line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
+                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, "
+                "or a smaller limit"
             )
         if line.reach < limit:
             raise RigtwinError(
-                f"range too small for the limit: {line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
+                "range too small for the limit: "
+                f"{line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
                 f"{key} is {limit:g} {line.unit}"
             )
 
 
-def trusted(table: ChannelTable, today: date) -> None:
-    """Raises RigtwinError unless somebody has calibrated this table and checked every sign: needed to move a real rig."""
+def require_trust(table: ChannelTable, today: date) -> None:
+    """Raises RigtwinError unless somebody has calibrated this table and checked every sign.
+
+    Needed to move a real rig.
+    """
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
-        raise RigtwinError(f"sign not checked: {', '.join(unchecked)}; rigtwin card check moves each a little and looks")
+        raise RigtwinError(
+            f"sign not checked: {', '.join(unchecked)}; "
+            "rigtwin card check moves each a little and looks"
+        )
     try:
         calibrated = date.fromisoformat(table.calibrated)
     except ValueError:
-        raise RigtwinError(f"card.calibrated = {table.calibrated!r}: expected the date of calibration, 2026-01-31") from None
+        raise RigtwinError(
+            f"card.calibrated = {table.calibrated!r}: expected the date of calibration, 2026-01-31"
+        ) from None
     if calibrated > today:
         raise RigtwinError(f"card.calibrated = {table.calibrated}: that is after today, {today}")
     if not table.operator.strip():
         raise RigtwinError("card.operator is missing: expected who calibrated it")
 
 
-def written(table: ChannelTable) -> str:
+def to_toml(table: ChannelTable) -> str:
     """The table as TOML."""
-    lines = ["[card]", f"pressure = {_quoted(table.pressure)}"]
-    lines += [f"{key} = {_quoted(getattr(table, key))}" for key in _FREE_TEXT]
-    lines += ["", "[plausible]", *(f"{key} = {value!r}" for key, value in table.plausible._asdict().items())]
+    lines = ["[card]", f"pressure = {_quote(table.pressure)}"]
+    lines += [f"{key} = {_quote(getattr(table, key))}" for key in _FREE_TEXT]
+    lines += [
+        "",
+        "[plausible]",
+        *(f"{key} = {value!r}" for key, value in table.plausible._asdict().items()),
+    ]
     for group, signals in (("inputs", table.inputs), ("outputs", table.outputs)):
         for signal in signals:
             scaling = signal.scaling
-            lines += ["", f"[{group}.{signal.name}]", f"line = {_quoted(signal.line)}", f"unit = {_quoted(signal.unit)}"]
-            lines += [f"scale = {scaling.scale!r}", f"offset = {scaling.offset!r}", f"sign = {int(scaling.sign)}"]
+            lines += [
+                "",
+                f"[{group}.{signal.name}]",
+                f"line = {_quote(signal.line)}",
+                f"unit = {_quote(signal.unit)}",
+            ]
+            lines += [
+                f"scale = {scaling.scale!r}",
+                f"offset = {scaling.offset!r}",
+                f"sign = {int(scaling.sign)}",
+            ]
             lines += [f"range = {scaling.range!r}"]
             lines += [f"sign_checked = {str(signal.sign_checked).lower()}"]
     return "\n".join(lines) + "\n"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -1,7 +1,10 @@
-"""Carries the calls of the unmodified nidaqmx client to a virtual card: in process, or through a socket.
+"""Carries the calls of the unmodified nidaqmx client to a virtual card.
 
-nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a connection that ends in a Python
-object; `serve` listens on a port, so that any NI-DAQmx gRPC client can use the twin as its card.
+In process, or through a socket.
+
+nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a
+connection that ends in a Python object; `serve` listens on a port, so that any NI-DAQmx gRPC
+client can use the twin as its card.
 """
 
 from __future__ import annotations
@@ -9,9 +12,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NoReturn
 
 import grpc
+from google.protobuf.message import Message
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.virtual import DriverError, VirtualCard
@@ -43,15 +47,20 @@ class _Entry:
 
 
 class InProcess(grpc.Channel):
-    """A connection to a card in this process. The client's messages are handed over as they are, unserialised."""
+    """A connection to a card in this process.
+
+    The client's messages are handed over as they are, unserialised.
+    """
 
     def __init__(self, card: VirtualCard) -> None:
         self._card = card
 
-    def unary_unary(self, method: str, *_: Any, response_deserializer: Any = None, **__: Any) -> Any:  # type: ignore[override]
+    def unary_unary(
+        self, method: str, *_: Any, response_deserializer: Any = None, **__: Any
+    ) -> Any:  # type: ignore[override]
         call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
 
-        def invoke(request: Any, **_: Any) -> Any:
+        def invoke(request: Message, **_: object) -> Message:
             try:
                 return card.answer(call, request, response)
             except DriverError as error:
@@ -61,17 +70,19 @@ class InProcess(grpc.Channel):
 
         return invoke
 
-    def unary_stream(self, *_: Any, **__: Any) -> Any:
+    def unary_stream(self, *_: object, **__: object) -> Any:
         """Events are not carried; a client that asks for them is told so when it does."""
 
-        def refuse(*_: Any, **__: Any) -> Any:
+        def refuse(*_: object, **__: object) -> NoReturn:
             raise CardError(grpc.StatusCode.UNIMPLEMENTED, "the virtual card sends no events")
 
         return refuse
 
     stream_unary = stream_stream = unary_stream
 
-    def subscribe(self, callback: Callable[..., Any], try_to_connect: bool | None = False) -> None: ...
+    def subscribe(
+        self, callback: Callable[..., Any], try_to_connect: bool | None = False
+    ) -> None: ...
 
     def unsubscribe(self, callback: Callable[..., Any]) -> None: ...
 
@@ -83,7 +94,7 @@ class InProcess(grpc.Channel):
     def __exit__(self, *_: object) -> None: ...
 
 
-class _Calls(grpc.GenericRpcHandler):
+class _CallHandler(grpc.GenericRpcHandler):
     """Every call of the service, found when it is made."""
 
     def __init__(self, card: VirtualCard) -> None:
@@ -93,13 +104,17 @@ class _Calls(grpc.GenericRpcHandler):
 
         self._card, self._messages = card, grpc_types
 
-    def service(self, handler_call_details: Any) -> Any:
+    def service(
+        self, handler_call_details: grpc.HandlerCallDetails
+    ) -> grpc.RpcMethodHandler | None:
         service, _, call = handler_call_details.method.strip("/").partition("/")
-        request, response = (getattr(self._messages, call + ending, None) for ending in ("Request", "Response"))
+        request, response = (
+            getattr(self._messages, call + ending, None) for ending in ("Request", "Response")
+        )
         if service != SERVICE or request is None or response is None:
             return None
 
-        def invoke(message: Any, context: grpc.ServicerContext) -> Any:
+        def invoke(message: Message, context: grpc.ServicerContext) -> Any:
             try:
                 return self._card.answer(call, message, response)
             except DriverError as error:
@@ -109,14 +124,23 @@ class _Calls(grpc.GenericRpcHandler):
                 context.abort(grpc.StatusCode.UNIMPLEMENTED, str(error))
 
         return grpc.unary_unary_rpc_method_handler(
-            invoke, request_deserializer=request.FromString, response_serializer=response.SerializeToString
+            invoke,
+            request_deserializer=request.FromString,
+            response_serializer=response.SerializeToString,
         )
 
 
 def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
-    """Listens on this computer only; port 0 takes a free one. Returns the server and its port. Raises RigtwinError."""
+    """Listens on this computer only; port 0 takes a free one.
+
+    Returns the server and its port. Raises RigtwinError.
+    """
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
-    server = grpc.server(ThreadPoolExecutor(max_workers=8), handlers=[_Calls(card)], options=(("grpc.so_reuseport", 0),))
+    server = grpc.server(
+        ThreadPoolExecutor(max_workers=8),
+        handlers=[_CallHandler(card)],
+        options=(("grpc.so_reuseport", 0),),
+    )
     try:
         bound = server.add_insecure_port(f"{LOCAL}:{port}")
     except RuntimeError:

@@ -1,7 +1,10 @@
-"""A virtual PCI-6229: answers the NI-DAQmx calls of a client, volts in and out, with the twin at its terminals.
+"""A virtual PCI-6229.
 
-Reservations, ranges, names, the buffer of a clocked acquisition and the driver's error codes are those that NI documents, as
-far as a client such as `rigtwin.hardware.daq.card` meets them; any other call is refused by name.
+Answers the NI-DAQmx calls of a client, volts in and out, with the twin at its terminals.
+
+Reservations, ranges, names, the buffer of a clocked acquisition and the driver's error codes are
+those that NI documents, as far as a client such as `rigtwin.hardware.daq.card` meets them; any
+other call is refused by name.
 """
 
 from __future__ import annotations
@@ -9,9 +12,11 @@ from __future__ import annotations
 import re
 import threading
 from collections import deque
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
+from google.protobuf.message import Message
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable
@@ -30,6 +35,9 @@ _INITIALIZE, _ATTACH = 1, 2
 """Session initialization behaviours of NI's session service."""
 _SUPPORTED = 10_000.0
 """Hz, the fastest sample clock that the twin is worth."""
+
+Response = Callable[..., Message]
+"""Class of a call's response, made of its fields."""
 
 
 class DriverError(Exception):
@@ -54,8 +62,8 @@ class OnDemand:
 
     def begin(self) -> None: ...
 
-    def passed(self, done: int) -> int:
-        """Ticks that have passed when the next sample is asked for."""
+    def next_tick(self, done: int) -> int:
+        """The tick of the sample that is asked for next."""
         return done + 1
 
     def now(self, done: int) -> int:
@@ -74,7 +82,7 @@ class RealTime:
     def begin(self) -> None:
         self._start = monotonic()
 
-    def passed(self, done: int) -> int:
+    def next_tick(self, done: int) -> int:
         return max(self.now(done), done)
 
     def now(self, _: int) -> int:
@@ -90,14 +98,23 @@ class RealTime:
 
 class _Task:
     def __init__(self, name: str) -> None:
-        self.name, self.lines, self.clocked, self.running, self.next = name, list[str](), False, False, 0
+        self.name, self.lines, self.clocked, self.running, self.next = (
+            name,
+            list[str](),
+            False,
+            False,
+            0,
+        )
 
 
 class VirtualCard:
-    """One card. Thread-safe. `answer` takes a call's name, its request, and the class of its response.
+    """One card.
 
-    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital line. Before the first tick
-    and after `disconnect` all outputs are at zero. wiring: the card's name, and which lines the terminals' signals are on.
+    Thread-safe. `answer` takes a call's name, its request, and the class of its response.
+
+    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital
+    line. Before the first tick and after `disconnect` all outputs are at zero. wiring: the card's
+    name, and which lines the terminals' signals are on.
     """
 
     def __init__(
@@ -107,7 +124,10 @@ class VirtualCard:
         time: OnDemand | RealTime,
     ) -> None:
         self._terminals, self._time, self._device = terminals, time, wiring.device
-        self._inputs, self._outputs = [line.line for line in wiring.inputs], [line.line for line in wiring.outputs]
+        self._inputs, self._outputs = (
+            [line.line for line in wiring.inputs],
+            [line.line for line in wiring.outputs],
+        )
         self._pressure_line = wiring.pressure
         self.outputs, self.pressure, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
@@ -117,8 +137,30 @@ class VirtualCard:
         self._lock = threading.RLock()
         self._begun = False
 
-    def answer(self, call: str, request: Any, response: type) -> Any:
-        """Raises DriverError as the driver would, RigtwinError for a call that no client of this project makes."""
+    def answer(self, call: str, request: Message, response: Response) -> Message:
+        """Answers a call.
+
+        Parameters
+        ----------
+        call : str
+            Its name in NI's gRPC service.
+        request : Message
+            What it asks.
+        response : Response
+            What its answer is made with.
+
+        Returns
+        -------
+        Message
+            The answer.
+
+        Raises
+        ------
+        DriverError
+            As the driver would.
+        RigtwinError
+            For a call that no client of this project makes.
+        """
         handler = getattr(self, f"_{call}", None)
         if handler is None:
             raise RigtwinError(f"the virtual card does not know the call {call}")
@@ -127,7 +169,9 @@ class VirtualCard:
         with self._lock:
             if not self.connected:
                 raise DriverError(
-                    GONE, f"The specified device is not present or is not active in the system. Device: {self._device}"
+                    GONE,
+                    "The specified device is not present or is not active in the system. Device: "
+                    f"{self._device}",
                 )
             self._catch_up()
             return handler(request, response)
@@ -156,7 +200,7 @@ class VirtualCard:
             self._samples.append(self._terminals.volts.tolist())
         self.run_until(self._time.now(self.tick))
 
-    def _await(self, request: Any) -> None:
+    def _await(self, request: Message) -> None:
         """Outside the lock: others may write while a reader waits for its sample."""
         task = self._tasks.get(request.task.name)
         if task is not None and task.running and task.clocked and self._begun:
@@ -164,20 +208,20 @@ class VirtualCard:
 
     # The calls, by their names in the gRPC service.
 
-    def _task(self, request: Any) -> _Task:
+    def _task(self, request: Message) -> _Task:
         task = self._tasks.get(request.task.name)
         if task is None:
             raise DriverError(NO_TASK, "Task specified is invalid or does not exist.")
         return task
 
-    def _GetSystemInfoAttributeUInt32(self, request: Any, response: type) -> Any:
+    def _GetSystemInfoAttributeUInt32(self, request: Message, response: Response) -> Message:
         return response(value={0x1272: 26, 0x1923: 5}.get(request.attribute_raw, 0))
 
-    def _GetSystemInfoAttributeString(self, _: Any, response: type) -> Any:
+    def _GetSystemInfoAttributeString(self, _: Message, response: Response) -> Message:
         return response(value=self._device)
 
-    def _GetDeviceAttributeString(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+    def _GetDeviceAttributeString(self, request: Message, response: Response) -> Message:
+        self._require_device(request.device_name)
         lists = {
             0x231E: [f"ai{n}" for n in range(32)],
             0x231F: [f"ao{n}" for n in range(4)],
@@ -185,33 +229,37 @@ class VirtualCard:
         }
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
-        return response(value=", ".join(f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])))
+        return response(
+            value=", ".join(
+                f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])
+            )
+        )
 
-    def _GetDeviceAttributeBool(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+    def _GetDeviceAttributeBool(self, request: Message, response: Response) -> Message:
+        self._require_device(request.device_name)
         return response(value=True)
 
-    def _GetDeviceAttributeDouble(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+    def _GetDeviceAttributeDouble(self, request: Message, response: Response) -> Message:
+        self._require_device(request.device_name)
         return response(value=_SUPPORTED)
 
-    def _GetDeviceAttributeDoubleArray(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+    def _GetDeviceAttributeDoubleArray(self, request: Message, response: Response) -> Message:
+        self._require_device(request.device_name)
         ranges = INPUT_RANGES if request.attribute_raw == 0x2990 else (10.0,)
         return response(value=[edge for volts in ranges for edge in (-volts, volts)])
 
-    def _known_device(self, name: str) -> None:
+    def _require_device(self, name: str) -> None:
         if name != self._device:
             raise DriverError(NO_DEVICE, f"Device identifier is invalid. Device specified: {name}")
 
-    def _ResetDevice(self, request: Any, response: type) -> Any:
-        self._known_device(request.device_name)
+    def _ResetDevice(self, request: Message, response: Response) -> Message:
+        self._require_device(request.device_name)
         self._tasks.clear()
         self.outputs[:] = 0.0
         self.pressure = False
         return response()
 
-    def _CreateTask(self, request: Any, response: type) -> Any:
+    def _CreateTask(self, request: Message, response: Response) -> Message:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"
         new = name not in self._tasks
         if new and request.initialization_behavior == _ATTACH:
@@ -224,69 +272,79 @@ class VirtualCard:
         made.task.name = name
         return made
 
-    def _GetTaskAttributeString(self, request: Any, response: type) -> Any:
+    def _GetTaskAttributeString(self, request: Message, response: Response) -> Message:
         return response(value=self._task(request).name)
 
-    def _add(self, request: Any, text: str, kind: str, count: int) -> _Task:
+    def _add(self, request: Message, text: str, kind: str, count: int) -> _Task:
         task = self._task(request)
         for line in text.split(","):
             device, _, name = line.strip().partition("/")
-            self._known_device(device)
+            self._require_device(device)
             number = re.fullmatch(rf"{kind}(\d+)", name)
             if number is None or int(number[1]) >= count:
                 raise DriverError(
-                    NO_CHANNEL, f"Physical channel specified does not exist on this device. Channel: {line.strip()}"
+                    NO_CHANNEL,
+                    "Physical channel specified does not exist on this device. Channel: "
+                    f"{line.strip()}",
                 )
             task.lines.append(name)
         return task
 
-    def _voltage(self, request: Any, allowed: tuple[float, ...]) -> None:
+    def _voltage(self, request: Message, allowed: tuple[float, ...]) -> None:
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
             raise DriverError(
-                BAD_VALUE, f"Requested value is not a supported value for this property. Maximum value: {max(allowed)}"
+                BAD_VALUE,
+                "Requested value is not a supported value for this property. Maximum value: "
+                f"{max(allowed)}",
             )
 
-    def _CreateAIVoltageChan(self, request: Any, response: type) -> Any:
+    def _CreateAIVoltageChan(self, request: Message, response: Response) -> Message:
         self._voltage(request, INPUT_RANGES)
         self._add(request, request.physical_channel, "ai", 32)
         return response()
 
-    def _CreateAOVoltageChan(self, request: Any, response: type) -> Any:
+    def _CreateAOVoltageChan(self, request: Message, response: Response) -> Message:
         self._voltage(request, (10.0,))
         self._add(request, request.physical_channel, "ao", 4)
         return response()
 
-    def _CreateDOChan(self, request: Any, response: type) -> Any:
+    def _CreateDOChan(self, request: Message, response: Response) -> Message:
         self._add(request, request.lines, "port0/line", 32)
         return response()
 
-    def _CfgSampClkTiming(self, request: Any, response: type) -> Any:
+    def _CfgSampClkTiming(self, request: Message, response: Response) -> Message:
         if not 0.0 < request.rate <= _SUPPORTED:
-            raise DriverError(BAD_VALUE, f"Requested value is not a supported value for this property. Rate: {request.rate}")
+            raise DriverError(
+                BAD_VALUE,
+                f"Requested value is not a supported value for this property. Rate: {request.rate}",
+            )
         self._task(request).clocked = True
         return response()
 
-    def _StartTask(self, request: Any, response: type) -> Any:
+    def _StartTask(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         for other in self._tasks.values():
             both = set(other.lines) & set(task.lines)
             if other is not task and other.running and both:
-                raise DriverError(RESERVED, f"The specified resource is reserved. Task {other.name}, channel {min(both)}")
+                raise DriverError(
+                    RESERVED,
+                    f"The specified resource is reserved. Task {other.name}, channel {min(both)}",
+                )
         task.running, task.next = True, self.tick
         return response()
 
-    def _StopTask(self, request: Any, response: type) -> Any:
+    def _StopTask(self, request: Message, response: Response) -> Message:
         self._task(request).running = False
         return response()
 
-    def _ClearTask(self, request: Any, response: type) -> Any:
+    def _ClearTask(self, request: Message, response: Response) -> Message:
         self._tasks.pop(request.task.name, None)
         return response()
 
-    def _GetReadAttributeUInt32(self, request: Any, response: type) -> Any:
+    def _GetReadAttributeUInt32(self, request: Message, response: Response) -> Message:
         return response(value=max(self._time.now(self.tick) - self._task(request).next + 1, 0))
 
-    def _ReadAnalogF64(self, request: Any, response: type) -> Any:
+    def _ReadAnalogF64(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         if not task.running:
             task.running, task.next = True, self.tick
@@ -296,33 +354,41 @@ class VirtualCard:
                 self.run_until(task.next + count - 1)
             behind = self.tick - task.next
             if behind >= len(self._samples):
-                raise DriverError(OVERWRITTEN, "Attempted to read samples that are no longer available.")
+                raise DriverError(
+                    OVERWRITTEN, "Attempted to read samples that are no longer available."
+                )
             task.next += count
         else:
             if task.next > 0:
-                self.run_until(self._time.passed(self.tick))
+                self.run_until(self._time.next_tick(self.tick))
             task.next, behind, count = 1, 0, 1
         samples = [self._samples[-1 - behind + number] for number in range(count)]
         places = [self._inputs.index(line) if line in self._inputs else -1 for line in task.lines]
         values = [sample[place] if place >= 0 else 0.0 for place in places for sample in samples]
         return response(read_array=values, samps_per_chan_read=count)
 
-    def _WriteAnalogF64(self, request: Any, response: type) -> Any:
+    def _WriteAnalogF64(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         if len(request.write_array) != len(task.lines):
-            raise DriverError(BAD_VALUE, f"{len(request.write_array)} values written to {len(task.lines)} channels")
+            raise DriverError(
+                BAD_VALUE,
+                f"{len(request.write_array)} values written to {len(task.lines)} channels",
+            )
         for line, volts in zip(task.lines, request.write_array, strict=True):
             if not abs(volts) <= 10.0:
-                raise DriverError(BAD_VALUE, f"Requested value is not a supported value for this property. Value: {volts} V")
+                raise DriverError(
+                    BAD_VALUE,
+                    f"Requested value is not a supported value for this property. Value: {volts} V",
+                )
             self.outputs[int(line[2:])] = volts
         return response(samps_per_chan_written=1)
 
-    def _WriteDigitalLines(self, request: Any, response: type) -> Any:
+    def _WriteDigitalLines(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         for line, level in zip(task.lines, request.write_array, strict=False):
             if line == self._pressure_line:
                 self.pressure = bool(level)
         return response(samps_per_chan_written=1)
 
-    def _GetErrorString(self, _: Any, response: type) -> Any:
+    def _GetErrorString(self, _: Message, response: Response) -> Message:
         return response(error_string="")

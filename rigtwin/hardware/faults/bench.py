@@ -1,4 +1,4 @@
-"""The twin at the card's terminals with a fault in cable or actuator, and a log of what was put out and what truly moved."""
+"""The twin at the card's terminals with a fault in cable or actuator, and a log of its motion."""
 
 from __future__ import annotations
 
@@ -12,19 +12,55 @@ from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.numerics.arrays import Array
 
 SEEN_LVDT, SEEN_FORCE = 0.03, 150.0
-"""m and N by which a reading must be wrong before a fault counts as one: three times what noise, tyre and friction explain."""
+"""m and N by which a reading must be wrong before a fault counts as one: three times what noise,
+tyre and friction explain."""
 SEEN_CYLINDER = 0.06
-"""m by which a cylinder must be off its command: what a fast test asks of a good one is two thirds of it."""
+"""m by which a cylinder must be off its command: what a fast test asks of a good one is two thirds
+of it."""
 
 
 class FaultyBench:
-    """A `Wired` rig. kind: a name of KINDS, or empty; at: tick from which it holds; place: input or output that has it.
+    """A `Wired` rig with a fault.
 
-    shown: first tick at which the fault is there to be seen, or −1. volts: at the inputs, shape (4,).
+    Parameters
+    ----------
+    terminals : Terminals
+        The healthy rig.
+    table : ChannelTable
+        By which volts are read.
+    kind : str
+        A name of KINDS, or empty.
+    at : int
+        Tick from which the fault holds.
+    place : int
+        Input or output that has it.
+    seed : int
+        Of the fault's own chance.
+    ticks : int
+        How many are logged.
+
+    Attributes
+    ----------
+    tick : int
+        Periods that have passed.
+    shown : int
+        First tick at which the fault is there to be seen, or −1.
+    volts : Array
+        At the inputs, shape (4,).
+    written, pressure, truth : Array
+        The log: volts of shape (ticks, 3), whether there was pressure, and true measurements of
+        shape (ticks, 4).
     """
 
     def __init__(
-        self, terminals: Terminals, table: ChannelTable, kind: str, at: int, place: int, seed: int, ticks: int
+        self,
+        terminals: Terminals,
+        table: ChannelTable,
+        kind: str,
+        at: int,
+        place: int,
+        seed: int,
+        ticks: int,
     ) -> None:
         self._terminals, self._kind, self._at, self._place = terminals, kind, at, place
         self._random = np.random.default_rng(seed)
@@ -34,10 +70,12 @@ class FaultyBench:
         self._held: float | None = None
         self._direction = float(self._random.choice([-1.0, 1.0]))
         self.tick, self.shown = 0, -1
-        self.written, self.pressure, self.truth = np.zeros((ticks, 3)), np.zeros(ticks, bool), np.zeros((ticks, 4))
+        self.written, self.pressure = np.zeros((ticks, 3)), np.zeros(ticks, bool)
+        self.truth = np.zeros((ticks, 4))
         self._read, self._true = np.empty(4), np.empty(4)
 
     def advance(self, written: Array, pressure: bool) -> None:
+        """Advances by one period under the outputs' volts, shape (3,)."""
         if self.tick < len(self.written):
             self.written[self.tick], self.pressure[self.tick] = written, pressure
         acting = written.copy()
@@ -91,22 +129,30 @@ class FaultyBench:
             volts[place] = self._random.uniform(-span, span)
         to_values(self._inputs, volts, self._read)
         to_values(self._inputs, self._terminals.volts, self._true)
-        self._show(not abs(self._read[place] - self._true[place]) <= (SEEN_FORCE if place == 3 else SEEN_LVDT))
+        self._show(
+            not abs(self._read[place] - self._true[place])
+            <= (SEEN_FORCE if place == 3 else SEEN_LVDT)
+        )
 
     def _show(self, there: bool) -> None:
         if there and self.shown < 0:
             self.shown = self.tick
 
-    def safe_from(self) -> int:
-        """First tick from which the motor's output is zero for good and the cylinders' are held or without pressure."""
+    def find_safe_tick(self) -> int:
+        """Finds the first tick from which the outputs are safe.
+
+        The motor's is zero for good, the cylinders' are held or without pressure.
+        """
         last = min(self.tick, len(self.written))
         motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
-        moving = np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
+        moving = (
+            np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
+        )
         changes = np.flatnonzero(moving) + 1
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 
-    def exceeded(self, limits: Safety, since: int) -> float:
-        """Greatest true magnitude of position, travel or force from a tick on, in its limit."""
+    def peak_share(self, limits: Safety, since: int) -> float:
+        """Finds the greatest true position, travel or force from a tick on, in its limit."""
         last = min(self.tick, len(self.truth))
         bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])
         return float(np.max(np.abs(self.truth[since:last]) / bounds)) if last > since else 0.0

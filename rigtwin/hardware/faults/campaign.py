@@ -1,4 +1,4 @@
-"""Many sessions on the virtual card, each with one fault at a random time, and what became of each."""
+"""Many sessions on the virtual card, each with one fault at a random time, and their results."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from google.protobuf.message import Message
 
-from controllers import Commands
+from controllers import Commands, Controller, Demand, Measurements, State
 from controllers import update as healthy
 from rigtwin.description.configuration import overridden
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import InProcess
-from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, VirtualCard
+from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, Response, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
-from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, Kind
+from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
 from rigtwin.hardware.session.record import Test, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.supervised import ARMED, LOOKING, SETTLING
+from rigtwin.hardware.supervision import ARMED, LOOKING, SETTLING, Update
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
+from rigtwin.simulation.experiment import Experiment
 
 EXPERIMENTS = ("drop", "road1.6", "semi-active", "imposed", "imposed-fast")
 """Model in the loop and imposed tests alike."""
@@ -44,9 +45,23 @@ SLOW = 5
 
 @dataclass(frozen=True)
 class Fault:
-    """What is put into one session. at: tick of the card; place: input or output that has it."""
+    """What is put into one session.
 
-    kind: Kind
+    Parameters
+    ----------
+    kind : FaultKind
+        What breaks.
+    experiment : str
+        Name of the test.
+    at : int
+        Tick of the card from which it is there.
+    place : int
+        Input or output that has it.
+    seed : int
+        Of the demands, the sensors' noise and the fault's own chance.
+    """
+
+    kind: FaultKind
     experiment: str
     at: int
     place: int
@@ -54,10 +69,27 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of it. late: ticks from when the fault could be seen to safe outputs, None if it never could and the test was
-    completed; from_start: ticks from the fault to safe outputs; exceeded: greatest true position, travel or force in its
-    limit; cause, reason: as the recording says; right: whether they name the fault; readable: recording to its last tick."""
+class FaultResult:
+    """What became of a session with a fault.
+
+    Parameters
+    ----------
+    fault : Fault
+        What was put into it.
+    late : int or None
+        Ticks from when the fault could be seen to safe outputs; None if it never could and the
+        test was completed.
+    from_start : int
+        Ticks from the fault to safe outputs.
+    exceeded : float
+        Greatest true position, travel or force, as a share of its limit.
+    cause, reason : str
+        As the recording says.
+    right : bool
+        Whether they name the fault.
+    readable : bool
+        Whether the recording can be read to its last tick.
+    """
 
     fault: Fault
     late: int | None
@@ -69,13 +101,29 @@ class Outcome:
     readable: bool
 
     @property
-    def passed(self) -> bool:
+    def ok(self) -> bool:
         """Whether the session was stopped as it must be."""
-        return (self.late is None or self.late <= 5) and self.exceeded <= 1.1 and self.right and self.readable
+        in_time = self.late is None or self.late <= 5
+        return in_time and self.exceeded <= 1.1 and self.right and self.readable
 
 
-def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
-    """So many faults, the kinds in turn, everything else at random."""
+def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> list[Fault]:
+    """Draws faults: the kinds in turn, everything else at random.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    seed : int
+        Same seed, same faults.
+    kinds : sequence of FaultKind
+        From which they are taken.
+
+    Returns
+    -------
+    list of Fault
+        In the order of the kinds.
+    """
     random = np.random.default_rng(seed)
     moving, ending = 1000.0 * (LOOKING + ARMED), BEFORE + 1000.0 * DURATION
     faults = []
@@ -83,7 +131,8 @@ def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
         kind = kinds[number % len(kinds)]
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]
-        first = BEFORE if kind.place in ("controller", "loop") or kind.name == "controller hangs" else moving
+        of_controller = kind.place in ("controller", "loop") or kind.name == "controller hangs"
+        first = BEFORE if of_controller else moving
         # A process on a slowed card takes its time: its faults come in the ramp or soon after.
         last = min(ending, BEFORE + SOON) if kind.place == "process" else ending
         at = int(random.uniform(first + 20.0, last - 50.0))
@@ -91,18 +140,31 @@ def drawn(count: int, seed: int, kinds: Sequence[Kind] = KINDS) -> list[Fault]:
     return faults
 
 
-def test_of(fault: Fault, table: ChannelTable) -> Test:
-    """The session that is to have a fault."""
-    from experiments import find
+def plan_test(fault: Fault, experiment: Experiment, table: ChannelTable) -> Test:
+    """Gives the session that is to have a fault.
 
-    experiment = find(fault.experiment)
+    Parameters
+    ----------
+    fault : Fault
+        Its seed is the session's.
+    experiment : Experiment
+        The one that the fault names.
+    table : ChannelTable
+        Of the virtual card.
+
+    Returns
+    -------
+    Test
+        The experiment cut to DURATION and RAMP.
+    """
     changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
     configuration = overridden(experiment.configuration, changes)
-    return Test(fault.experiment, configuration, experiment.demands(configuration, fault.seed), fault.seed, table)
+    demands = experiment.demands(configuration, fault.seed)
+    return Test(fault.experiment, configuration, demands, fault.seed, table)
 
 
-def whole(test: Test) -> int:
-    """Ticks that a session may take, and some more."""
+def count_card_ticks(test: Test) -> int:
+    """Counts the ticks that a session may take, and some more."""
     return len(test.demands) + 4000
 
 
@@ -111,7 +173,7 @@ class _GlitchingCard(VirtualCard):
 
     glitch: tuple[str, int] = ("", 0)
 
-    def answer(self, call: str, request: Any, response: type) -> Any:
+    def answer(self, call: str, request: Message, response: Response) -> Message:
         kind, at = self.glitch
         if kind and self.tick >= at:
             if kind == "card disconnected":
@@ -122,42 +184,81 @@ class _GlitchingCard(VirtualCard):
         return super().answer(call, request, response)
 
 
-def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
-    """One fault in this process. Raises RigtwinError only if the session could not even begin."""
-    test = test_of(fault, table)
+def try_fault(
+    fault: Fault, experiment: Experiment, table: ChannelTable, folder: Path
+) -> FaultResult:
+    """Runs a session with one fault in this process.
+
+    Parameters
+    ----------
+    fault : Fault
+        Of any place but a process.
+    experiment : Experiment
+        The one that the fault names.
+    table : ChannelTable
+        Of the virtual card.
+    folder : Path
+        Where the recording goes.
+
+    Returns
+    -------
+    FaultResult
+        What became of it.
+
+    Raises
+    ------
+    RigtwinError
+        Only if the session could not even begin.
+    """
+    test = plan_test(fault, experiment, table)
     period, name = test.configuration.timing.period, fault.kind.name
-    bench = FaultyBench(test.terminals(), table, name, fault.at, fault.place, fault.seed, whole(test))
+    bench = FaultyBench(
+        test.terminals(),
+        table,
+        kind=name,
+        at=fault.at,
+        place=fault.place,
+        seed=fault.seed,
+        ticks=count_card_ticks(test),
+    )
     virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
-    with _full_disk(path) as fill, stop_requests(stop_file) as asked:
+    with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
 
         def stop() -> str | None:
             if virtual.tick >= fault.at:
                 if name == "operator's signal" and virtual.tick == fault.at:
-                    os.kill(os.getpid(), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[fault.seed % 3])
+                    signals = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+                    os.kill(os.getpid(), signals[fault.seed % len(signals)])
                 elif name == "operator's file":
                     stop_file.touch()
                 elif name == "full disk":
                     fill()
-            return asked()
+            return find_request()
 
-        def flushed(_: int) -> None:
+        def show_full_disk(_: int) -> None:
             if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
                 bench.shown = virtual.tick
 
-        updating = _failing(fault, virtual) if fault.kind.place in ("controller", "loop") else healthy
-        record_at_leisure(card, test, path, stop, flushed, updating)
+        fails = fault.kind.place in ("controller", "loop")
+        updating = _make_failing_update(fault, virtual) if fails else healthy
+        record_at_leisure(card, test, path, stop, show_full_disk, updating)
     stop_file.unlink(missing_ok=True)
-    return judged(fault, test, bench, path)
+    return judge(fault, test, bench, path)
 
 
-def _failing(fault: Fault, card: VirtualCard) -> Any:
-    """A controller, or the loop around it, that fails in its time; before the test it is the first tick that fails."""
+def _make_failing_update(fault: Fault, card: VirtualCard) -> Update:
+    """Makes a controller, or the loop around it, fail in its time.
 
-    def update(controlling: Any, state: Any, measured: Any, demand: Any) -> tuple[Any, Commands]:
+    Before the test at its first tick.
+    """
+
+    def update(
+        controlling: Controller, state: State, measured: Measurements, demand: Demand
+    ) -> tuple[State, Commands]:
         state, commands = healthy(controlling, state, measured, demand)
         if card.tick < fault.at:
             return state, commands
@@ -166,8 +267,9 @@ def _failing(fault: Fault, card: VirtualCard) -> Any:
         if fault.kind.name == "command not a number":
             return state, commands._replace(**{("structure", "voltage")[fault.place]: float("nan")})
         if fault.kind.name == "command jumps":
-            step = {"structure": commands.structure + 0.05} if fault.place == 0 else {"voltage": commands.voltage - 11.0}
-            return state, commands._replace(**step)
+            if fault.place == 0:
+                return state, commands._replace(structure=commands.structure + 0.05)
+            return state, commands._replace(voltage=commands.voltage - 11.0)
         card.run_until(card.tick + SLOW)
         return state, commands
 
@@ -188,28 +290,60 @@ def _full_disk(path: Path) -> Iterator[Callable[[], None]]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def judged(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> Outcome:
-    """What the log of the terminals and the recording say."""
-    ended = last_words(path)
-    cause, reason = ended
-    safe = bench.safe_from()
+def judge(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:
+    """Judges a session by the log of its terminals and by its recording.
+
+    Parameters
+    ----------
+    fault : Fault
+        What was put into it.
+    test : Test
+        What was run.
+    bench : FaultyBench
+        The terminals.
+    path : Path
+        The recording.
+
+    Returns
+    -------
+    FaultResult
+        Its numbers in ticks of the card.
+    """
+    cause, reason = last_words(path)
+    safe = bench.find_safe_tick()
     harmless = cause == "completed"
     shown = fault.at if fault.kind.everywhere else bench.shown
     late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
-    named = fault.kind.place != "sensor" or cause not in ("jump", "stuck", "not_a_number") or SIGNALS[fault.place] in reason
+    named = (
+        fault.kind.place != "sensor"
+        or cause not in ("jump", "stuck", "not_a_number")
+        or SIGNALS[fault.place] in reason
+    )
     right = named and (cause in fault.kind.causes or (harmless and shown < 0))
-    exceeded = bench.exceeded(test.limited.safety, fault.at)
-    return Outcome(fault, late, safe - fault.at, exceeded, cause, reason, right, readable(path))
+    exceeded = bench.peak_share(test.card_configuration.safety, fault.at)
+    return FaultResult(
+        fault,
+        late=late,
+        from_start=safe - fault.at,
+        exceeded=exceeded,
+        cause=cause,
+        reason=reason,
+        right=right,
+        readable=is_readable(path),
+    )
 
 
 def last_words(path: Path) -> tuple[str, str]:
-    """Cause and reason of a recording's last transition."""
+    """Reads cause and reason of a recording's last transition, empty where it has none."""
     found = transitions(path)
     return (found[-1]["cause"], found[-1]["reason"]) if found else ("", "")
 
 
-def readable(path: Path) -> bool:
-    """Whether a recording can be read as far as it goes; one that ended before the test began has nothing but its states."""
+def is_readable(path: Path) -> bool:
+    """Says whether a recording can be read as far as it goes.
+
+    One that ended before the test began has nothing but its states.
+    """
     try:
         recording = load(path)
     except RigtwinError as error:

@@ -5,13 +5,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SIGNALS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
-_IMPLAUSIBLE = ("jump", "wheel", "motor", "following", "structure", "travel", "ground", "force", "velocity")
+_IMPLAUSIBLE = (
+    "jump",
+    "wheel",
+    "motor",
+    "following",
+    "structure",
+    "travel",
+    "ground",
+    "force",
+    "velocity",
+)
 
 
 @dataclass(frozen=True)
-class Kind:
-    """One kind of fault. place: sensor, actuator, controller, loop, card, recording, operator or process; causes: names of the
-    causes that are right; everywhere: whether it shows at once, whatever the rig does."""
+class FaultKind:
+    """One kind of fault.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    place : str
+        Sensor, actuator, controller, loop, card, recording, operator or process.
+    meaning : str
+        What breaks, in words.
+    causes : tuple of str
+        Names of the supervisor's causes that are right.
+    everywhere : bool
+        Whether it shows at once, whatever the rig does.
+    """
 
     name: str
     place: str
@@ -21,34 +44,61 @@ class Kind:
 
 
 KINDS = (
-    Kind("dropout", "sensor", "reads 0 V from then on", ("stuck", *_IMPLAUSIBLE), everywhere=False),
-    Kind("stuck", "sensor", "repeats its last reading", ("stuck",), everywhere=False),
-    Kind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump",)),
-    Kind("not a number", "sensor", "the driver gives NaN", ("not_a_number",)),
-    Kind("wrong sign", "sensor", "cable turned round", ("jump", "wheel", "motor", "following"), everywhere=False),
-    Kind("gain x10", "sensor", "reads ten times as much", _IMPLAUSIBLE, everywhere=False),
-    Kind("step", "sensor", "reads 20 % of its range too much", ("jump",)),
-    Kind("open input", "sensor", "reads anything within its range", ("jump",)),
-    Kind("amplifier dead", "actuator", "the motor makes no force", ("motor", "following"), everywhere=False),
-    Kind("valve stuck", "actuator", "a cylinder stays where it is", ("following", "wheel"), everywhere=False),
-    Kind(
+    FaultKind(
+        "dropout", "sensor", "reads 0 V from then on", ("stuck", *_IMPLAUSIBLE), everywhere=False
+    ),
+    FaultKind("stuck", "sensor", "repeats its last reading", ("stuck",), everywhere=False),
+    FaultKind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump",)),
+    FaultKind("not a number", "sensor", "the driver gives NaN", ("not_a_number",)),
+    FaultKind(
+        "wrong sign",
+        "sensor",
+        "cable turned round",
+        ("jump", "wheel", "motor", "following"),
+        everywhere=False,
+    ),
+    FaultKind("gain x10", "sensor", "reads ten times as much", _IMPLAUSIBLE, everywhere=False),
+    FaultKind("step", "sensor", "reads 20 % of its range too much", ("jump",)),
+    FaultKind("open input", "sensor", "reads anything within its range", ("jump",)),
+    FaultKind(
+        "amplifier dead",
+        "actuator",
+        "the motor makes no force",
+        ("motor", "following"),
+        everywhere=False,
+    ),
+    FaultKind(
+        "valve stuck",
+        "actuator",
+        "a cylinder stays where it is",
+        ("following", "wheel"),
+        everywhere=False,
+    ),
+    FaultKind(
         "valve open",
         "actuator",
         "a cylinder runs away",
         ("following", "structure", "ground", "travel", "wheel"),
         everywhere=False,
     ),
-    Kind("controller exception", "controller", "it raises an exception", ("controller",)),
-    Kind("command not a number", "controller", "it commands NaN", ("not_a_number",)),
-    Kind("command jumps", "controller", "it commands a step", ("command_rate", "command")),
-    Kind("slow tick", "loop", "a tick takes 4 periods", ("late",)),
-    Kind("output refused", "card", "a write fails once", ("card",)),
-    Kind("card disconnected", "card", "its cable is pulled", ("card",)),
-    Kind("full disk", "recording", "no more can be written; seen at the next block", ("recording",), everywhere=False),
-    Kind("operator's signal", "operator", "SIGINT, SIGTERM or SIGHUP", ("operator",)),
-    Kind("operator's file", "operator", "the stop file appears", ("operator",)),
-    Kind("process killed", "process", "kill -9", ("process",)),
-    Kind("process frozen", "process", "SIGSTOP", ("process",)),
-    Kind("controller hangs", "process", "a tick never ends", ("process",)),
+    FaultKind("controller exception", "controller", "it raises an exception", ("controller",)),
+    FaultKind("command not a number", "controller", "it commands NaN", ("not_a_number",)),
+    FaultKind("command jumps", "controller", "it commands a step", ("command_rate", "command")),
+    FaultKind("slow tick", "loop", "a tick takes 4 periods", ("late",)),
+    FaultKind("output refused", "card", "a write fails once", ("card",)),
+    FaultKind("card disconnected", "card", "its cable is pulled", ("card",)),
+    FaultKind(
+        "full disk",
+        "recording",
+        "no more can be written; seen at the next block",
+        ("recording",),
+        everywhere=False,
+    ),
+    FaultKind("operator's signal", "operator", "SIGINT, SIGTERM or SIGHUP", ("operator",)),
+    FaultKind("operator's file", "operator", "the stop file appears", ("operator",)),
+    FaultKind("process killed", "process", "kill -9", ("process",)),
+    FaultKind("process frozen", "process", "SIGSTOP", ("process",)),
+    FaultKind("controller hangs", "process", "a tick never ends", ("process",)),
 )
-"""All of them. Those of a process need two processes and a card between them; the others run in one."""
+"""All of them. Those of a process need two processes and a card between them; the others run in
+one."""

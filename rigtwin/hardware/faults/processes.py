@@ -1,5 +1,7 @@
-"""Faults of the whole controller process: killed, frozen, hanging. The card is behind a socket, its clock runs, and a guardian
-watches; only its word counts."""
+"""Faults of the whole controller process: killed, frozen, hanging.
+
+The card is behind a socket, its clock runs, and a guardian watches; only its word counts.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +9,17 @@ import multiprocessing
 import os
 import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from multiprocessing.process import BaseProcess
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
-from typing import Any
 
+from controllers import Commands, Controller, Demand, Measurements, State
 from controllers import update as healthy
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.card import Card, connected
+from rigtwin.hardware.daq.card import Card, connect
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import LOCAL, serve
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
@@ -22,44 +27,76 @@ from rigtwin.hardware.faults.bench import FaultyBench
 from rigtwin.hardware.faults.campaign import (
     BEFORE,
     Fault,
-    Outcome,
-    judged,
+    FaultResult,
+    count_card_ticks,
+    judge,
     last_words,
-    test_of,
-    whole,
+    plan_test,
 )
 from rigtwin.hardware.realtime import in_real_time, monotonic
 from rigtwin.hardware.session.guardian import Guardian
-from rigtwin.hardware.session.record import Test, watched
-from rigtwin.hardware.supervised import supervise
+from rigtwin.hardware.session.record import Test, guardian_settings
+from rigtwin.hardware.supervision import supervise
+from rigtwin.simulation.experiment import Experiment
 
 DILATION = 8.0
-"""By how much the card's clock is slowed: a call through a socket takes most of a millisecond, a tick needs three, and this
-computer may be doing other things. Ticks are counted, not seconds."""
+"""By how much the card's clock is slowed: a call through a socket takes most of a millisecond, a
+tick needs three, and this computer may be doing other things. Ticks are counted, not seconds."""
 TIMES = 6
 COMING = 60.0
 """s within which the controller process must have reached its fault."""
 
 
 class Stray(RigtwinError):
-    """The guardian stopped the rig before the fault came: this computer kept the loop waiting for longer than it may wait."""
+    """The guardian stopped the rig before the fault came: this computer kept the loop waiting."""
 
     def __init__(self) -> None:
-        super().__init__("this computer is too busy: the loop was kept waiting and the rig stopped before its fault came")
+        super().__init__(
+            "this computer is too busy: "
+            "the loop was kept waiting and the rig stopped before its fault came"
+        )
 
 
-def tried(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
-    """One such fault. A session that a busy computer has cut short is begun anew, a few times. Raises RigtwinError."""
+def try_process_fault(
+    fault: Fault, experiment: Experiment, table: ChannelTable, folder: Path
+) -> FaultResult:
+    """Runs a session whose controller process has a fault.
+
+    A session that a busy computer has cut short is begun anew, a few times.
+
+    Parameters
+    ----------
+    fault : Fault
+        Of a process.
+    experiment : Experiment
+        The one that the fault names.
+    table : ChannelTable
+        Of the virtual card.
+    folder : Path
+        Where the recording goes.
+
+    Returns
+    -------
+    FaultResult
+        What became of it.
+
+    Raises
+    ------
+    RigtwinError
+        If the fault could not be put into any of the sessions.
+    """
+    test = plan_test(fault, experiment, table)
     for _ in range(TIMES):
         with suppress(Stray):
-            return _once(fault, table, folder)
+            return _try_once(fault, test, folder)
     raise Stray
 
 
-def _once(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
-    test = test_of(fault, table)
-    period = test.configuration.timing.period
-    bench = FaultyBench(test.terminals(), table, "", whole(test), 0, fault.seed, whole(test))
+def _try_once(fault: Fault, test: Test, folder: Path) -> FaultResult:
+    table, period, ticks = test.table, test.configuration.timing.period, count_card_ticks(test)
+    bench = FaultyBench(
+        test.terminals(), table, kind="", at=ticks, place=0, seed=fault.seed, ticks=ticks
+    )
     clock = RealTime(DILATION * period)
     virtual = VirtualCard(bench, table, clock)
     server, port = serve(virtual, 0)
@@ -71,32 +108,44 @@ def _once(fault: Fault, table: ChannelTable, folder: Path) -> Outcome:
     controller = context.Process(target=_control, args=arguments, name="rigtwin controller")
     try:
         controller.start()
-        at = clock.tick_at(_struck(controller, virtual, fault, hung))
-        _until(lambda: not virtual.pressure, "the pressure to be taken off")
-        _until(lambda: _ended(path), "the recording to be ended")
+        at = clock.tick_at(_strike(controller, virtual, fault, hung))
+        _wait_until(lambda: not virtual.pressure, "the pressure to be taken off")
+        _wait_until(lambda: _has_ended(path), "the recording to be ended")
         virtual.run_until(virtual.tick + 1)
     finally:
         controller.kill()
         controller.join()
         server.stop(0.0).wait()
-    return judged(replace(fault, at=at), test, bench, path)
+    return judge(replace(fault, at=at), test, bench, path)
 
 
-def _struck(controller: Any, virtual: VirtualCard, fault: Fault, hung: Any) -> float:
-    """Strikes when the card's time has come; returns the moment. The card's time begins with the session."""
+def _strike(
+    controller: BaseProcess, virtual: VirtualCard, fault: Fault, hung: Synchronized[float]
+) -> float:
+    """Strikes when the card's time has come; returns the moment, s of `monotonic`.
+
+    The card's time begins with the session.
+    """
     if fault.kind.name == "controller hangs":
-        _until(lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang")
+        _wait_until(
+            lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang"
+        )
         if hung.value == 0.0:
             raise Stray
         return float(hung.value)
-    _until(lambda: virtual.tick >= fault.at or controller.exitcode is not None, "the session to get there")
+    _wait_until(
+        lambda: virtual.tick >= fault.at or controller.exitcode is not None,
+        "the session to get there",
+    )
     if controller.exitcode is not None:
         raise Stray
-    os.kill(controller.pid, {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}[fault.kind.name])
+    assert controller.pid is not None
+    deadly = {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}
+    os.kill(controller.pid, deadly[fault.kind.name])
     return monotonic()
 
 
-def _until(there: Any, what: str) -> None:
+def _wait_until(there: Callable[[], bool], what: str) -> None:
     end = monotonic() + COMING
     while not there():
         if monotonic() > end:
@@ -104,19 +153,27 @@ def _until(there: Any, what: str) -> None:
         time.sleep(5e-4)
 
 
-def _ended(path: Path) -> bool:
+def _has_ended(path: Path) -> bool:
     return last_words(path)[0] == "process"
 
 
-def _control(test: Test, path: Path, fault: Fault, hung: Any) -> None:
-    """The controller process: everything slowed as the card is. What it and its guardian have to say is in the recording."""
+def _control(test: Test, path: Path, fault: Fault, hung: Synchronized[float]) -> None:
+    """The controller process: everything slowed as the card is.
+
+    What it and its guardian have to say is in the recording.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    card = Card(test.table, test.configuration.timing.period, connected(test.table.address), clock=_slowed)
-    patient = watched(test, path, True)
-    guardian = Guardian(replace(patient, patience=DILATION * patient.patience, hold=DILATION * patient.hold))
+    period, channel = test.configuration.timing.period, connect(test.table.address)
+    card = Card(test.table, period, channel, clock=_read_slow_clock)
+    usual = guardian_settings(test, path, guarded=True)
+    guardian = Guardian(
+        replace(usual, patience=DILATION * usual.patience, hold=DILATION * usual.hold)
+    )
     ticks = 0
 
-    def hanging(controlling: Any, state: Any, measured: Any, demand: Any) -> Any:
+    def hang(
+        controlling: Controller, state: State, measured: Measurements, demand: Demand
+    ) -> tuple[State, Commands]:
         nonlocal ticks
         ticks += 1
         if fault.kind.name == "controller hangs" and ticks > fault.at - BEFORE:
@@ -126,9 +183,9 @@ def _control(test: Test, path: Path, fault: Fault, hung: Any) -> None:
         return healthy(controlling, state, measured, demand)
 
     with in_real_time():
-        supervise(card, test.limited, test.demands, guardian, updating=hanging)
+        supervise(card, test.card_configuration, test.demands, guardian, updating=hang)
     guardian.finish("completed")
 
 
-def _slowed() -> float:
+def _read_slow_clock() -> float:
     return monotonic() / DILATION

@@ -1,1 +1,4 @@
-"""A test on the rig from the dry run to the recording: who keeps it, who watches, how the operator stops it."""
+"""A test on the rig from the dry run to the recording.
+
+Who keeps it, who watches, how the operator stops it.
+"""

@@ -1,4 +1,7 @@
-"""The dry run: the exact session on the virtual card first. What it predicts, and the list of what has passed."""
+"""The dry run: the exact session on the virtual card first.
+
+What it predicts, and the list of what has passed.
+"""
 
 from __future__ import annotations
 
@@ -12,22 +15,56 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration, flattened
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, written
+from rigtwin.hardware.daq.table import ChannelTable, to_toml
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.peaks import Peak, peaks
 
 
-def predicted(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
-    """How near to every limit a session came that was recorded on the virtual card."""
+def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
+    """Predicts how near to every limit a session comes.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of its dry run.
+    configuration : Configuration
+        With the limits.
+
+    Returns
+    -------
+    tuple of Peak
+        One for each limit.
+    """
     commands = np.column_stack([recording.column("/command", name) for name in Commands._fields])
-    measurements = np.column_stack([recording.column("/sensor", name) for name in Measurements._fields])
+    measurements = np.column_stack(
+        [recording.column("/sensor", name) for name in Measurements._fields]
+    )
     return peaks(commands, measurements, configuration)
 
 
-def digest(experiment: str, configuration: Configuration, demands: Array, table: ChannelTable) -> str:
-    """What makes a session another one: experiment, every setting, what is demanded, and the channel table."""
-    told = json.dumps([experiment, flattened(configuration), written(table)], sort_keys=True)
+def digest(
+    experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
+) -> str:
+    """Computes a key of all that makes a session another one.
+
+    Parameters
+    ----------
+    experiment : str
+        Its name.
+    configuration : Configuration
+        Every setting.
+    demands : Array
+        Shape (ticks, 3).
+    table : ChannelTable
+        Of the card.
+
+    Returns
+    -------
+    str
+        SHA-256, in hexadecimal.
+    """
+    told = json.dumps([experiment, flattened(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
 
 
@@ -36,8 +73,11 @@ def ledger(card: Path) -> Path:
     return card.with_suffix(".dry-runs.json")
 
 
-def passed(card: Path, key: str) -> bool:
-    """Whether that session has had a dry run which completed. Raises RigtwinError for a list that cannot be read."""
+def has_passed(card: Path, key: str) -> bool:
+    """Whether that session has had a dry run which completed.
+
+    Raises RigtwinError for a list that cannot be read.
+    """
     return key in _entries(ledger(card))
 
 
@@ -61,7 +101,9 @@ def _entries(path: Path) -> dict[str, dict[str, str]]:
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except ValueError:
-        raise RigtwinError(f"{path} is not a list of dry runs; remove it and do them again") from None
+        raise RigtwinError(
+            f"{path} is not a list of dry runs; remove it and do them again"
+        ) from None
     if not isinstance(entries, dict):
         raise RigtwinError(f"{path} is not a list of dry runs; remove it and do them again")
     return entries

@@ -1,5 +1,7 @@
-"""The loop's side of a second process that keeps the recording and watches the loop: if the loop dies or hangs, it stops the
-rig and says so in the recording."""
+"""The loop's side of a second process that keeps the recording and guards the rig.
+
+If the loop dies or hangs, the guardian stops the rig and says so in the recording.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +9,25 @@ import multiprocessing
 import os
 import threading
 import time
-from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import monotonic
 from rigtwin.hardware.session.guardian_process import guard
-from rigtwin.hardware.session.recorder import ROW
-from rigtwin.hardware.session.watched import (
+from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
     GROUND,
+    GUARDED,
     NUMBERS,
     PREPARED,
     READ,
     RING,
     STRUCTURE,
-    WATCHED,
     WRITTEN,
-    Watched,
-    parts,
+    GuardianSettings,
+    split_memory,
 )
+from rigtwin.hardware.session.recorder import ROW
 from rigtwin.hardware.supervisor import Transition
 
 STARTED = 30.0
@@ -36,17 +37,17 @@ ABSENT = 1.0
 
 
 class Guardian:
-    """The loop's side: a `rigtwin.hardware.supervised.Recorder` whose work another process does."""
+    """The loop's side: a `Recorder` of a session whose work another process does."""
 
-    def __init__(self, watched: Watched) -> None:
-        """Raises RigtwinError if the recording cannot be written or the other process does not come."""
-        self._watched, self._finishing = watched, False
+    def __init__(self, settings: GuardianSettings) -> None:
+        """Raises RigtwinError if the recording cannot be written or the process does not come."""
+        self._settings, self._finishing = settings, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
         memory = context.RawArray("d", NUMBERS + RING * ROW)
-        self._shared, self._ring = parts(memory)
+        self._shared, self._ring = split_memory(memory)
         self._pipe, theirs = context.Pipe()
-        arguments = (watched, theirs, memory, os.getpid())
+        arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
             self._process.start()
@@ -62,12 +63,14 @@ class Guardian:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def beat(self, ground: float, structure: float) -> None:
+        """Tells that the loop is alive, and the positions held, m; sees whether the guardian is."""
         shared, now = self._shared, time.monotonic()
         shared[GROUND], shared[STRUCTURE], shared[BEAT] = ground, structure, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
 
     def tick(self, row: tuple[float, ...]) -> None:
+        """Hands over one tick; see `Recorder`."""
         written = int(self._shared[WRITTEN])
         if written - self._shared[READ] >= RING:
             self.fault = self.fault or "the recording cannot keep up with the loop"
@@ -79,6 +82,7 @@ class Guardian:
         """The other process writes by itself."""
 
     def ready(self) -> None:
+        """Waits until the guardian could stop the rig. Raises RigtwinError if it cannot."""
         self._send("prepare")
         end = monotonic() + STARTED
         while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
@@ -87,30 +91,32 @@ class Guardian:
             raise RigtwinError(self.fault or "the guardian process does not answer")
 
     def transition(self, transition: Transition) -> None:
-        if transition.after in self._watched.phases and self._shared[WATCHED] == 0.0:
+        """Has a transition recorded; the loop is guarded from arming to rest."""
+        if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
             self._shared[BEAT] = time.monotonic()
-            self._shared[WATCHED] = 1.0
+            self._shared[GUARDED] = 1.0
         self._send("transition", transition)
-        if transition.after not in self._watched.phases:
-            self._shared[WATCHED] = 0.0
+        if transition.after not in self._settings.phases:
+            self._shared[GUARDED] = 0.0
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        """Has a metadata record added."""
         self._send("metadata", name, values)
 
     def finish(self, reason: str) -> None:
         """Ends the recording and the other process."""
-        self._shared[WATCHED], self._finishing = 0.0, True
+        self._shared[GUARDED], self._finishing = 0.0, True
         self._send("finish", reason)
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
 
-    def _send(self, *message: Any) -> None:
+    def _send(self, *message: object) -> None:
         try:
             self._pipe.send(message)
         except (OSError, ValueError):
             self.fault = self.fault or "the guardian process is gone, and the recording with it"
 
-    def _answer(self) -> Any:
+    def _answer(self) -> object:
         try:
             return self._pipe.recv()
         except (EOFError, OSError):

@@ -1,4 +1,4 @@
-"""The guardian's own process: writes the recording, looks at the loop, stops the rig if the loop dies or hangs."""
+"""The guardian's own process: writes the recording, stops the rig if the loop dies or hangs."""
 
 from __future__ import annotations
 
@@ -11,27 +11,32 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import TYPE_CHECKING
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import PRIORITY, monotonic
-from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
-from rigtwin.hardware.session.watched import (
+from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
     GROUND,
+    GUARDED,
     PREPARED,
     READ,
     RING,
     STRUCTURE,
-    WATCHED,
     WRITTEN,
-    Watched,
-    parts,
+    GuardianSettings,
+    SharedMemory,
+    split_memory,
 )
+from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
 from rigtwin.hardware.supervisor import Cause, Phase, Transition
 from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Writer
 from rigtwin.simulation.loop import BLOCK
+
+if TYPE_CHECKING:
+    from rigtwin.hardware.daq.failsafe import LastResort
 
 WRITE = 0.1
 """s between two blocks of the recording."""
@@ -41,55 +46,67 @@ GONE = 1.0
 """s within which a killed process must be gone."""
 
 
-def guard(watched: Watched, pipe: Connection, memory: Any, owner: int) -> None:
-    """The other process."""
+def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, owner: int) -> None:
+    """Runs the guardian until the recording is finished or the rig is stopped.
+
+    Parameters
+    ----------
+    settings : GuardianSettings
+        What it has to know.
+    pipe : Connection
+        To the loop, for all but ticks.
+    memory : SharedMemory
+        Through which ticks come.
+    owner : int
+        The loop's process.
+    """
     # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
     with suppress(OSError, AttributeError):
         os.setsid()
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    shared, ring = parts(memory)
-    from rigtwin.recording import Writer
-
+    shared, ring = split_memory(memory)
     try:
-        writer = Writer(**watched.recording)
+        writer = settings.open_writer()
         writer.reserve()
-        for name, values in watched.metadata.items():
+        for name, values in settings.metadata.items():
             writer.add_metadata(name, values)
-        view = _live(watched)
-        keeping = _Keeping(writer, pipe, watched, view, shared, ring)
-        keeping.make_ready()
+        view = _open_live_view(settings)
+        keeper = _GuardianKeeper(writer, pipe, settings, view, shared=shared, ring=ring)
+        keeper.make_ready()
     except RigtwinError as error:
         pipe.send(str(error))
         return
     shared[ALIVE] = monotonic()
-    thread = threading.Thread(target=keeping.work, daemon=True)
+    thread = threading.Thread(target=keeper.work, daemon=True)
     thread.start()
     with suppress(OSError, AttributeError):
         # Of this thread alone: writing the recording must never be in the loop's way.
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
     pipe.send("ready")
-    died = _died_or_hung(owner, shared, watched, keeping)
+    died = _guard_loop(owner, shared, settings, keeper)
     if died is not None:
-        keeping.stop_rig(died, shared)
+        keeper.stop_rig(died, shared)
     thread.join(1.0)
-    keeping.finish(died)
+    keeper.finish(died)
 
 
-def _live(watched: Watched) -> Callable[[str, Array], None] | None:
-    if watched.live == 0:
+def _open_live_view(settings: GuardianSettings) -> Callable[[str, Array], None] | None:
+    if settings.live == 0:
         return None
-    from rigtwin.hardware.session.live import live_view
+    from rigtwin.hardware.session.live import open_live_view
 
-    return live_view(watched.live)
+    return open_live_view(settings.live)
 
 
-def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping) -> Cause | None:
+def _guard_loop(
+    owner: int, shared: Array, settings: GuardianSettings, keeper: _GuardianKeeper
+) -> Cause | None:
     """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
     handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
     try:
-        while not keeping.done.is_set():
+        while not keeper.done.is_set():
             shared[ALIVE] = monotonic()
             if handle is not None:
                 dead = bool(select.select([handle], [], [], LOOK)[0])
@@ -97,43 +114,48 @@ def _died_or_hung(owner: int, shared: Array, watched: Watched, keeping: _Keeping
                 time.sleep(LOOK)
                 dead = os.getppid() != owner
             if dead:
-                return Cause("process", "the controller process died") if shared[WATCHED] else None
-            if watched.table is not None and shared[WATCHED] and monotonic() - shared[BEAT] > watched.patience:
+                return Cause("process", "the controller process died") if shared[GUARDED] else None
+            silent = monotonic() - shared[BEAT] > settings.patience
+            if settings.table is not None and shared[GUARDED] and silent:
                 with suppress(ProcessLookupError):
                     os.kill(owner, signal.SIGKILL)
-                if handle is not None and not watched.table.address:
-                    # A driver on this computer keeps the lines until the process is gone altogether.
+                if handle is not None and not settings.table.address:
+                    # A driver on this computer keeps the lines until the process is gone
+                    # altogether.
                     select.select([handle], [], [], GONE)
-                waited = f"{1e3 * watched.patience:.3g} ms"
-                return Cause("process", f"the controller process died or hung: no tick for {waited}; it was killed")
+                waited = f"{1e3 * settings.patience:.3g} ms"
+                reason = f"the controller process died or hung: no tick for {waited}; it was killed"
+                return Cause("process", reason)
         return None
     finally:
         if handle is not None:
             os.close(handle)
 
 
-class _Keeping:
+class _GuardianKeeper:
     """Writes what the loop sends, on a thread of its own."""
 
     def __init__(
         self,
-        writer: Any,
+        writer: Writer,
         pipe: Connection,
-        watched: Watched,
+        settings: GuardianSettings,
         view: Callable[[str, Array], None] | None,
         shared: Array,
         ring: Array,
     ) -> None:
         self._shared, self._ring = shared, ring
-        self._writer, self._keeper, self._pipe, self._watched, self._view = writer, Keeper(writer), pipe, watched, view
+        self._writer, self._keeper = writer, Keeper(writer)
+        self._pipe, self._settings, self._view = pipe, settings, view
         self._last: Transition | None = None
         self._reason: str | None = None
-        self._resort: Any = None
+        self._resort: LastResort | None = None
         self._cause = Cause("process", "")
         self._time, self._said = 0.0, False
         self.done = threading.Event()
 
     def work(self) -> None:
+        """Writes until the loop has finished the recording or is gone."""
         try:
             while self._reason is None:
                 if self._pipe.poll(WRITE):
@@ -162,11 +184,11 @@ class _Keeping:
                 self._view(SESSION, rows[:, : len(FIELDS)])
 
     def make_ready(self) -> None:
-        """Everything that takes time, before there is anything to watch."""
-        if self._watched.table is not None:
+        """Everything that takes time, before there is anything to guard."""
+        if self._settings.table is not None:
             from rigtwin.hardware.daq.failsafe import LastResort
 
-            self._resort = LastResort(self._watched.table)
+            self._resort = LastResort(self._settings.table)
 
     def _prepare(self) -> None:
         if self._resort is not None:
@@ -194,10 +216,10 @@ class _Keeping:
         said = cause.reason
         resort = self._resort
         if resort is not None:
-            failed = _tried_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
+            failed = _try_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
             if failed is None:
-                time.sleep(self._watched.hold)
-            failed = _tried_often(resort.pressure_off) or failed
+                time.sleep(self._settings.hold)
+            failed = _try_often(resort.pressure_off) or failed
             if failed is not None:
                 said = f"{said}; and {failed}: stop the rig by hand"
             resort.close()
@@ -210,7 +232,8 @@ class _Keeping:
             self._writer.finish(self._reason or "the loop ended without a word")
             return
         before = self._last.after if self._last is not None else Phase.IDLE
-        cause, now = self._cause, self._time if self._last is None else max(self._time, self._last.time)
+        cause = self._cause
+        now = self._time if self._last is None else max(self._time, self._last.time)
         if before != Phase.STOPPING:
             self._keeper.transition(Transition(now, before, Phase.STOPPING, cause))
         self._keeper.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))
@@ -218,7 +241,7 @@ class _Keeping:
             self._writer.finish(cause.reason)
 
 
-def _tried_often(act: Callable[[], None]) -> str | None:
+def _try_often(act: Callable[[], None]) -> str | None:
     """What is wrong with it after some tries, or None."""
     failed = None
     for _ in range(TRIES):

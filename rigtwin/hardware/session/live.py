@@ -1,4 +1,4 @@
-"""A live view of a session for Foxglove, in the browser or on the desktop, served on this computer only."""
+"""A live view of a session for Foxglove, served on this computer only."""
 
 from __future__ import annotations
 
@@ -8,19 +8,24 @@ from typing import Any
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
-from rigtwin.recording.schema import descriptor, encoded, type_name
+from rigtwin.recording.schema import descriptor, encode, type_name
 
 HOST = "127.0.0.1"
 SHOWN = 10
 """Every so many ticks one is shown."""
 
 
-def live_view(port: int) -> Callable[[str, Array], None]:
-    """Starts serving; returns what takes rows of a topic whose first column is the time in s. Raises RigtwinError."""
+def open_live_view(port: int) -> Callable[[str, Array], None]:
+    """Starts serving; returns what takes rows of a topic whose first column is the time in s.
+
+    Raises RigtwinError.
+    """
     try:
         import foxglove
     except ImportError:
-        raise RigtwinError("the foxglove-sdk package is missing; pip install 'rigtwin[live]'") from None
+        raise RigtwinError(
+            "the foxglove-sdk package is missing; pip install 'rigtwin[live]'"
+        ) from None
     try:
         server = foxglove.start_server(name="rigtwin", host=HOST, port=port)
     except (RuntimeError, OverflowError) as error:
@@ -29,9 +34,13 @@ def live_view(port: int) -> Callable[[str, Array], None]:
 
     def show(topic: str, rows: Array) -> None:
         if topic not in channels:
-            schema = foxglove.Schema(name=type_name(topic), encoding="protobuf", data=descriptor(topic, topic_fields(topic)))
+            schema = foxglove.Schema(
+                name=type_name(topic),
+                encoding="protobuf",
+                data=descriptor(topic, topic_fields(topic)),
+            )
             channels[topic] = foxglove.Channel(topic, schema=schema, message_encoding="protobuf")
         for row in rows[::SHOWN]:
-            channels[topic].log(encoded(row), log_time=max(0, round(float(row[0]) * 1e9)))
+            channels[topic].log(encode(row), log_time=max(0, round(float(row[0]) * 1e9)))
 
     return show

@@ -1,26 +1,37 @@
-"""`rigtwin session`: a list of tests one after the other, a recording and a comparison each."""
+"""A list of tests to be recorded one after the other, and what is there of it already."""
 
 from __future__ import annotations
 
-import time
-from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from rigtwin.cli.session_commands import permitted, run, test_of
-from rigtwin.description.configuration import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
+from rigtwin.simulation.experiment import Experiment
 
 LONGEST = 3600.0
 """s of a pause."""
+KEYS = ("experiment", "name", "seed", "pause", "set")
 
 
 @dataclass(frozen=True)
-class Planned:
-    """One test of a list. pause: s before it; settings: `key=value` texts, as --set takes them."""
+class PlannedTest:
+    """One test of a list.
+
+    Parameters
+    ----------
+    name : str
+        Of its recording, without the ending.
+    experiment : str
+        What is run.
+    seed : int
+        Of the demands.
+    pause : float
+        s before it.
+    settings : list of str
+        `key=value` texts, as --set takes them.
+    """
 
     name: str
     experiment: str
@@ -29,98 +40,103 @@ class Planned:
     settings: list[str] = field(default_factory=list)
 
 
-def planned(tables: Mapping[str, Any]) -> list[Planned]:
-    """The tests of a TOML list. Raises RigtwinError naming the test and what is wrong with it."""
-    from experiments import find
+def parse_plan(
+    tables: Mapping[str, object], find: Callable[[str], Experiment]
+) -> list[PlannedTest]:
+    """Reads the tests of a list.
 
+    Parameters
+    ----------
+    tables : mapping
+        TOML's tables: `test`, a list of tables.
+    find : callable
+        Gives the experiment of a name; raises RigtwinError if there is none.
+
+    Returns
+    -------
+    list of PlannedTest
+        In the order of the list.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the test and what is wrong with it.
+    """
     unknown = [name for name in tables if name != "test"]
+    if unknown:
+        raise RigtwinError(f"unknown {unknown[0]!r}; expected [[test]] tables")
     tests = tables.get("test")
-    if unknown or not isinstance(tests, list) or not tests:
-        raise RigtwinError(f"unknown {unknown[0]!r}; expected [[test]] tables" if unknown else "no [[test]] in it")
-    found: list[Planned] = []
-    for number, test in enumerate(tests, start=1):
-        where = f"test {number}"
-        if not isinstance(test, Mapping):
-            raise RigtwinError(f"{where} = {test!r}; expected a table, [[test]]")
-        for key in test:
-            if key not in ("experiment", "name", "seed", "pause", "set"):
-                raise RigtwinError(f"{where}: unknown {key!r}; there are experiment, name, seed, pause, set")
-        experiment, seed, pause = test.get("experiment"), test.get("seed", 0), test.get("pause", 0.0)
-        if not isinstance(experiment, str):
-            raise RigtwinError(f"{where}: experiment is missing")
-        find(experiment)
-        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise RigtwinError(f"{where}: seed = {seed!r}; expected 0 or more")
-        if isinstance(pause, bool) or not isinstance(pause, int | float) or not 0.0 <= pause <= LONGEST:
-            raise RigtwinError(f"{where}: pause = {pause!r}; expected 0 to {LONGEST:g} s")
-        settings = test.get("set", {})
-        if not isinstance(settings, Mapping):
-            raise RigtwinError(f"{where}: set = {settings!r}; expected a table of settings")
-        name = test.get("name", f"{number:02d}-{experiment}-{seed}")
-        if not isinstance(name, str) or not name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
-            raise RigtwinError(f"{where}: name = {name!r}; expected what a file can be called")
-        if name in (other.name for other in found):
-            raise RigtwinError(f"{where}: name {name!r} is another test's; expected one of its own")
-        found.append(Planned(name, experiment, seed, float(pause), list(_assignments(settings))))
+    if not isinstance(tests, list) or not tests:
+        raise RigtwinError("no [[test]] in it")
+    found: list[PlannedTest] = []
+    for number, table in enumerate(tests, start=1):
+        test = _parse_test(number, table, find)
+        if test.name in (other.name for other in found):
+            raise RigtwinError(
+                f"test {number}: name {test.name!r} is another test's; expected one of its own"
+            )
+        found.append(test)
     return found
 
 
-def _assignments(settings: Mapping[str, Any]) -> list[str]:
-    """`group.name=value` of nested or dotted tables."""
+def _parse_test(number: int, table: object, find: Callable[[str], Experiment]) -> PlannedTest:
+    where = f"test {number}"
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"{where} = {table!r}; expected a table, [[test]]")
+    for key in table:
+        if key not in KEYS:
+            raise RigtwinError(f"{where}: unknown {key!r}; there are {', '.join(KEYS)}")
+    experiment, seed, pause = table.get("experiment"), table.get("seed", 0), table.get("pause", 0.0)
+    if not isinstance(experiment, str):
+        raise RigtwinError(f"{where}: experiment is missing")
+    find(experiment)
+    if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
+        raise RigtwinError(f"{where}: seed = {seed!r}; expected 0 or more")
+    is_number = isinstance(pause, int | float) and not isinstance(pause, bool)
+    if not is_number or not 0.0 <= pause <= LONGEST:
+        raise RigtwinError(f"{where}: pause = {pause!r}; expected 0 to {LONGEST:g} s")
+    settings = table.get("set", {})
+    if not isinstance(settings, Mapping):
+        raise RigtwinError(f"{where}: set = {settings!r}; expected a table of settings")
+    name = table.get("name", f"{number:02d}-{experiment}-{seed}")
+    if not isinstance(name, str) or not _is_file_name(name):
+        raise RigtwinError(f"{where}: name = {name!r}; expected what a file can be called")
+    return PlannedTest(
+        name, experiment, seed=seed, pause=float(pause), settings=list_assignments(settings)
+    )
+
+
+def _is_file_name(name: str) -> bool:
+    whole = name.strip() != "" and name.isprintable()
+    return whole and "/" not in name and not name.startswith(".")
+
+
+def list_assignments(settings: Mapping[str, object]) -> list[str]:
+    """Gives `group.name=value` texts of nested or dotted tables."""
     lines: list[str] = []
     for key, value in settings.items():
         if isinstance(value, Mapping):
-            lines += [f"{key}.{line}" for line in _assignments(value)]
+            lines += [f"{key}.{line}" for line in list_assignments(value)]
         else:
             lines.append(f"{key}={value}")
     return lines
 
 
-def session(parsed: Namespace) -> int:
-    """Runs the list. Stops at the first test that did not end as it should. Returns the exit code."""
-    if parsed.target == "daq" and parsed.card is None:
-        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
-    tests = read_toml(parsed.list, planned)
-    try:
-        parsed.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RigtwinError(f"cannot make {parsed.folder}: {error.strerror}") from None
-    real = parsed.target == "daq" and not parsed.dry_run
-    todo = [test for test in tests if not (parsed.resume and _completed(parsed.folder / f"{test.name}.mcap", real))]
-    taken = [test.name for test in todo if (parsed.folder / f"{test.name}.mcap").exists()]
-    if taken and not parsed.resume:
-        raise RigtwinError(f"{parsed.folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder")
-    # Every mistake is found before the first test moves anything.
-    ready = [(test, test_of(_of(parsed, test), test.experiment)) for test in todo]
-    for _, one in ready:
-        _ = one.limited
-        if real:
-            permitted(parsed, one)
-    if len(todo) < len(tests):
-        print(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
-    for test, one in ready:
-        if test.pause:
-            print(f"pause of {test.pause:g} s before {test.name}", flush=True)
-            time.sleep(test.pause)
-        path = parsed.folder / f"{test.name}.mcap"
-        aside = _aside(path)
-        code = run(parsed, one, path)
-        if aside is not None:
-            print(f"what was there before is in {aside}")
-        if code != 0:
-            print(f"{test.name} did not complete; see {path}, then --resume")
-            return code
-        _compared(path)
-    return 0
+def is_complete(path: Path, real: bool) -> bool:
+    """Says whether a test need not be done again.
 
+    Parameters
+    ----------
+    path : Path
+        Where its recording is, or would be.
+    real : bool
+        Whether the recording must be of the rig itself, else of a twin.
 
-def _of(parsed: Namespace, test: Planned) -> Namespace:
-    """The command line of one test: its own settings after those of the session."""
-    return Namespace(**{**vars(parsed), "seed": test.seed, "set": [*parsed.set, *test.settings]})
-
-
-def _completed(path: Path, real: bool) -> bool:
-    """Whether it is there, of the rig itself where that is asked for."""
+    Returns
+    -------
+    bool
+        True if it is there and completed.
+    """
     if not path.exists():
         return False
     try:
@@ -130,22 +146,11 @@ def _completed(path: Path, real: bool) -> bool:
     return recording.end == "completed" and real == (not recording.twin)
 
 
-def _aside(path: Path) -> Path | None:
-    """A recording of a test that did not complete is kept under another name."""
+def move_aside(path: Path) -> Path | None:
+    """Keeps a recording of a test that did not complete under another name, which it returns."""
     if not path.exists():
         return None
     number = 1
     while (aside := path.with_suffix(f".{number}.mcap")).exists():
         number += 1
     return path.rename(aside)
-
-
-def _compared(path: Path) -> None:
-    """Where the rig and the twin disagree, at once."""
-    from rigtwin.cli.diagnosis_commands import compare
-
-    arguments = {"recording": path, "other": None, "json": None, "machine": None, "effect": [], "set": [], "config": None}
-    try:
-        compare(Namespace(**arguments))
-    except RigtwinError as error:
-        print(f"not compared: {error}")

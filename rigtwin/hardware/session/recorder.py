@@ -21,12 +21,15 @@ SENSORS = [FIELDS.index(name) for name in Measurements._fields]
 COMMANDS = slice(len(FIELDS), len(FIELDS) + len(Commands._fields))
 NUMBER = len(FIELDS) + len(Commands._fields)
 ROW = NUMBER + 1
-"""Numbers of a tick as a `rigtwin.hardware.supervised.Recorder` gets them: /session, /command, the tick's number in the test."""
+"""Numbers of a tick as a `rigtwin.hardware.supervision.Recorder` gets them: /session, /command,
+the tick's number in the test."""
 
 
 class Keeper:
-    """A `rigtwin.hardware.supervised.Recorder` that writes block by block. What cannot be written is no exception but a `fault`: the rig
-    has to be stopped first."""
+    """A `rigtwin.hardware.supervision.Recorder` that writes block by block.
+
+    What cannot be written is no exception but a `fault`: the rig has to be stopped first.
+    """
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer

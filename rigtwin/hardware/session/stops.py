@@ -11,13 +11,20 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP") if hasattr(signal, name)]
+_SIGNALS = [
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+    if hasattr(signal, name)
+]
 
 
 @contextmanager
 def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]]:
-    """Gives a function to be called once a tick: who asked to stop, or None. Ctrl-C and the other signals that end a program
-    are requests inside this context; on a terminal so is any key; so is a file of that name."""
+    """Gives a function to be called once a tick: who asked to stop, or None.
+
+    Ctrl-C and the other signals that end a program are requests inside this context; on a terminal
+    so is any key; so is a file of that name.
+    """
     said: list[str] = []
 
     def on_signal(number: int, _: FrameType | None) -> None:
@@ -28,7 +35,7 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
     try:
         with _single_keys() as keys:
 
-            def asked() -> str | None:
+            def find_request() -> str | None:
                 if said:
                     return said[0]
                 if path is not None and os.path.exists(path):  # noqa: PTH110 - 1 us instead of 3, every tick
@@ -38,7 +45,7 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
                     return "stopped by the operator: key"
                 return None
 
-            yield asked
+            yield find_request
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -46,7 +53,10 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
 
 @contextmanager
 def _single_keys() -> Iterator[bool]:
-    """Whether there is a terminal whose keys can be read one by one; for the time of the context they are."""
+    """Whether there is a terminal whose keys can be read one by one.
+
+    For the time of the context they are.
+    """
     try:
         import termios
         import tty

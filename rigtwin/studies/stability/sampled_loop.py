@@ -40,7 +40,7 @@ from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import deflected
+from rigtwin.simulation.plant import start_deflection
 
 PERTURBATION = 1e-6
 """In each variable's unit; far within every threshold of the controllers."""
@@ -165,7 +165,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     plate[CYLINDER], rate[CYLINDER] = out, out @ inner
     cell = -motor.viscous * rate
     cell[FORCE], cell[SPEED] = 1.0, motor.viscous
-    squeezed, step = deflected(plant, preload), 1e-6
+    squeezed, step = start_deflection(plant, preload), 1e-6
     around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0
