@@ -10,6 +10,7 @@ from rigtwin.components import KINDS, RigPlant
 from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
+from rigtwin.signals.runs import find_cut_off
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}

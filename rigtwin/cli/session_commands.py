@@ -261,10 +261,10 @@ def _command_line(parsed: Namespace, test: PlannedTest) -> Namespace:
 
 def _compare(path: Path) -> None:
     """Says where the rig and the twin disagree, at once."""
-    from rigtwin.cli.diagnosis_commands import compare
+    from rigtwin.cli.compare import execute
 
     nothing = {"other": None, "json": None, "machine": None, "config": None}
     try:
-        compare(Namespace(recording=path, effect=[], set=[], **nothing))
+        execute(Namespace(recording=path, effect=[], set=[], **nothing))
     except RigtwinError as error:
         print(f"not compared: {error}")
