@@ -18,11 +18,10 @@ import numpy as np
 from controllers import Compensator, Structure
 from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
+from rigtwin.description.catalogue import find
+from rigtwin.description.configuration import Configuration, Safety, Timing, apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import tried
-from rigtwin.description.configuration import Configuration, Safety, Timing
-from rigtwin.description.configuration import applied
-from rigtwin.description.catalogue import find
 from rigtwin.numerics.compiling import kernel, step
 from rigtwin.simulation.loop import BLOCK, run_compiled
 from rigtwin.simulation.plant import Simulation
@@ -124,7 +123,7 @@ def _diagnosed(seconds: float) -> Callable[[], object]:
     """The whole library on an imposed test of that length with one effect, and its report's figures."""
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
-    recording = tried("imposed", applied(configuration, ["coulomb@motor=20"]), imposed.demands(configuration, 0))
+    recording = tried("imposed", apply_effects(configuration, ["coulomb@motor=20"]), imposed.demands(configuration, 0))
     return lambda: diagnose(find("suspension-rig"), [recording], Configuration())
 
 

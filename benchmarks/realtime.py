@@ -10,14 +10,19 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
+from rigtwin.description.configuration import from_assignments
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.daq.virtual import VirtualCard
 from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import Test, on_virtual_card, record_at_leisure, record_in_real_time
-from rigtwin.description.configuration import from_assignments
+from rigtwin.hardware.session.record import (
+    Test,
+    on_virtual_card,
+    record_at_leisure,
+    record_in_real_time,
+)
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 

@@ -13,13 +13,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from rigtwin.description.setting import nominal
 from scipy.signal import butter, sosfiltfilt
 
+from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.leftover import remaining
-from rigtwin.description.catalogue import find
-from rigtwin.description.setting import nominal
+from rigtwin.diagnosis.leftover import remaining_rms
 from rigtwin.recording import Recording, load
 
 BAND = 40.0
@@ -51,8 +51,8 @@ def main() -> None:
     plant = machine.plant._replace(carriage=machine.plant.carriage._replace(mass=plain["mass"]), guide=guide)
     judged = Evidence(machine, [held_out], [setup])
     print("least squares: " + ", ".join(f"{name} {value:.4g}" for name, value in plain.items()))
-    print(f"{'nominal':40s} {remaining(judged, machine.plant)['force']:8.3f} N")
-    print(f"{'least squares, four parameters':40s} {remaining(judged, plant)['force']:8.3f} N")
+    print(f"{'nominal':40s} {remaining_rms(judged, machine.plant)['force']:8.3f} N")
+    print(f"{'least squares, four parameters':40s} {remaining_rms(judged, plant)['force']:8.3f} N")
     for step in diagnose(machine, [fitted], setup, [held_out]).diagnosis.steps[1:]:
         print(f"{'diagnosis, ' + step.added:40s} {step.left['force']:8.3f} N")
 

@@ -13,7 +13,7 @@ from referee.benches import (
     DamperTruth,
     actuator_position,
     damper_force,
-    sampled,
+    sample,
     wander,
 )
 
@@ -33,7 +33,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Recorded:
+class BenchRecording:
     """What its sensors read. first: command or displacement m; second: position m or force N; shape (ticks,)."""
 
     first: Array
@@ -56,7 +56,7 @@ DAMPERS = (
 )
 
 
-def drawn(number: int, seed: int) -> Case:
+def draw_case(number: int, seed: int) -> Case:
     """The case of that number: every sort in turn, its sizes at random."""
     random = np.random.default_rng([seed, number])
     period = float(random.choice([5e-4, 1e-3, 2e-3]))
@@ -105,17 +105,17 @@ def _damper(sort: str, random: np.random.Generator) -> DamperTruth:
     )
 
 
-def recorded(case: Case, again: int = 0) -> Recorded:
+def record(case: Case, again: int = 0) -> BenchRecording:
     """A test of the bench. again: another one of the same bench."""
     random = np.random.default_rng([case.seed, 77, again])
     reach = float(random.uniform(0.02, 0.04))
     if isinstance(case.truth, ActuatorTruth):
         command = wander(random, SECONDS, case.period, reach, 0.1, 8.0)
-        position = sampled(random, actuator_position(case.truth, command, case.period), 2e-5, 1e-6)
-        return Recorded(command, position)
+        position = sample(random, actuator_position(case.truth, command, case.period), 2e-5, 1e-6)
+        return BenchRecording(command, position)
     fine = 4
     motion = wander(random, SECONDS, case.period / fine, reach, 0.1, 3.0)
     force = damper_force(case.truth, motion, np.gradient(motion, case.period / fine))[::fine]
-    return Recorded(
-        sampled(random, motion[::fine], 5e-6, 1e-6), sampled(random, force, 0.01 * float(np.std(force)) + 0.3, 0.05)
+    return BenchRecording(
+        sample(random, motion[::fine], 5e-6, 1e-6), sample(random, force, 0.01 * float(np.std(force)) + 0.3, 0.05)
     )

@@ -58,7 +58,7 @@ def wander(random: np.random.Generator, seconds: float, period: float, reach: fl
 
 
 @numba.njit
-def _integrated(wanted: Array, lags: Array, own: Array, fastest: float, half: float, step: float) -> Array:
+def _integrate(wanted: Array, lags: Array, own: Array, fastest: float, half: float, step: float) -> Array:
     levels = np.full(len(lags), wanted[0])
     place, speed, out, held = wanted[0], 0.0, np.empty(len(wanted)), wanted[0]
     carried = wanted[0]
@@ -93,7 +93,7 @@ def actuator_position(truth: ActuatorTruth, command: Array, period: float) -> Ar
     if behind:
         held = np.concatenate([np.full(behind, held[0]), held[:-behind]])
     own = np.array(truth.own or (0.0, 0.0))
-    moved = _integrated(held, np.array(truth.lags, float), own, truth.fastest, 0.5 * truth.lost, step)
+    moved = _integrate(held, np.array(truth.lags, float), own, truth.fastest, 0.5 * truth.lost, step)
     # A sample is taken before the command of its tick acts.
     return np.concatenate([[held[0]], moved[FINE - 1 :: FINE][:-1]])
 
@@ -113,7 +113,7 @@ def damper_force(truth: DamperTruth, motion: Array, speed: Array) -> Array:
     return dry + viscous + truth.rate * motion + truth.charge
 
 
-def sampled(random: np.random.Generator, signal: Array, noise: float, bit: float) -> Array:
+def sample(random: np.random.Generator, signal: Array, noise: float, bit: float) -> Array:
     """What a converter makes of a signal."""
     noisy = signal + noise * random.standard_normal(len(signal))
     return np.round(noisy / bit) * bit if bit > 0.0 else noisy

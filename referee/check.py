@@ -63,7 +63,7 @@ def check(
             raise RigtwinError("the referee ended before it committed itself to a key")
         (recordings / "commitment.txt").write_text(commitment + "\n")
         try:
-            given = _diagnosed(recordings, cases, workers, progress)
+            given = _diagnose_all(recordings, cases, workers, progress)
             crude = _crude(recordings, cases, workers) if baselines else {}
         except BaseException:
             referee.kill()
@@ -78,7 +78,7 @@ def check(
     return Result(seed, commitment, json.loads(opened), given, crude)
 
 
-def _diagnosed(recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]) -> list[dict[str, Any]]:
+def _diagnose_all(recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]) -> list[dict[str, Any]]:
     def jobs() -> Iterator[tuple[str, Files]]:
         for number in range(cases):
             files = [path.read_bytes() for path in _paths(recordings, number)]
@@ -101,9 +101,9 @@ def _key(recordings: Path, number: int) -> str:
 
 def answer(files: Files) -> dict[str, Any]:
     """One case's answer, of its recording and the one held out. Runs where there are neither the key nor the other cases."""
-    from rigtwin.diagnosis import diagnose as module
-    from rigtwin.description.configuration import Configuration
     from rigtwin.description.catalogue import find
+    from rigtwin.description.configuration import Configuration
+    from rigtwin.diagnosis import diagnose as module
     from rigtwin.recording import load
     from rigtwin.recording.channels import DEFAULT_MACHINE
 
@@ -115,7 +115,7 @@ def answer(files: Files) -> dict[str, Any]:
         return module.diagnose(find(DEFAULT_MACHINE), [recording], Configuration(), [held_out]).diagnosis.document()
 
 
-def named(content: bytes) -> str:
+def name_effect(content: bytes) -> str:
     """What the black-box baseline names in a recording."""
     from referee.crude import black_box
 
@@ -129,4 +129,4 @@ def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
     from referee.crude import TRIED
 
     jobs = ((str(number), _paths(recordings, number)[0].read_bytes()) for number in range(min(cases, TRIED)))
-    return {int(number): name for number, name in sorted(iterate_results(workers, named, jobs), key=lambda pair: int(pair[0]))}
+    return {int(number): name for number, name in sorted(iterate_results(workers, name_effect, jobs), key=lambda pair: int(pair[0]))}

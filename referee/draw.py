@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from referee.reference_plant import CELL, LVDT, Array, Truth
-from referee.reference_rig import Law, quiet
+from referee.reference_rig import Law, run_quiet
 
 Random = np.random.Generator
 Change = Callable[[Truth, Law], tuple[Truth, Law]]
@@ -194,7 +194,7 @@ def _others(random: Random) -> list[Callable[[], Defect]]:
     return [mass, stiffness, damping, hardening, late, missed, setting]
 
 
-def outside(random: Random) -> list[Callable[[], Defect]]:
+def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
     """Defects that no report has a name for."""
     any_lvdt = str(random.choice(SENSORS[:3]))
     any_cylinder = str(random.choice(["ground", "structure"]))
@@ -237,7 +237,7 @@ def library(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]
     ]
 
 
-def tolerated(random: Random) -> Truth:
+def draw_tolerated(random: Random) -> Truth:
     """A rig within its tolerances, in a laboratory with noise of its own, its friction set-valued or a stiff bristle."""
 
     def near(value: float, share: float) -> float:
@@ -276,7 +276,7 @@ def effect_size(rig: Truth, law: Law, defect: Defect, commands: Array) -> float:
     if defect.kind in ("hum", "noise", "quantisation", "missed_ticks") or defect.kind.startswith("setting"):
         return float("inf")
     with_it, real = defect.change(rig, law)
-    change = quiet(with_it, real, commands) - quiet(rig, law, commands)
+    change = run_quiet(with_it, real, commands) - run_quiet(rig, law, commands)
     noise = np.array([getattr(rig, name).white for name in SENSORS])
     return float(np.max(np.sqrt(np.mean(change**2, axis=0)) / noise))
 

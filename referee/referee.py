@@ -16,10 +16,18 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from referee.draw import MATERIAL, Defect, effect_size, library, outside, summary, tolerated
+from referee.draw import (
+    MATERIAL,
+    Defect,
+    draw_tolerated,
+    draw_unnamed,
+    effect_size,
+    library,
+    summary,
+)
 from referee.reference_plant import Array
 from referee.reference_rig import Law, run
-from referee.test_signals import TESTS, asked
+from referee.test_signals import TESTS, draw_demands
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
 """Of all cases."""
@@ -36,26 +44,26 @@ def sorts(cases: int, random: np.random.Generator) -> list[str]:
     return names
 
 
-def chosen(groups: list[list[Any]], random: np.random.Generator) -> Defect:
+def choose(groups: list[list[Any]], random: np.random.Generator) -> Defect:
     """One defect: the component first, so that none is rare because it has few kinds."""
     group = groups[int(random.integers(len(groups)))]
     return group[int(random.integers(len(group)))]()
 
 
-def case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
+def draw_case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
     """The key's entry of one case, and its recordings: what the operator set, commands and sensors; the second is held out."""
-    rig = tolerated(random)
+    rig = draw_tolerated(random)
     test = str(random.choice(TESTS if sort != "pair" else TESTS[:3]))
-    law, demands = asked(test, random)
+    law, demands = draw_demands(test, random)
     plain, _ = run(rig, law, demands, np.random.default_rng(0))
     defects: list[Defect] = []
     sizes: list[float] = []
     while len(defects) < {"single": 1, "null": 0, "pair": 2, "outside": 1}[sort]:
         if sort == "outside":
-            options = outside(random)
+            options = draw_unnamed(random)
             drawn = options[int(random.integers(len(options)))]()
         else:
-            drawn = chosen(library(plain, random), random)
+            drawn = choose(library(plain, random), random)
         size = effect_size(rig, law, drawn, plain)
         # A defect that this test does not show is asked for only where it is alone and inside the library.
         shown = sort == "single" or size >= MATERIAL
@@ -66,7 +74,7 @@ def case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[t
     for defect in defects:
         truth, real = defect.change(truth, real)
     recordings = [(law, *run(truth, real, demands, random))]
-    _, again = asked("imposed" if test == "tripped" else test, random)
+    _, again = draw_demands("imposed" if test == "tripped" else test, random)
     recordings.append((law, *run(truth, real, again, random)))
     entry = {
         "sort": sort,
@@ -133,7 +141,7 @@ def main(arguments: list[str]) -> int:
     key = []
     for number, sort in enumerate(order):
         # Each case has a stream of its own, so that one more case leaves the others as they are.
-        entry, recordings = case(sort, np.random.default_rng([seed, 1, number]))
+        entry, recordings = draw_case(sort, np.random.default_rng([seed, 1, number]))
         for name, recording in zip((f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), recordings, strict=True):
             write(folder / name, *recording)
         key.append(entry)

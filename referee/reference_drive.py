@@ -18,11 +18,11 @@ from controllers import (
     update,
 )
 from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
-from referee.reference_rig import disturbed
+from referee.reference_rig import draw_noise
 from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.runner import Ran
+from rigtwin.simulation.runner import SimulationResult
 from rigtwin.simulation.safety import Trip, Watch, judged, watching_compiled
 
 
@@ -63,12 +63,12 @@ def _ticks(
     return len(demands), Trip.NONE.value
 
 
-def driven(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> Ran:
+def drive(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> SimulationResult:
     """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant is not looked at."""
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)
     body = at_rest(truth, float(demands[0, 0]), settings.start, settings.preload)
-    noise, missed = disturbed(truth, ticks, np.random.default_rng([seed, 5]))
+    noise, missed = draw_noise(truth, ticks, np.random.default_rng([seed, 5]))
     commands, sensors, true = (np.empty((ticks, 4)) for _ in range(3))
     held = np.array([demands[0, 0], settings.start, settings.preload, settings.preload / 186.0])
     done, number = _ticks(
@@ -86,4 +86,4 @@ def driven(truth: Truth, configuration: Configuration, demands: Array, seed: int
         sensors,
         true,
     )
-    return Ran(commands[:done], sensors[:done], true[:done], Trip(number))
+    return SimulationResult(commands[:done], sensors[:done], true[:done], Trip(number))

@@ -121,7 +121,7 @@ def dry(of: Slider, speed: float, place: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def solved(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: float, rod_down: float, plate: float) -> float:
+def solve(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: float, rod_down: float, plate: float) -> float:
     """The carriage's velocity by bisection on the monotone balance of impulses; rod friction acts on plate − v."""
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
@@ -147,7 +147,7 @@ def solved(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: fl
 
 
 @numba.njit(cache=True, nogil=True)
-def passed(
+def pass_command(
     drive: Drive, memory: Array, history: Array, count: int, command: float, centred: bool, time: float, late: float
 ) -> float:
     """A command through a drive, one step. memory: rate limit's, lag's and dead zone's output."""
@@ -200,7 +200,7 @@ def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> flo
 
 
 @numba.njit(cache=True, nogil=True)
-def settled(z: Array, at: float, of: Hydraulic) -> None:
+def settle(z: Array, at: float, of: Hydraulic) -> None:
     """At rest with its output at `at`."""
     w, scale = 1.0 - of.slower, 6.281e5 / 6.243e5
     a3, a2, a1 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3
@@ -259,8 +259,8 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
     )
     ground = ground_command * truth.ground.gain
     x = ground - preload / truth.tyre
-    settled(body.ground_z, ground, truth.ground_hydraulic)
-    settled(body.structure_z, x, truth.structure_hydraulic)
+    settle(body.ground_z, ground, truth.ground_hydraulic)
+    settle(body.structure_z, x, truth.structure_hydraulic)
     first = (preload / truth.constant, ground_command, structure_command)
     for number in range(3):
         body.histories[number, :] = first[number]
@@ -302,10 +302,10 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
     ground_yield, structure_yield, ground_before, structure_before = motion[10], motion[11], motion[12], motion[13]
     acceleration, cell, count = motion[14], motion[15], int(motion[16])
     for _ in range(round(1e-3 / STEP)):
-        asked = passed(truth.voltage, memories[0], histories[0], count, held[3], True, time, truth.late)
+        asked = pass_command(truth.voltage, memories[0], histories[0], count, held[3], True, time, truth.late)
         asked = max(-1860.0 / truth.constant, min(1860.0 / truth.constant, max(-10.0, min(10.0, asked))))
-        asked_ground = passed(truth.ground, memories[1], histories[1], count, held[0], False, time, truth.late)
-        asked_structure = passed(truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late)
+        asked_ground = pass_command(truth.ground, memories[1], histories[1], count, held[0], False, time, truth.late)
+        asked_structure = pass_command(truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late)
         count += 1
         next_ground = hydraulic_step(truth.ground_hydraulic, ground_z, ground, asked_ground)
         next_structure = hydraulic_step(truth.structure_hydraulic, structure_z, structure, asked_structure)
@@ -348,7 +348,7 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
             rod_force = truth.bristle * bristle_rod + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
             v += STEP / truth.mass * (push - rail_force + rod_force)
         else:
-            v = solved(
+            v = solve(
                 truth.mass * v + STEP * push,
                 truth.mass,
                 STEP * rail_up,

@@ -79,13 +79,13 @@ def simulate(
 def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator) -> tuple[Array, Array]:
     """A whole test: the commands and sensors as recorded, shape (ticks, 4) each."""
     ticks = len(demands)
-    noise, absent = disturbed(truth, ticks, random)
+    noise, absent = draw_noise(truth, ticks, random)
     commands, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
     done = simulate(truth, law, np.ascontiguousarray(demands), np.empty(0), noise, absent, commands, sensors)
     return commands[:done], sensors[:done]
 
 
-def disturbed(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Array, Array]:
+def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Array, Array]:
     """The sensors' noise, shape (ticks, 4), and 1 where a tick is missed, shape (ticks,)."""
     time = np.arange(ticks) * 1e-3
     noise = np.empty((ticks, 4))
@@ -97,7 +97,7 @@ def disturbed(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Ar
     return noise, absent
 
 
-def quiet(truth: Truth, law: Law, commands: Array) -> Array:
+def run_quiet(truth: Truth, law: Law, commands: Array) -> Array:
     """The sensors without noise under given commands, shape (ticks, 4) both."""
     ticks = len(commands)
     out, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))

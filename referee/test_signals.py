@@ -34,7 +34,7 @@ def _road(time: Array, speed: float, low: float, high: float, random: np.random.
     return (signal - signal[0]) * _rise(time)
 
 
-def asked(test: str, random: np.random.Generator) -> tuple[Law, Array]:
+def draw_demands(test: str, random: np.random.Generator) -> tuple[Law, Array]:
     """The controller's settings and the demands, shape (ticks, 3), of a test of that name."""
     time: Array = np.arange(round(SECONDS[test] / 1e-3), dtype=np.float64) * 1e-3
     demands = np.zeros((len(time), 3))

@@ -11,7 +11,7 @@ from rigtwin.diagnosis.replays import REPLAYS, Replays, Undetermined
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components import candidates, find
-from rigtwin.description.configuration import Configuration, Timing, applied, from_assignments
+from rigtwin.description.configuration import Configuration, Timing, apply_effects, from_assignments
 from rigtwin.diagnosis.compare import compare, compare_recordings, configuration_of
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
@@ -205,7 +205,7 @@ def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     record(path, "imposed", configuration, experiment.demands(configuration, 5), 5, effects=[text(name)])
     recording = load(path)
     nominal = Replays(recording, configuration_of(recording))
-    known = Replays(recording, configuration_of(recording, applied(Configuration(), [text(name)])))
+    known = Replays(recording, configuration_of(recording, apply_effects(Configuration(), [text(name)])))
     if name not in LEFT_OVER:
         for component in COMPONENTS:
             left = ratio(known, component)

@@ -12,15 +12,15 @@ from rigtwin.models.predictor import Motion
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.components import RigPlant, find
-from rigtwin.description.configuration import Configuration, overridden, without
+from rigtwin.description.configuration import Configuration, override, without_effect
 from rigtwin.diagnosis.controller import ControllerReplay
-from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
+from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
 from rigtwin.diagnosis.diagnose import Outcome
 from rigtwin.diagnosis.fit import Fitter
 from rigtwin.diagnosis.localisation import region
-from rigtwin.diagnosis.next_test import proposed
-from rigtwin.diagnosis.sampling import outstanding
-from rigtwin.diagnosis.unknown_input import located
+from rigtwin.diagnosis.next_test import propose_test
+from rigtwin.diagnosis.sampling import find_outstanding
+from rigtwin.diagnosis.unknown_input import locate_disturbance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from tests.helpers.recordings import SHIPPED, beside, shipped
@@ -85,7 +85,7 @@ def test_a_known_effect_is_named_in_twenty_seconds(name):
 
 
 def test_a_friction_taken_out_of_the_twin_is_found():
-    base = without(Configuration(), "coulomb@rail")
+    base = without_effect(Configuration(), "coulomb@rail")
     assert base.plant.rail.coulomb == 0.0
     outcome = answer(recorded("imposed", seconds=4.0), base=base)
     assert names(outcome) == {"coulomb@rail"}
@@ -96,9 +96,9 @@ def test_a_friction_taken_out_of_the_twin_is_found():
 
 def test_what_is_not_there_cannot_be_taken_out():
     with pytest.raises(RigtwinError, match=r"none to take out; it has coulomb@rail, coulomb@motor"):
-        without(Configuration(), "viscous@rail")
+        without_effect(Configuration(), "viscous@rail")
     with pytest.raises(RigtwinError, match="unknown effect"):
-        without(Configuration(), "nonsense@rail")
+        without_effect(Configuration(), "nonsense@rail")
 
 
 @SLOW
@@ -146,7 +146,7 @@ def test_a_correction_that_worsens_held_out_data_is_rejected():
 def test_a_free_disturbance_finds_the_component_without_the_library(effect):
     evidence = evidence_of(recorded("imposed", (effect,)))
     name = effect.partition("=")[0].partition("@")[2]
-    assert located(evidence, evidence.plant)[0].component == name
+    assert locate_disturbance(evidence, evidence.plant)[0].component == name
 
 
 SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}
@@ -157,7 +157,7 @@ def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     recording = recorded("road1.6", (f"setting@controller={name}:{value}",), 3.0)
     told = EXPERIMENTS["road1.6"].configuration.controller
     recording = replace(recording, controller={**recording.controller, name: getattr(told, name)})
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    settings = override(Configuration(), {"controller": recording.controller}).controller
     deviation = ControllerReplay(recording, settings).deviation()
     assert deviation is not None
     assert (deviation.kind, deviation.name) == ("setting", name)
@@ -166,7 +166,7 @@ def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
 
 def test_missed_ticks_are_counted():
     recording = recorded("imposed", ("missed_ticks@controller=0.04",))
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    settings = override(Configuration(), {"controller": recording.controller}).controller
     deviation = ControllerReplay(recording, settings).deviation()
     assert deviation is not None
     assert deviation.kind == "missed_ticks"
@@ -175,7 +175,7 @@ def test_missed_ticks_are_counted():
 
 def test_a_controller_as_told_has_no_deviation():
     recording = recorded("imposed")
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    settings = override(Configuration(), {"controller": recording.controller}).controller
     assert ControllerReplay(recording, settings).deviation() is None
 
 
@@ -185,7 +185,7 @@ def test_a_controller_as_told_has_no_deviation():
 )
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
-    (found,) = outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predicted(RigPlant())], RigPlant())
+    (found,) = find_outstanding(evidence.names, evidence.recordings, [list(rows) for rows in evidence.predict(RigPlant())], RigPlant())
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)
 
@@ -225,7 +225,7 @@ def test_the_gate_keeps_what_helps_and_drops_what_harms():
         left = 5.0 - 3.0 * (good in kept) + 1.0 * (bad in kept)
         return Blocks(np.full(4, 5.0), np.full(4, left))
 
-    assert gated((good, bad), across) == ((good,), (bad,))
+    assert reject_worsening((good, bad), across) == ((good,), (bad,))
 
 
 def test_halves_share_every_tick_out():
@@ -251,9 +251,9 @@ def test_regions_are_told_apart():
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",)))
     fitter = Fitter(evidence)
-    fits = [fitter.single(find("delay@motor")), fitter.single(find("lag@motor"))]
+    fits = [fitter.fit_one(find("delay@motor")), fitter.fit_one(find("lag@motor"))]
     tests = [(e.name, e.configuration, e.demands) for e in EXPERIMENTS.values() if e.name in ("imposed-fast", "drop")]
-    found = proposed(RIG, fits, tests)
+    found = propose_test(RIG, fits, tests)
     assert found is not None
     assert found.experiment == "imposed-fast"
     assert found.command.startswith("rigtwin run imposed-fast")

@@ -14,15 +14,15 @@ from rigtwin.cli import main
 from rigtwin.components import RigPlant
 from rigtwin.components import find as effect_of
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.document import examined, load
+from rigtwin.description.document import examine, load
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.fit import possible
+from rigtwin.diagnosis.fit import is_possible
 from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_machine_has_no_mistakes(name):
-    machine, mistakes = examined(shipped()[name])
+    machine, mistakes = examine(shipped()[name])
     assert mistakes == []
     assert machine is not None
     assert machine.name == name
@@ -91,8 +91,8 @@ def test_every_effect_of_a_machine_can_be_searched_for(name):
 def test_what_acts_through_friction_needs_some():
     machine = find("damper-bench")
     play, dry = (effect_of(name, machine.plant) for name in ("backlash@damper", "coulomb@damper"))
-    assert not possible((play,), machine.plant)
-    assert possible((play, dry), machine.plant)
+    assert not is_possible((play,), machine.plant)
+    assert is_possible((play, dry), machine.plant)
 
 
 MISTAKES = [
@@ -145,7 +145,7 @@ def test_a_mistake_is_one_line(tmp_path: Path, capsys, old: str, new: str, said:
     path = tmp_path / "bench.toml"
     assert old in TOML
     path.write_text(TOML.replace(old, new, 1))
-    machine, mistakes = examined(path)
+    machine, mistakes = examine(path)
     assert machine is None
     assert any(said in mistake for mistake in mistakes), mistakes
     assert all("\n" not in mistake for mistake in mistakes)

@@ -13,7 +13,7 @@ from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, sliding
+from rigtwin.models.quarter_car import Disturbances, Reduced, motor_friction, solve_velocity
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin
@@ -38,7 +38,7 @@ def both(configuration: Configuration, name: str = "imposed") -> tuple[np.ndarra
     commands = np.concatenate([block.commands for block in blocks])
     measured = np.concatenate([block.measurements for block in blocks]).T
     ground, structure, _, voltage = commands.T
-    return measured, Reduced(ground, structure, voltage, free, 8).sensed(free.plant)
+    return measured, Reduced(ground, structure, voltage, free, 8).predict(free.plant)
 
 
 def apart(configuration: Configuration, name: str = "imposed") -> tuple[float, float]:
@@ -91,7 +91,7 @@ def test_every_effect_does_the_same_to_both(effect, swing):
 @pytest.mark.parametrize("plate", [-0.7, 0.0, 0.7])
 def test_the_inclusion_is_solved_exactly(rhs, plate):
     rail, motor, inertia = (0.3, 0.2), (0.1, 0.4), 1.5
-    velocity = sliding(rhs, inertia, rail, motor, plate)
+    velocity = solve_velocity(rhs, inertia, rail, motor, plate)
     dry = motor_friction(rhs, inertia, rail, motor, plate, velocity)
     assert -motor[1] <= dry <= motor[0]
     # What is left is the rail's, which must lie within its bounds, and at one of them while it slides.
@@ -109,9 +109,9 @@ def test_a_disturbance_acts_where_it_enters():
     reduced = reduced_of(recording)
     nothing = np.zeros(recording.ticks)
     shift = np.full(recording.ticks, 1e-3)
-    before = reduced.true(plant)
-    assert np.array_equal(reduced.true(plant, Disturbances(nothing, nothing, nothing, nothing)), before)
-    moved = reduced.true(plant, Disturbances(nothing, shift, nothing, nothing))
+    before = reduced.predict_true(plant)
+    assert np.array_equal(reduced.predict_true(plant, Disturbances(nothing, nothing, nothing, nothing)), before)
+    moved = reduced.predict_true(plant, Disturbances(nothing, shift, nothing, nothing))
     assert np.allclose(moved[1] - before[1], 1e-3)
     assert np.array_equal(moved[0], before[0])
 
@@ -119,6 +119,6 @@ def test_a_disturbance_acts_where_it_enters():
 def test_a_finer_step_changes_little():
     recording = recorded("imposed", seconds=SECONDS)
     reduced = reduced_of(recording)
-    change = np.abs(reduced.sensed(RigPlant()) - reduced.finer().sensed(RigPlant()))
+    change = np.abs(reduced.predict(RigPlant()) - reduced.double_steps().predict(RigPlant()))
     assert np.max(change[:3]) < 6e-5
     assert float(np.median(change[3])) < 0.3

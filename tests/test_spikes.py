@@ -15,7 +15,7 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.runner import record
-from rigtwin.studies.friction_spikes import BOUNDS, find_compensator, filter_lag, reversals
+from rigtwin.studies.friction_spikes import BOUNDS, filter_lag, find_compensator, reversals
 
 
 @pytest.fixture(scope="module")

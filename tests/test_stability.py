@@ -10,10 +10,10 @@ import numba
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from rigtwin.cli.stability_commands import arguments, stability
 from scipy.linalg import expm
 
 from experiments.vehicles import VEHICLES
-from rigtwin.cli.stability_commands import arguments, stability
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.stability.critical import critical_delay, critical_lag
 from rigtwin.studies.stability.delayed import rightmost_delay_root

@@ -77,18 +77,18 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
     )
 
 
-def holding(conditioning: Actuator, command: float) -> ActuatorState:
+def hold(conditioning: Actuator, command: float) -> ActuatorState:
     """The state in which `command` has been held for long."""
     state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
     if conditioning.zero_centred:
         state.memory[1] = 0.0
-    output = limited(conditioning, state, command)
+    output = limit(conditioning, state, command)
     state.memory[2] = state.memory[3] = output
     return state
 
 
 @compilable
-def limited(conditioning: Actuator, state: ActuatorState, command: float) -> float:
+def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float:
     """Deadband, gain and saturation."""
     band = conditioning.deadband
     if conditioning.zero_centred:
@@ -101,12 +101,12 @@ def limited(conditioning: Actuator, state: ActuatorState, command: float) -> flo
 
 
 @compilable
-def conditioned(conditioning: Actuator, state: ActuatorState, command: float) -> float:
+def condition(conditioning: Actuator, state: ActuatorState, command: float) -> float:
     """What acts over the coming timestep. Advances the state by one timestep."""
     if conditioning.neutral:
         state.memory[3] = command
         return command
-    wanted = limited(
+    wanted = limit(
         conditioning, state, delayed(state.history, state.memory, conditioning.delay, command)
     )
     before = state.memory[2]

@@ -58,7 +58,7 @@ class CylinderState(NamedTuple):
     position: Array
 
 
-def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
+def state_space(cylinder: Cylinder) -> tuple[Array, Array, Array]:
     """Controllable form (A, B, C) of H(s)/H(0); shapes (4, 4), (4,), (4,)."""
     a = np.diag(np.ones(3), 1)
     a[3] = [-cylinder.a0, -cylinder.a1, -cylinder.a2, -cylinder.a3]
@@ -68,12 +68,12 @@ def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
+def discretise(cylinder: Cylinder, timestep: float) -> CylinderModel:
     """The cylinder sampled at `timestep` (s) with its command held; not to be changed.
 
     Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down rigs that run beside.
     """
-    a, b, c = continuous(cylinder)
+    a, b, c = state_space(cylinder)
     both = np.zeros((5, 5))
     both[:4, :4], both[:4, 4] = a, b
     step = expm(both * timestep)
@@ -83,7 +83,7 @@ def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
     )
 
 
-def settled(cylinder: Cylinder, position: float) -> CylinderState:
+def rest_state(cylinder: Cylinder, position: float) -> CylinderState:
     """At rest at `position` (m) under a command of that value."""
     return CylinderState(np.array([position / cylinder.a0, 0.0, 0.0, 0.0]), np.array([position]))
 

@@ -66,7 +66,7 @@ def equilibrium(spring: GasSpring, load: float) -> float:
     return spring.length * (1.0 - (spring.force / load) ** (1.0 / spring.exponent))
 
 
-def designed(extended: float, compressed: float, stroke: float, exponent: float) -> GasSpring:
+def design(extended: float, compressed: float, stroke: float, exponent: float) -> GasSpring:
     """The spring of those forces, N, fully extended and compressed by the stroke, m."""
     _positive(
         ("force fully extended", extended, "N"), ("stroke", stroke, "m"), ("exponent", exponent, "")
@@ -79,7 +79,7 @@ def designed(extended: float, compressed: float, stroke: float, exponent: float)
     return GasSpring(extended, stroke * ratio / (ratio - 1.0), exponent)
 
 
-def charged(spring: GasSpring, area: float, stroke: float) -> Charge:
+def find_charge(spring: GasSpring, area: float, stroke: float) -> Charge:
     """The charge that makes a cylinder of that area, m², and stroke, m, this spring: pressure F/A, gas volume A L."""
     _positive(("area", area, "m²"), ("stroke", stroke, "m"))
     if stroke >= spring.length:

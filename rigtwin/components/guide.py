@@ -152,17 +152,17 @@ def breakaway(
 
 
 @compilable
-def stretched(apart: float, half: float) -> float:
+def stretch(apart: float, half: float) -> float:
     """How far the spring behind a play of 2·half is stretched."""
     return apart - half if apart > half else (apart + half if apart < -half else 0.0)
 
 
 @compilable
-def slid(
+def slide(
     apart: float, half: float, spring: float, forward: float, backward: float
 ) -> tuple[float, float]:
     """(dry friction, how far the slider slid) for a distance between the joint and its slider."""
-    force = spring * stretched(apart, half)
+    force = spring * stretch(apart, half)
     if force > forward:
         return forward, apart - half - forward / spring
     if force < -backward:
@@ -178,7 +178,7 @@ def damping(guide: Guide, velocity: float) -> float:
 
 
 @compilable
-def resting(guide: Guide, position: float, rest: float) -> float:
+def position_force(guide: Guide, position: float, rest: float) -> float:
     """The forces that depend on the position alone."""
     force = guide.stiffness * (position - rest) + guide.offset
     if guide.cogging != 0.0:

@@ -112,13 +112,13 @@ def transducer(sensor: Sensor, period: float) -> Transducer:
     return Transducer(neutral, sensor.gain, sensor.offset, sensor.delay / period, share)
 
 
-def fresh(sensor: Transducer) -> TransducerState:
+def start_transducer(sensor: Transducer) -> TransducerState:
     """Before the first sample."""
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0]))
 
 
 @compilable
-def transduced(sensor: Transducer, state: TransducerState, value: float) -> float:
+def transduce(sensor: Transducer, state: TransducerState, value: float) -> float:
     """The sensor's output at this tick. Before the first tick the quantity was what it is then."""
     if sensor.neutral:
         return value
@@ -131,21 +131,21 @@ def transduced(sensor: Transducer, state: TransducerState, value: float) -> floa
 
 
 @kernel
-def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
+def _transduce_all(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
     for tick in range(len(true)):
-        out[tick] = transduced(sensor, state, true[tick])
+        out[tick] = transduce(sensor, state, true[tick])
 
 
-def seen(sensor: Sensor, true: Array, period: float) -> Array:
+def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
     """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
     model, out = transducer(sensor, period), np.empty(len(true))
     if model.neutral:
         return true.copy()
-    _seen(model, fresh(model), np.ascontiguousarray(true), out)
+    _transduce_all(model, start_transducer(model), np.ascontiguousarray(true), out)
     return out
 
 
-def unseen(sensor: Sensor, signal: Array, period: float) -> Array:
+def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
     """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
 
     The lag's inverse is limited to 80 Hz, or it would make much of the noise.

@@ -107,7 +107,7 @@ class Components:
             return
         joint = mechanism.joint_of(element, mjcf)
         self.types[name] = kind
-        self.values[name] = self._filled(name, where, kind, table, element, mjcf, joint)
+        self.values[name] = self._fill(name, where, kind, table, element, mjcf, joint)
         turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
@@ -173,7 +173,7 @@ class Components:
                 )
         return frozenset(wanted)
 
-    def _filled(
+    def _fill(
         self,
         name: str,
         where: str,

@@ -173,7 +173,7 @@ def groups(configuration: Configuration) -> dict[str, Any]:
     return {**configuration.plant._asdict(), **rest}
 
 
-def flattened(configuration: Configuration) -> dict[str, dict[str, float | str]]:
+def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
     """Group → name → number or label, as TOML and recordings hold it."""
     return {
         name: {
@@ -191,7 +191,7 @@ def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantit
             yield f"{name}.{key}", getattr(group, key), meaning
 
 
-def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
+def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
     """The value, if it is allowed. Raises RigtwinError naming the key and what is allowed."""
     if not isinstance(meaning, Quantity):
         try:
@@ -214,7 +214,7 @@ def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float 
     return number
 
 
-def overridden(
+def override(
     configuration: Configuration, changes: Mapping[str, Mapping[str, object]]
 ) -> Configuration:
     """The configuration with `changes` (group → name → value) applied. Raises RigtwinError for any key or value not allowed."""
@@ -236,7 +236,7 @@ def overridden(
                 raise RigtwinError(
                     f"unknown setting {group_name}.{key}; {group_name} has {', '.join(meanings)}"
                 )
-            group = group._replace(**{key: checked(f"{group_name}.{key}", value, meanings[key])})
+            group = group._replace(**{key: check_value(f"{group_name}.{key}", value, meanings[key])})
         if group_name in plant._fields:
             plant = plant._replace(**{group_name: group})
         else:
@@ -256,7 +256,7 @@ def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Appl
         raise RigtwinError(f"{path}: {error}") from None
 
 
-def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
+def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
     """group → name → value of each `group.name=value` text, as `--set` takes them. Raises RigtwinError for any other."""
     for text in assignments:
         key, equals, value = text.partition("=")
@@ -268,7 +268,7 @@ def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
 
 def from_toml(configuration: Configuration, path: Path) -> Configuration:
     """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
-    return read_toml(path, lambda tables: overridden(configuration, values_of(tables)))
+    return read_toml(path, lambda tables: override(configuration, values_of(tables)))
 
 
 def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -278,8 +278,8 @@ def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
     """The configuration with `group.name=value` texts applied."""
-    for changes in assigned(assignments):
-        configuration = overridden(configuration, changes)
+    for changes in parse_assignments(assignments):
+        configuration = override(configuration, changes)
     return configuration
 
 
@@ -294,44 +294,44 @@ def with_changes(
     if isinstance(changes, str | Path):
         return from_toml(configuration, Path(changes))
     if isinstance(changes, Mapping):
-        return overridden(configuration, changes)
+        return override(configuration, changes)
     for each in changes:
         configuration = with_changes(configuration, each)
     return configuration
 
 
-def at_effect(
+def with_effect(
     configuration: Configuration, effect: Effect, values: Mapping[str, float]
 ) -> Configuration:
     """The configuration with an effect. Raises RigtwinError for a value out of bounds."""
-    return overridden(configuration, {effect.group: values})
+    return override(configuration, {effect.group: values})
 
 
-def without(configuration: Configuration, name: str) -> Configuration:
+def without_effect(configuration: Configuration, name: str) -> Configuration:
     """The configuration with an effect of the nominal machine taken out, such as `coulomb@rail`: its magnitude set to 0.
 
     Raises RigtwinError if the machine has none of it to take out.
     """
     effect = find(name, configuration.plant)
-    if not _removable(effect, configuration.plant):
+    if not _is_removable(effect, configuration.plant):
         there = [
             each.name
             for each in candidates(configuration.plant)
-            if _removable(each, configuration.plant)
+            if _is_removable(each, configuration.plant)
         ]
         raise RigtwinError(
             f"--without {name}: the twin has none to take out; it has {', '.join(there) or 'none'}"
         )
-    return at_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
+    return with_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
 
 
-def _removable(effect: Effect, plant: Plant) -> bool:
+def _is_removable(effect: Effect, plant: Plant) -> bool:
     parameter, quantity = next(iter(effect.quantities().items()))
     there = effect.nominal(plant)[parameter]
     return effect.searched and there not in (0.0, quantity.high) and quantity.low <= 0.0
 
 
-def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration:
+def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configuration:
     """The configuration with effects as `--effect` takes them: `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or
     `setting@controller=kp:0.5` for a setting that is not what the recording will say.
 
@@ -345,7 +345,7 @@ def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration
             )
         if name == "setting@controller":
             key, _, value = values.partition(":")
-            configuration = overridden(configuration, {"controller": {key: value}})
+            configuration = override(configuration, {"controller": {key: value}})
             continue
         effect = find(name, configuration.plant)
         first, *more = values.split(",")
@@ -357,11 +357,11 @@ def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration
                     f"--effect {text}: {effect.name} has {', '.join(effect.kind.parameters)}, not {key!r}"
                 )
             changes[key] = value
-        configuration = overridden(configuration, {effect.group: changes})
+        configuration = override(configuration, {effect.group: changes})
     return configuration
 
 
-def rebased(configuration: Configuration, base: Configuration) -> Configuration:
+def rebase(configuration: Configuration, base: Configuration) -> Configuration:
     """What a configuration changes of the nominal suspension rig, on top of another base of the same settings."""
     changes: dict[str, dict[str, object]] = {}
     for (key, value, _), (_, nominal, _) in zip(
@@ -372,4 +372,4 @@ def rebased(configuration: Configuration, base: Configuration) -> Configuration:
             changes.setdefault(group, {})[name] = (
                 value.label if isinstance(value, Choice) else value
             )
-    return overridden(base, changes)
+    return override(base, changes)

@@ -27,7 +27,7 @@ NOMINAL = ("known", "rough")
 
 def load(path: Path) -> Machine:
     """The machine of a description. Raises RigtwinError with the first mistake in it."""
-    machine, mistakes = examined(path)
+    machine, mistakes = examine(path)
     if mistakes or machine is None:
         more = (
             f" (and {len(mistakes) - 1} more; rigtwin machine check {path})"
@@ -38,7 +38,7 @@ def load(path: Path) -> Machine:
     return machine
 
 
-def examined(path: Path) -> tuple[Machine | None, list[str]]:
+def examine(path: Path) -> tuple[Machine | None, list[str]]:
     """The machine of a description, and all mistakes in it, one line each; no machine if there are any."""
     mistakes = Mistakes()
     try:
@@ -92,7 +92,7 @@ class _Reader:
             components.add(each, table)
         control = self._control(components)
         reader = Replays(mechanism, components, control, self._mistakes)
-        replays = reader.all(self._document.get("replays", []))
+        replays = reader.read(self._document.get("replays", []))
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
         experiments = self._experiments()

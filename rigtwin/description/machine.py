@@ -11,7 +11,7 @@ from typing import Any
 
 from rigtwin.components import Effect, candidates
 from rigtwin.components.quantity import Quantity
-from rigtwin.description.configuration import Configuration, Nothing, overridden
+from rigtwin.description.configuration import Configuration, Nothing, override
 from rigtwin.description.control import Control
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
@@ -150,7 +150,7 @@ class Machine:
             if setting in given and getattr(start.plant, group) == getattr(self.plant, group):
                 changes.setdefault(group, {})[name] = given[setting]
         try:
-            return overridden(start, changes)
+            return override(start, changes)
         except RigtwinError as error:
             raise RigtwinError(f"{recording.path}: {error}") from None
 

@@ -18,7 +18,7 @@ from rigtwin.description.configuration import (
     POSTERIOR,
     Configuration,
     groups,
-    overridden,
+    override,
     read_toml,
     values_of,
 )
@@ -52,15 +52,15 @@ class Posterior:
 
     def at_best(self, configuration: Configuration) -> Configuration:
         """The corrected twin."""
-        return overridden(configuration, self.changes)
+        return override(configuration, self.changes)
 
-    def drawn(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
+    def draw(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
         """A twin as it may be: each value found normal about what was found, either side as wide as its interval, cut off at
         its bounds."""
         configuration = self.at_best(configuration)
         for key, (low, high) in self.intervals.items():
             there, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
-            configuration = shifted_within(
+            configuration = shift_within(
                 configuration, key, amount * (high - there if amount > 0.0 else there - low)
             )
         return configuration
@@ -72,16 +72,16 @@ def value_of(configuration: Configuration, key: str) -> float:
     return float(getattr(groups(configuration)[group], name))
 
 
-def shifted_within(configuration: Configuration, key: str, amount: float) -> Configuration:
+def shift_within(configuration: Configuration, key: str, amount: float) -> Configuration:
     """The configuration with a number `group.name` higher by an amount, or at the bound next to that."""
     group, _, name = key.partition(".")
     meaning = fields(type(groups(configuration)[group]))[name]
     assert isinstance(meaning, Quantity)
     value = value_of(configuration, key) + amount
-    return overridden(configuration, {group: {name: min(max(value, meaning.low), meaning.high)}})
+    return override(configuration, {group: {name: min(max(value, meaning.low), meaning.high)}})
 
 
-def written(posterior: Posterior) -> list[str]:
+def format_toml(posterior: Posterior) -> list[str]:
     """The table's lines in TOML. Full precision, so that a twin read again is the same to the bit."""
     lines = [
         f"[{POSTERIOR}]",
@@ -110,10 +110,10 @@ def load_posterior(path: Path) -> Posterior:
 
     Raises RigtwinError naming file and fault.
     """
-    return read_toml(path, _parsed)
+    return read_toml(path, _parse)
 
 
-def _parsed(tables: Mapping[str, Any]) -> Posterior:
+def _parse(tables: Mapping[str, Any]) -> Posterior:
     changes = values_of(tables)
     configuration = _of_rig("it", changes)
     table = tables.get(POSTERIOR, {})
@@ -143,7 +143,7 @@ def _parsed(tables: Mapping[str, Any]) -> Posterior:
 
 def _of_rig(where: str, changes: Changes) -> Configuration:
     """The nominal rig with changes, which must be of its components alone."""
-    configuration = overridden(Configuration(), changes)
+    configuration = override(Configuration(), changes)
     for group in changes:
         if group not in configuration.plant._fields:
             raise RigtwinError(

@@ -34,7 +34,7 @@ class Replays:
             mistakes,
         )
 
-    def all(self, given: object) -> tuple[ReplayOf, ...]:
+    def read(self, given: object) -> tuple[ReplayOf, ...]:
         if (
             not isinstance(given, list)
             or not given
@@ -81,7 +81,7 @@ class Replays:
                 )
         rows = [
             row
-            for name in self._observed(where, table)
+            for name in self._read_observed(where, table)
             if (row := self._row(where, name, movers)) is not None
         ]
         if len(self._mistakes) > before:
@@ -156,7 +156,7 @@ class Replays:
         control, channel = self._control, self._components.found[mover].channel
         return isinstance(control, FormulaControl) and channel == ("/command", control.output)
 
-    def _observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
+    def _read_observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
         observed = table.get("observe", [])
         if (
             not isinstance(observed, list)

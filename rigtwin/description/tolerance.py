@@ -30,7 +30,7 @@ class Tolerance:
             else 1.0
         )
 
-    def shifted(self, plant: Any, amount: float) -> Any:
+    def shift(self, plant: Any, amount: float) -> Any:
         """The plant with this parameter higher by that much, in its unit."""
         group = getattr(plant, self.group)
         value = float(getattr(group, self.parameter)) + amount

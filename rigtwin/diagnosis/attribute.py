@@ -15,8 +15,16 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values, without_each
-from rigtwin.diagnosis.stepwise import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
+from rigtwin.diagnosis.fit import Fit, Fitter, Proposal, with_values, without_each
+from rigtwin.diagnosis.stepwise import (
+    NEAR,
+    SECOND,
+    Growth,
+    drop_needless,
+    fit_stepwise,
+    penalised_cost,
+    within_tolerance,
+)
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""
@@ -107,12 +115,12 @@ def attribute(
     evidence: Evidence, progress: Callable[[int], object] = lambda _: None
 ) -> Attribution:
     """Searches the whole library. progress is called with the number of fits done since its last call."""
-    least, rules = detectable(evidence), ROUGH if evidence.machine.rough else KNOWN
-    search, fitter = Fitter(evidence.coarser()), Fitter(evidence)
+    least, rules = detection_limit(evidence), ROUGH if evidence.machine.rough else KNOWN
+    search, fitter = Fitter(evidence.halve_steps()), Fitter(evidence)
     effects = library(evidence)
     with ThreadPoolExecutor(THREADS) as pool:
 
-        def mapped(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
+        def map_fits(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
             results = []
             try:
                 for fit in pool.map(function, items):
@@ -124,8 +132,8 @@ def attribute(
                 raise
             return results
 
-        singles = mapped(search.single, effects)
-        singles.sort(key=priced)
+        singles = map_fits(search.fit_one, effects)
+        singles.sort(key=penalised_cost)
         # Those far behind stay there, however the tolerances are taken.
         near = (
             singles[0].misfit
@@ -133,70 +141,70 @@ def attribute(
             + 2.0 * least
         )
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        tried = mapped(fitter.settled, close) + singles[len(close) :]
-        tried.sort(key=priced)
+        tried = map_fits(fitter.refit_with_tolerances, close) + singles[len(close) :]
+        tried.sort(key=penalised_cost)
         first = tried[0]
-        nothing = fitter.settled(fitter.nothing)
-        if nothing.misfit - priced(first) > least:
-            much = _left(first.misfit, evidence) > MUCH * evidence.expected
-            hopes: list[Hope] = []
+        nothing = fitter.refit_with_tolerances(fitter.nothing)
+        if nothing.misfit - penalised_cost(first) > least:
+            much = _excess(first.misfit, evidence) > MUCH * evidence.expected
+            hopes: list[Proposal] = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
                 if leader.misfit - first.misfit <= FAR_BEHIND * max(
                     nothing.misfit - first.misfit, 0.0
                 ):
-                    hopes += search.seconds(leader, effects, least)
+                    hopes += search.propose_additions(leader, effects, least)
             hopes.sort(key=lambda hope: hope.promised)
-            hopeful = _once(hopes)[: MANY if much else FEW]
-            pairs = mapped(
-                lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful
+            hopeful = _distinct(hopes)[: MANY if much else FEW]
+            pairs = map_fits(
+                lambda hope: search.refine(hope.effects, hope.values, hope.space), hopeful
             )
-            pairs.sort(key=priced)
+            pairs.sort(key=penalised_cost)
             for _ in range(LOOKED_AGAIN if pairs else 0):
                 known = {frozenset(pair.effects) for pair in pairs}
                 fresh = [
                     pair
-                    for pair in search.alike(pairs[0], effects)
+                    for pair in search.propose_replacements(pairs[0], effects)
                     if frozenset(pair[0]) not in known
                 ]
-                pairs += mapped(lambda pair: search.refined(*pair), fresh)
-                pairs.sort(key=priced)
-            pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
-            least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
+                pairs += map_fits(lambda pair: search.refine(*pair), fresh)
+                pairs.sort(key=penalised_cost)
+            pairs = map_fits(fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
+            least_more = max(SECOND * least, rules.more * _excess(first.misfit, evidence))
             tried += [
                 p
                 for p in pairs
                 if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)
             ]
-        chain = [fit for fit in plain(tried, least) if fit.effects][:1]
+        chain = [fit for fit in drop_needless(tried, least) if fit.effects][:1]
         if rules.most > KNOWN.most:
-            more, chain = grown(
-                tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), mapped
+            more, chain = fit_stepwise(
+                tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), map_fits
             )
             tried += more
-    tried = plain(tried, least)
-    silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
-    return _judged(nothing, tried, evidence, silent, rules, chain)
+    tried = drop_needless(tried, least)
+    silent = tuple(effect for effect in effects if search.largest_response(effect) < DETECTED)
+    return _conclude(nothing, tried, evidence, silent, rules, chain)
 
 
-def _once(hopes: Sequence[Hope]) -> list[Hope]:
+def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
     """Each pair of effects once, however it was come by."""
-    found: dict[frozenset[str], Hope] = {}
+    found: dict[frozenset[str], Proposal] = {}
     for hope in hopes:
         found.setdefault(frozenset(effect.name for effect in hope.effects), hope)
     return list(found.values())
 
 
-def _left(misfit: float, evidence: Evidence) -> float:
+def _excess(misfit: float, evidence: Evidence) -> float:
     return max(misfit - evidence.expected, 0.0)
 
 
-def detectable(evidence: Evidence) -> float:
+def detection_limit(evidence: Evidence) -> float:
     """χ² that an effect must explain to be a finding on this evidence."""
     return max(DETECTED, NOTICEABLE * evidence.expected)
 
 
-def _judged(
+def _conclude(
     nothing: Fit,
     tried: list[Fit],
     evidence: Evidence,
@@ -205,22 +213,22 @@ def _judged(
     chain: Sequence[Fit],
 ) -> Attribution:
     gap = max(nothing.misfit - evidence.expected, 0.0)
-    pool = sorted([*tried, nothing], key=priced)
+    pool = sorted([*tried, nothing], key=penalised_cost)
     best = pool[0]
-    expected = evidence.expected_at(best.plant)
+    expected = evidence.expected_misfit(best.plant)
     temper = TEMPER + FORM_TEMPER * max(best.misfit - expected, 0.0)
-    apart = np.array([(priced(fit) - priced(best)) / (2.0 * temper) for fit in pool])
+    apart = np.array([(penalised_cost(fit) - penalised_cost(best)) / (2.0 * temper) for fit in pool])
     if evidence.machine.rough:
         # What is left is no noise but the model's error: as many pieces of it as are independent speak for one against another.
-        relative = np.array([(priced(fit) + expected) / (priced(best) + expected) for fit in pool])
-        apart = 0.5 * _independent(evidence, best.plant) * np.log(relative)
+        relative = np.array([(penalised_cost(fit) + expected) / (penalised_cost(best) + expected) for fit in pool])
+        apart = 0.5 * _count_independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
     ranking = tuple(
-        Explanation(fit, priced(fit), float(weight))
+        Explanation(fit, penalised_cost(fit), float(weight))
         for fit, weight in zip(pool, weights, strict=True)
     )
-    found = nothing.misfit - priced(best) > detectable(evidence) and bool(best.effects)
+    found = nothing.misfit - penalised_cost(best) > detection_limit(evidence) and bool(best.effects)
     if found and len(best.effects) == 1 and within_tolerance(best, evidence):
         found = False
     left = max(best.misfit - expected, 0.0) / expected
@@ -246,7 +254,7 @@ def _judged(
     )
 
 
-def _independent(evidence: Evidence, plant: Plant) -> float:
+def _count_independent(evidence: Evidence, plant: Plant) -> float:
     """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
     imaginary parts."""
     total = square = 0.0

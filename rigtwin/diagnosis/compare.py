@@ -14,7 +14,7 @@ from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undet
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.residual import Residual, single
+from rigtwin.diagnosis.residual import Residual, compute_residual
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise, without_mains
@@ -83,9 +83,9 @@ def compare(
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
     """What each signal of the first recording has left, by its name."""
     lines, period = evidence.lines[0], evidence.recordings[0].period
-    difference = lines.measured - evidence.predicted(evidence.plant)[0]
+    difference = lines.measured - evidence.predict(evidence.plant)[0]
     return {
-        row.name: single(
+        row.name: compute_residual(
             difference[n][lines.fade[n] > 0.5], float(lines.noise[n]), row.unit, period
         )
         for n, row in enumerate(evidence.machine.rows)
@@ -146,7 +146,7 @@ def compare_recordings(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
             difference = without_mains(one - other, first.period, machine.plant.mains.frequency)
-            results[sensor.name] = single(
+            results[sensor.name] = compute_residual(
                 difference,
                 math.hypot(white_noise(one), white_noise(other)),
                 sensor.unit,

@@ -12,13 +12,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rigtwin.components import Carriage, Cylinder, GasSpring, Motor, Rail, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
-    sampled,
-    settled,
+    discretise,
+    rest_state,
 )
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
@@ -28,8 +28,8 @@ from rigtwin.simulation.plant import (
     Contacts,
     brace,
     contacts,
-    deflected,
     drive,
+    initial_deflection,
     motor_force,
     touch,
     true_measurements,
@@ -62,7 +62,7 @@ def _cylinder(
     for tick in range(len(commands)):
         out[tick] = state.position[0]
         for _ in range(substeps):
-            advance_cylinder(model, state, conditioned(conditioning, command, commands[tick]))
+            advance_cylinder(model, state, condition(conditioning, command, commands[tick]))
 
 
 def replay_cylinder(
@@ -76,9 +76,9 @@ def replay_cylinder(
     where that command holds it."""
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
-    command = holding(conditioning, start)
-    state = settled(cylinder, float(command.memory[3]) if position is None else position)
-    model = sampled(cylinder, timestep)
+    command = hold(conditioning, start)
+    state = rest_state(cylinder, float(command.memory[3]) if position is None else position)
+    model = discretise(cylinder, timestep)
     _cylinder(
         model,
         state,
@@ -113,7 +113,7 @@ def _mechanics(
         following = force[min(tick + 1, ticks - 1)]
         for substep in range(substeps):
             now = tick * substeps + substep
-            mechanics.control[0] = conditioned(motor_drive, motor_command, voltage[tick])
+            mechanics.control[0] = condition(motor_drive, motor_command, voltage[tick])
             drive(mechanics, mechanics.ground, ground[now], ground[now + 1])
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
@@ -137,7 +137,7 @@ def _mechanics(
             integrate(mechanics.model, mechanics.data)
 
 
-def _between(motion: Array, substeps: int) -> Array:
+def _interpolate(motion: Array, substeps: int) -> Array:
     """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity must not jump, or a motor
     that sticks would have to pass on the blow."""
     ticks = len(motion)
@@ -170,11 +170,11 @@ def _run(
         view,
         contacts(plant, wheel, float(structure[0]) - wheel),
         conditioning,
-        holding(conditioning, preload / plant.motor.constant),
+        hold(conditioning, preload / plant.motor.constant),
         substeps,
-        _between(ground, substeps),
-        _between(structure, substeps),
-        np.empty(0) if carriage is None else _between(carriage, substeps),
+        _interpolate(ground, substeps),
+        _interpolate(structure, substeps),
+        np.empty(0) if carriage is None else _interpolate(carriage, substeps),
         np.ascontiguousarray(voltage),
         np.ascontiguousarray(force),
         out.load_cell,
@@ -190,7 +190,7 @@ def replay_carriage(
     plant = configuration.plant
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
-    wheel = float(ground[0]) - deflected(plant, preload)
+    wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
 
 
@@ -199,7 +199,7 @@ def replay_mechanics(
 ) -> Output:
     """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
     plant = configuration.plant
-    wheel = float(ground[0]) - deflected(plant, preload)
+    wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
         plant,
         configuration,

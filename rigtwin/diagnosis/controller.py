@@ -94,13 +94,13 @@ class ControllerReplay:
         if left <= 1.0:
             return None
         return (
-            self._missed()
-            or self._late()
-            or self._setting(left)
+            self._find_missed_ticks()
+            or self._find_delay()
+            or self._find_setting(left)
             or Deviation("unknown", "", 0.0, 0.0, "1")
         )
 
-    def _missed(self) -> Deviation | None:
+    def _find_missed_ticks(self) -> Deviation | None:
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=1) == 0.0, axis=0)])
         if not 0 < repeated.sum() < REPEATED * len(repeated):
             return None
@@ -110,13 +110,13 @@ class ControllerReplay:
             return None
         return Deviation("missed_ticks", "missed_ticks", 0.0, float(repeated.mean()), "1")
 
-    def _late(self) -> Deviation | None:
+    def _find_delay(self) -> Deviation | None:
         for late in range(1, LATE + 1):
             if self.misfit(self.commands(self._settings, late=late)) <= 1.0:
                 return Deviation("delay", "delay", 0.0, late * self._period, "s")
         return None
 
-    def _setting(self, left: float) -> Deviation | None:
+    def _find_setting(self, left: float) -> Deviation | None:
         """The one setting that, at another value, reproduces the commands."""
         found: list[tuple[float, Deviation]] = []
         for name, meaning in fields(type(self._settings)).items():
@@ -128,7 +128,7 @@ class ControllerReplay:
                 return self.misfit(self.commands(self._settings._replace(**{name: value})))
 
             if isinstance(meaning, Quantity):
-                best, value = _least(misfit, told, meaning)
+                best, value = _minimise(misfit, told, meaning)
                 found.append((best, Deviation("setting", name, told, value, meaning.unit)))
             else:
                 best, value = min((misfit(choice), float(choice)) for choice in meaning)
@@ -141,7 +141,7 @@ class ControllerReplay:
         )[1]
 
 
-def _least(misfit: Callable[[float], float], told: float, meaning: Quantity) -> tuple[float, float]:
+def _minimise(misfit: Callable[[float], float], told: float, meaning: Quantity) -> tuple[float, float]:
     """Smallest misfit over one setting, and where: a coarse look around the told value, then a bounded search."""
     size = max(abs(told), 0.01 * min(meaning.high, 1.0))
     # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.

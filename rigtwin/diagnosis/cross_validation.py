@@ -40,7 +40,7 @@ class Blocks:
     before: Array
     after: Array
 
-    def joined(self, other: Blocks) -> Blocks:
+    def join(self, other: Blocks) -> Blocks:
         return Blocks(
             np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after])
         )
@@ -49,7 +49,7 @@ class Blocks:
 def power(evidence: Evidence, plant: Plant) -> list[Array]:
     """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
     found = []
-    for each, predicted in zip(evidence.lines, evidence.predicted(plant), strict=True):
+    for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
         relative = (each.measured - predicted) / each.noise[:, None]
         found.append(np.mean(relative**2, axis=0))
     return found
@@ -106,7 +106,7 @@ def interval(of: Blocks) -> Interval:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Validation:
     """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
     halves: the fits to each half of the recordings, where they were made."""
 
@@ -131,24 +131,24 @@ def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
     return first, second
 
 
-def _refitted(evidence: Evidence, fit: Fit) -> Fit:
-    return Fitter(evidence).refined(
+def _refit(evidence: Evidence, fit: Fit) -> Fit:
+    return Fitter(evidence).refine(
         fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects)
     )
 
 
-def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
+def _fit_halves(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
     """The halves of the recordings, and the fit made again to each."""
     parts = halves(evidence.recordings)
     return parts, [
-        _refitted(
+        _refit(
             Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit
         )
         for part in parts
     ]
 
 
-def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judged:
+def validate(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Validation:
     """Judges a fit on evidence held out of it; without any, on each half of the recordings after a fit to the other."""
     # Where much is left, an effect must help to stay.
     worse = BETTER if evidence.machine.rough else WORSE
@@ -163,23 +163,23 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
         whole = [np.ones(recording.ticks) for recording in other.recordings]
         data = f"{len(whole)} held-out recording{'s' if len(whole) > 1 else ''}"
 
-        def outside(plant: Plant) -> Blocks:
+        def blocks_of(plant: Plant) -> Blocks:
             return blocks(other, evidence.plant, plant, whole)
 
-        def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
-            return outside(with_effects(evidence.plant, fit, kept))
+        def blocks_with(kept: tuple[Effect, ...]) -> Blocks:
+            return blocks_of(with_effects(evidence.plant, fit, kept))
 
-        kept, rejected = gated(fit.effects, kept_outside, worse)
+        kept, rejected = reject_worsening(fit.effects, blocks_with, worse)
         if rejected and evidence.machine.rough:
             values = [
                 own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept
             ]
-            fit = Fitter(evidence).settled(Fitter(evidence).refined(kept, values))
-        apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
-        return Judged(
-            predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit
+            fit = Fitter(evidence).refit_with_tolerances(Fitter(evidence).refine(kept, values))
+        apart = _fit_halves(evidence, fit)[1] if evidence.machine.rough else []
+        return Validation(
+            predicted, interval(blocks_with(kept)), kept, rejected, data, tuple(apart), fit
         )
-    parts, fits = _halved(evidence, fit)
+    parts, fits = _fit_halves(evidence, fit)
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
         inside = blocks(evidence, evidence.plant, refitted.plant, own)
@@ -190,17 +190,17 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
         )
         outcomes.append((refitted, foreign))
 
-    def across(kept: tuple[Effect, ...]) -> Blocks:
+    def blocks_across(kept: tuple[Effect, ...]) -> Blocks:
         found = [
             blocks(evidence, evidence.plant, with_effects(evidence.plant, refitted, kept), part)
             for refitted, part in outcomes
         ]
-        return found[0].joined(found[1])
+        return found[0].join(found[1])
 
-    kept, rejected = gated(fit.effects, across, worse)
+    kept, rejected = reject_worsening(fit.effects, blocks_across, worse)
     data = "each half, fitted to the other"
-    return Judged(
-        float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits)
+    return Validation(
+        float(np.mean(predictions)), interval(blocks_across(kept)), kept, rejected, data, tuple(fits)
     )
 
 
@@ -214,7 +214,7 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
-def gated(
+def reject_worsening(
     effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE
 ) -> tuple[Effects, Effects]:
     """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some

@@ -48,7 +48,7 @@ UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
 
 
 @dataclass(frozen=True)
-class Alike:
+class SimilarityLimits:
     """How surely a signal goes with its prediction. sign: correlation below whose negative the sign is wrong; unit: above which
     a scale is judged; far: scale, either way, that is no gain whatever it is; close: how near a scale must be to a unit's."""
 
@@ -58,8 +58,8 @@ class Alike:
     close: float
 
 
-KNOWN = Alike(sign=0.7, unit=0.7, far=5.0, close=0.5)
-ROUGH = Alike(sign=0.8, unit=0.8, far=np.inf, close=0.15)
+KNOWN = SimilarityLimits(sign=0.7, unit=0.7, far=5.0, close=0.5)
+ROUGH = SimilarityLimits(sign=0.8, unit=0.8, far=np.inf, close=0.15)
 """Of a machine whose nominal values are only a start."""
 
 
@@ -92,12 +92,12 @@ def find_faults(
     -------
     Faults, the gravest first. Later checks are left out where earlier ones make them meaningless.
     """
-    found = [*_presence(machine, recording)]
+    found = [*_check_presence(machine, recording)]
     if not found:
-        found += _values(machine, recording)
+        found += _check_values(machine, recording)
     if not found:
-        predicted = model_of(machine, recording, configuration, STEPS).sensed(configuration.plant)
-        for stage in (_alive, _order, _scale):
+        predicted = model_of(machine, recording, configuration, STEPS).predict(configuration.plant)
+        for stage in (_check_alive, _check_order, _check_scale):
             found += stage(machine, recording, predicted)
             if any(fault.fatal for fault in found):
                 break
@@ -127,7 +127,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     return list(dict.fromkeys(found))
 
 
-def _presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
     if recording.machine != machine.name:
         yield Fault(
             "wrong machine",
@@ -152,7 +152,7 @@ def _presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
         yield Fault("too short", "recording", message)
 
 
-def _values(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
     steps = np.diff(recording.time)
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
@@ -179,11 +179,11 @@ def _values(machine: Machine, recording: Recording) -> Iterator[Fault]:
             )
 
 
-def _alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     still = {
         row.name
         for row, model in zip(machine.rows, predicted, strict=True)
-        if _rests(machine, row, model)
+        if _is_at_rest(machine, row, model)
     }
     for name, component in machine.components.items():
         if component.channel is None or not recording.has(*component.channel):
@@ -209,7 +209,7 @@ def _alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator
                 "dead", where, f"{where} does not change {since}: a dead or disconnected sensor"
             )
             continue
-        yield from _cut(where, signal)
+        yield from _check_clipping(where, signal)
 
 
 def _movers(machine: Machine) -> set[str]:
@@ -217,13 +217,13 @@ def _movers(machine: Machine) -> set[str]:
     return {name for replay in machine.replays if not replay.closed for name in replay.moved_by}
 
 
-def _rests(machine: Machine, row: Row, predicted: Array) -> bool:
+def _is_at_rest(machine: Machine, row: Row, predicted: Array) -> bool:
     """Whether a signal should not change: commands that stay put move nothing."""
     bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
     return float(np.ptp(predicted)) <= bit
 
 
-def _cut(where: str, signal: Array) -> Iterator[Fault]:
+def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:
     at_end = cut_off(signal)
     for end, extreme in (("above", signal.max()), ("below", signal.min())):
         share = 100 * float(np.mean(at_end & (signal == extreme)))
@@ -232,7 +232,7 @@ def _cut(where: str, signal: Array) -> Iterator[Fault]:
             yield Fault("clipped", where, message, fatal=False)
 
 
-def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Swapped channels: another order of the sensors of one unit fits far better."""
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
         rows = [
@@ -272,7 +272,7 @@ def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator
             yield Fault("swapped", "/sensor", f"channels of /sensor are swapped: {swapped}")
 
 
-def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Signs and units, by how a signal goes with what the nominal machine would show."""
     rule = ROUGH if machine.rough else KNOWN
     odd: dict[Row, float] = {}
@@ -294,7 +294,7 @@ def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator
             )
             if not 1 / rule.far < slope < rule.far or (machine.rough and near):
                 odd[row] = slope
-    for row, slope in _beyond_gain(machine, recording, odd).items():
+    for row, slope in _unexplained_scales(machine, recording, odd).items():
         known = UNITS.get(row.unit, ((1.0, ""),))
         factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
         as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < KNOWN.close and guess else ""
@@ -306,13 +306,13 @@ def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator
         )
 
 
-def _beyond_gain(
+def _unexplained_scales(
     machine: Machine, recording: Recording, odd: Mapping[Row, float]
 ) -> dict[Row, float]:
     """Odd scales less those that physics explains."""
     found = dict(odd)
     for row in odd:
-        if row.kind == "force" and _wound_up(machine, recording):
+        if row.kind == "force" and _is_wound_up(machine, recording):
             # A loop at its limit says that the force is not to be had; whose fault it is, is for the diagnosis.
             del found[row]
     for unit in {row.unit for row in odd}:
@@ -325,7 +325,7 @@ def _beyond_gain(
     return found
 
 
-def _wound_up(machine: Machine, recording: Recording) -> bool:
+def _is_wound_up(machine: Machine, recording: Recording) -> bool:
     """Whether a force actuator's command stands at its limit for long."""
     for name in _movers(machine):
         component = machine.components[name]

@@ -18,7 +18,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Judged, gap_level, judged, with_effects
+from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import (
@@ -29,18 +29,18 @@ from rigtwin.diagnosis.finding import (
     Name,
     NextTest,
     Place,
-    Unseen,
+    Unobservable,
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.leftover import leftovers, missed, steps
+from rigtwin.diagnosis.leftover import leftovers, power_without_each, steps
 from rigtwin.diagnosis.levels import compute_levels
-from rigtwin.diagnosis.localisation import placed
-from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.localisation import locate
+from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.sampling import Sampled, outstanding
+from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
 from rigtwin.diagnosis.text import sentence
-from rigtwin.diagnosis.unknown_input import Disturbed, located
+from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
@@ -63,7 +63,7 @@ SOMETHING = 0.03
 """Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
 
-def _unusable(
+def _answer_unusable(
     machine: Machine,
     recordings: Sequence[Recording],
     configurations: Sequence[Configuration],
@@ -128,7 +128,7 @@ def diagnose(
     started = time.perf_counter()
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        if (bad := _unusable(machine, recordings, configurations, started)) is not None:
+        if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
             return Diagnosis(bad, machine, None, configurations[0])
         others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
@@ -151,9 +151,9 @@ def _diagnose(
         if found.best is not None
         else Fit((), (), found.nothing.misfit, (), evidence.plant)
     )
-    notes = [*_notes(evidence.recordings), *_clipped(evidence)]
+    notes = [*_notes(evidence.recordings), *_clipping_notes(evidence)]
     progress("judging on held-out data", 1)
-    verdict_of_data = judged(evidence, best, held_out)
+    verdict_of_data = validate(evidence, best, held_out)
     if verdict_of_data.fit is not None:
         best = verdict_of_data.fit
     if verdict_of_data.rejected:
@@ -161,7 +161,7 @@ def _diagnose(
         notes.append(f"{names} rejected: held-out data became worse with it")
     plant = with_effects(evidence.plant, best, verdict_of_data.kept)
     progress("looking where", 1)
-    disturbed = located(evidence, plant, verdict_of_data.kept, follow=found.unknown)
+    disturbed = locate_disturbance(evidence, plant, verdict_of_data.kept, follow=found.unknown)
     left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
     something = (
         found.unknown
@@ -169,15 +169,15 @@ def _diagnose(
         or (left - disturbed[0].misfit) > SOMETHING * found.expected
     )
     deviations = _deviations(evidence)
-    sampled = outstanding(
+    sampled = find_outstanding(
         evidence.names,
         evidence.recordings,
-        [list(rows) for rows in evidence.predicted(plant)],
+        [list(rows) for rows in evidence.predict(plant)],
         evidence.plant,
     )
     attributed = _findings(found, verdict_of_data, evidence)
     # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
-    lost = missed(evidence, best) if evidence.machine.rough else {}
+    lost = power_without_each(evidence, best) if evidence.machine.rough else {}
     traces = tuple(
         each
         for each in attributed
@@ -185,8 +185,8 @@ def _diagnose(
     )
     effects = [
         *(each for each in attributed if each not in traces),
-        *(_sampled(each, evidence.plant) for each in sampled),
-        *(_deviation(each) for each in deviations if each.kind != "unknown"),
+        *(_sensor_finding(each, evidence.plant) for each in sampled),
+        *(_controller_finding(each) for each in deviations if each.kind != "unknown"),
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
     verdict: Verdict
@@ -196,7 +196,7 @@ def _diagnose(
         verdict = "unknown" if something or odd_controller else "no gap"
     small = {str(each.name) for each in traces}
     claimed = tuple(effect for effect in verdict_of_data.kept if effect.name not in small)
-    where = _where(evidence, found, plant, claimed, disturbed if something else (), best)
+    where = _places(evidence, found, plant, claimed, disturbed if something else (), best)
     if odd_controller:
         where.append(
             Place(
@@ -210,8 +210,8 @@ def _diagnose(
     progress("replaying components", 1)
     gap = _gap(evidence, plant, verdict_of_data, sampled)
     progress("choosing the next test", 1)
-    suggestion = _next(evidence.machine, found, effects, verdict_of_data.kept, tests)
-    corrected = _corrected(evidence.configurations[0], plant, sampled)
+    suggestion = _next_test(evidence.machine, found, effects, verdict_of_data.kept, tests)
+    corrected = _correct(evidence.configurations[0], plant, sampled)
     rough = evidence.machine.rough
     gone = verdict == "no gap"
     answer = Answer(
@@ -224,7 +224,7 @@ def _diagnose(
             (" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]
         ),
         next_test=suggestion,
-        not_observable=_unseen(found, attributed),
+        not_observable=_unobservable_effects(found, attributed),
         notes=tuple(notes),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
@@ -235,11 +235,11 @@ def _diagnose(
         traces=traces,
     )
     return Diagnosis(
-        answer, evidence.machine, evidence, corrected, _otherwise(found, verdict_of_data.kept)
+        answer, evidence.machine, evidence, corrected, _alternatives(found, verdict_of_data.kept)
     )
 
 
-def _otherwise(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, float], ...]:
+def _alternatives(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, float], ...]:
     """Explanations other than the one that is named, the likeliest first."""
     others = [
         each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)
@@ -247,7 +247,7 @@ def _otherwise(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, f
     return tuple((each.fit, each.probability) for each in others if each.probability >= POSSIBLE)
 
 
-def _clipped(evidence: Evidence) -> list[str]:
+def _clipping_notes(evidence: Evidence) -> list[str]:
     return [
         f"{recording.path.name}: {fault.message}; those ticks are left out"
         for recording, configuration in zip(
@@ -273,7 +273,7 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     return list(found.values())
 
 
-def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[Finding]:
+def _findings(found: Attribution, outcome: Validation, evidence: Evidence) -> list[Finding]:
     if found.best is None:
         return []
     fit = outcome.fit or found.best.fit
@@ -295,7 +295,7 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
             Name(effect.component, effect.kind.name),
             estimates(effect, values, spread, evidence),
             min(surest, _probability(found.ranking, effect)),
-            _class(found.ranking, found.best, effect),
+            _equivalence_class(found.ranking, found.best, effect),
             min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
             effect.kind.title,
         )
@@ -330,7 +330,7 @@ def _probability(ranking: Sequence[Explanation], effect: Effect) -> float:
     return float(sum(each.probability for each in ranking if effect in each.fit.effects))
 
 
-def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) -> tuple[Name, ...]:
+def _equivalence_class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) -> tuple[Name, ...]:
     """Effects that stand in this one's place in other likely explanations."""
     names = [Name(effect.component, effect.kind.name)]
     rest = [other for other in best.fit.effects if other != effect]
@@ -347,7 +347,7 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     return tuple(dict.fromkeys(names))
 
 
-def _sampled(each: Sampled, plant: Plant) -> Finding:
+def _sensor_finding(each: SensorProperty, plant: Plant) -> Finding:
     effect = find(f"{each.kind}@{each.component}", plant)
     unit = effect.quantities()[each.parameter].unit
     spread = 0.05 * each.value
@@ -356,28 +356,28 @@ def _sampled(each: Sampled, plant: Plant) -> Finding:
     return Finding(name, {each.parameter: estimate}, SURE, (name,), 1.0, effect.kind.title)
 
 
-def _deviation(each: Deviation) -> Finding:
+def _controller_finding(each: Deviation) -> Finding:
     name = Name("controller", each.kind)
     spread = 1e-3 * abs(each.used)
     estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
     return Finding(name, {each.name: estimate}, SURE, (name,), 1.0, title(each.kind))
 
 
-def _where(
+def _places(
     evidence: Evidence,
     found: Attribution,
     plant: Plant,
     kept: tuple[Effect, ...],
-    disturbed: tuple[Disturbed, ...],
+    disturbed: tuple[DisturbanceFit, ...],
     best: Fit,
 ) -> list[Place]:
     places: dict[str, Place] = {}
-    own = evidence.predicted(plant)
+    own = evidence.predict(plant)
     for effect in kept:
         without = with_effects(evidence.plant, best, [other for other in kept if other != effect])
-        change: list[Array] = [a - b for a, b in zip(own, evidence.predicted(without), strict=True)]
+        change: list[Array] = [a - b for a, b in zip(own, evidence.predict(without), strict=True)]
         share = min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0)
-        place = placed(evidence, effect.component, share, change)
+        place = locate(evidence, effect.component, share, change)
         places[effect.name] = replace(place, evidence=f"{effect.kind.title}: {place.evidence}")
     if disturbed:
         foremost = disturbed[0]
@@ -388,14 +388,14 @@ def _where(
             else "what is left has no plain form"
         )
         left = evidence.differences(plant)
-        place = placed(evidence, foremost.component, share, left, words)
+        place = locate(evidence, foremost.component, share, left, words)
         if all(place.component != foremost.component for place in places.values()):
             places["left"] = place
     return sorted(places.values(), key=lambda place: -place.share)
 
 
-def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
-    corrected = _corrected(evidence.configurations[0], plant, sampled)
+def _gap(evidence: Evidence, plant: Plant, outcome: Validation, sampled: Sequence[SensorProperty]) -> Gap:
+    corrected = _correct(evidence.configurations[0], plant, sampled)
     replays, loop = compute_levels(evidence, plant, corrected)
     return Gap(
         before=gap_level(evidence, evidence.plant),
@@ -409,13 +409,13 @@ def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sa
     )
 
 
-def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled]) -> Configuration:
+def _correct(nominal: Configuration, plant: Plant, sampled: Sequence[SensorProperty]) -> Configuration:
     for each in sampled:
         plant = with_parameters(plant, each.component, {each.parameter: each.value})
     return nominal._replace(plant=plant)
 
 
-def _next(
+def _next_test(
     machine: Machine,
     found: Attribution,
     effects: Sequence[Finding],
@@ -430,13 +430,13 @@ def _next(
         or len(likely) < 2
     ):
         return None
-    return proposed(
+    return propose_test(
         machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests
     )
 
 
-def _unseen(found: Attribution, effects: Sequence[Finding]) -> tuple[Unseen, ...]:
+def _unobservable_effects(found: Attribution, effects: Sequence[Finding]) -> tuple[Unobservable, ...]:
     why = "no size tried changes these data by more than their noise"
     named = {(effect.name.component, effect.name.kind) for effect in effects}
-    unseen = [Unseen(effect.component, effect.kind.name, why) for effect in found.silent]
+    unseen = [Unobservable(effect.component, effect.kind.name, why) for effect in found.silent]
     return tuple(each for each in unseen if (each.component, each.kind) not in named)

@@ -101,7 +101,7 @@ class NextTest:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class Unobservable:
     """An effect that these data could not show, and why."""
 
     component: str
@@ -132,7 +132,7 @@ class Answer:
     gap: Gap | None = None
     ranking: tuple[tuple[str, float], ...] = ()
     next_test: NextTest | None = None
-    not_observable: tuple[Unseen, ...] = ()
+    not_observable: tuple[Unobservable, ...] = ()
     faults: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     recordings: tuple[str, ...]

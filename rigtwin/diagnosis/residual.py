@@ -28,7 +28,7 @@ class Residual:
     outputs: dict[str, Residual] = field(default_factory=dict)
 
 
-def single(difference: Array, floor: float, unit: str, period: float) -> Residual:
+def compute_residual(difference: Array, floor: float, unit: str, period: float) -> Residual:
     """The residual of one output."""
     left = rms(difference)
     return Residual(
@@ -36,7 +36,7 @@ def single(difference: Array, floor: float, unit: str, period: float) -> Residua
     )
 
 
-def together(
+def combine_residuals(
     outputs: dict[str, Residual], differences: dict[str, Array], period: float
 ) -> Residual:
     """Several outputs as one, each in units of its own noise floor."""

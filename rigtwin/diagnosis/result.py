@@ -83,7 +83,7 @@ class Diagnosis:
         return calibrated.save(Path(path), self)
 
     def __str__(self) -> str:
-        return text.described(self.answer)
+        return text.describe(self.answer)
 
     def _repr_html_(self) -> str:
         return report.html(self)

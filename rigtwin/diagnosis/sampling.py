@@ -22,7 +22,7 @@ LEVELS = 64
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SensorProperty:
     """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value, nominal: in the sensor's
     unit."""
 
@@ -44,19 +44,19 @@ def properties(recording: Recording, name: str, predicted: Array, plant: Plant) 
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
 
 
-def outstanding(
+def find_outstanding(
     sensors: Sequence[str],
     recordings: Sequence[Recording],
     predicted: Sequence[Sequence[Array]],
     plant: Plant,
-) -> tuple[Sampled, ...]:
+) -> tuple[SensorProperty, ...]:
     """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
     order of the rows of predicted: one list a recording, one array a sensor."""
     declared = [name for name in sensors if getattr(getattr(plant, name, None), "white", 0.0) > 0.0]
     if not declared:
         return ()
     names = {"white": "noise", "hum": "hum", "resolution": "quantisation"}
-    found: list[Sampled] = []
+    found: list[SensorProperty] = []
     table: dict[str, dict[str, float]] = {}
     for number, name in enumerate(sensors):
         if name not in declared:
@@ -81,5 +81,5 @@ def outstanding(
                 continue
             if ratio > OUTSTANDING and ratio > OUTSTANDING * float(np.median(others)):
                 nominal = float(getattr(getattr(plant, name), parameter))
-                found.append(Sampled(name, kind, parameter, table[name][parameter], nominal))
+                found.append(SensorProperty(name, kind, parameter, table[name][parameter], nominal))
     return tuple(found)

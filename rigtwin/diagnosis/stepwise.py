@@ -12,7 +12,15 @@ from itertools import product
 
 from rigtwin.components import Effect, Guide
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Values, clashing, possible, with_values, without_each
+from rigtwin.diagnosis.fit import (
+    Fit,
+    Fitter,
+    Values,
+    clashes,
+    is_possible,
+    with_values,
+    without_each,
+)
 
 PRICE = 8.0
 """Of each parameter, in χ²: a simpler explanation is preferred."""
@@ -38,11 +46,11 @@ BEHIND = ("compliance", "backlash")
 """Kinds that hide their gateway."""
 
 
-def priced(fit: Fit) -> float:
+def penalised_cost(fit: Fit) -> float:
     return fit.misfit + PRICE * sum(len(effect.kind.parameters) for effect in fit.effects)
 
 
-def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
+def drop_needless(tried: Sequence[Fit], least: float) -> list[Fit]:
     """The fits less those in which a simpler effect would do as well."""
     misfits = {frozenset((e.kind.name, e.group) for e in fit.effects): fit.misfit for fit in tried}
     most = max((fit.misfit for fit in tried), default=0.0)
@@ -63,12 +71,12 @@ def plain(tried: Sequence[Fit], least: float) -> list[Fit]:
 def within_tolerance(fit: Fit, evidence: Evidence) -> bool:
     """Whether one of the effects is no more than its declared tolerance."""
     return any(
-        _tolerated(effect, values[0], evidence)
+        _is_tolerated(effect, values[0], evidence)
         for effect, values in zip(fit.effects, fit.values, strict=True)
     )
 
 
-def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
+def _is_tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
     parameter = effect.kind.parameters[0]
     tolerance = evidence.machine.tolerance_of(effect.group, parameter)
     if tolerance is None:
@@ -81,7 +89,7 @@ def _tolerated(effect: Effect, value: float, evidence: Evidence) -> bool:
 
 Start = tuple[tuple[Effect, ...], Values]
 """Effects, and values to start from."""
-Mapped = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
+MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
 
 
 @dataclass(frozen=True)
@@ -97,29 +105,29 @@ class Growth:
     most: int
 
 
-def grown(
-    tried: Sequence[Fit], first: Fit, growth: Growth, mapped: Mapped
+def fit_stepwise(
+    tried: Sequence[Fit], first: Fit, growth: Growth, map_fits: MapFits
 ) -> tuple[list[Fit], list[Fit]]:
     """(further fits, the chain of fits that leads to the best one, from its first effect on). tried: of one and two."""
     found: list[Fit] = []
     before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
-    level = sorted(plain([fit for fit in tried if len(fit.effects) == 2], growth.least), key=priced)
+    level = sorted(drop_needless([fit for fit in tried if len(fit.effects) == 2], growth.least), key=penalised_cost)
     while level and len(level[0].effects) < growth.most:
         following: list[Fit] = []
         for leader in _leaders(level):
-            further = _extended(leader, growth, mapped)
+            further = _extend(leader, growth, map_fits)
             before |= {id(fit): leader for fit in further}
             following += further
         found += following
-        level = sorted(plain(following, growth.least), key=priced)
-    best = min(plain([*tried, *found], growth.least), key=priced)
+        level = sorted(drop_needless(following, growth.least), key=penalised_cost)
+    best = min(drop_needless([*tried, *found], growth.least), key=penalised_cost)
     if len(best.effects) > 1:
-        replaced = _replaced(best, [*tried, *found], growth, mapped)
+        replaced = _replace_each(best, [*tried, *found], growth, map_fits)
         # One that came of another's chain is no step of its own.
         before |= {id(fit): before[id(best)] for fit in replaced if id(best) in before}
         found += replaced
-        best = min(plain([best, *replaced], growth.least), key=priced)
-        for fit in _pruned(best, growth):
+        best = min(drop_needless([best, *replaced], growth.least), key=penalised_cost)
+        for fit in _prune(best, growth):
             before[id(fit)] = best
             found.append(fit)
             best = fit
@@ -135,20 +143,20 @@ def _leaders(level: Sequence[Fit]) -> list[Fit]:
     return list({id(fit): fit for fit in (level[0], *through[:1])}.values())
 
 
-def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
+def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
     """Fits of one effect more that explain enough of what a leader leaves."""
     evidence = growth.fitter.evidence
     hopes = sorted(
-        growth.search.seconds(leader, growth.effects, growth.least), key=lambda hope: hope.promised
+        growth.search.propose_additions(leader, growth.effects, growth.least), key=lambda hope: hope.promised
     )[:TRIED]
-    found = mapped(lambda hope: growth.search.refined(hope.effects, hope.values, hope.space), hopes)
-    found += mapped(
-        lambda start: growth.search.refined(*start),
-        [*_through(leader, growth), *_unfolded(leader, growth)],
+    found = map_fits(lambda hope: growth.search.refine(hope.effects, hope.values, hope.space), hopes)
+    found += map_fits(
+        lambda start: growth.search.refine(*start),
+        [*_gateway_starts(leader, growth), *_unfold(leader, growth)],
     )
-    found = mapped(growth.fitter.settled, sorted(found, key=priced)[:SETTLED])
+    found = map_fits(growth.fitter.refit_with_tolerances, sorted(found, key=penalised_cost)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
-    left = max(leader.misfit - evidence.expected_at(leader.plant), 0.0)
+    left = max(leader.misfit - evidence.expected_misfit(leader.plant), 0.0)
     enough = max(SECOND * growth.least, growth.more * left)
     accepted = []
     for fit in found:
@@ -158,11 +166,11 @@ def _extended(leader: Fit, growth: Growth, mapped: Mapped) -> list[Fit]:
     return accepted
 
 
-def _through(leader: Fit, growth: Growth) -> list[Start]:
+def _gateway_starts(leader: Fit, growth: Growth) -> list[Start]:
     """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly resembles friction alone."""
     search, found = growth.search, []
     for gate in growth.effects:
-        if gate.kind.name != GATEWAY or gate.of is not Guide or clashing(gate, leader.effects):
+        if gate.kind.name != GATEWAY or gate.of is not Guide or clashes(gate, leader.effects):
             continue
         for other in growth.effects:
             if (
@@ -171,11 +179,11 @@ def _through(leader: Fit, growth: Growth) -> list[Start]:
                 or len(leader.effects) + 2 > growth.most
             ):
                 continue
-            found.append(_beside(search, leader.effects, leader.values, (gate, other)))
+            found.append(_pair_start(search, leader.effects, leader.values, (gate, other)))
     return found
 
 
-def _beside(
+def _pair_start(
     search: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]
 ) -> Start:
     """A pair of effects beside others, with the best of all pairs of their starts."""
@@ -191,7 +199,7 @@ def _beside(
     )[1]
 
 
-def _unfolded(leader: Fit, growth: Growth) -> list[Start]:
+def _unfold(leader: Fit, growth: Growth) -> list[Start]:
     """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
     found = []
     for effect, rest, values in without_each(leader):
@@ -203,38 +211,38 @@ def _unfolded(leader: Fit, growth: Growth) -> list[Start]:
         if (
             effect.kind.name in SECOND_ORDER
             and len(pair) == 2
-            and not any(clashing(each, rest) for each in pair)
+            and not any(clashes(each, rest) for each in pair)
         ):
-            found.append(_beside(growth.search, rest, values, (pair[0], pair[1])))
+            found.append(_pair_start(growth.search, rest, values, (pair[0], pair[1])))
     return found
 
 
-def _pruned(best: Fit, growth: Growth) -> list[Fit]:
+def _prune(best: Fit, growth: Growth) -> list[Fit]:
     """The fit with one effect after another taken out that explains nothing any more, now that the others are there."""
     found: list[Fit] = []
     while len(best.effects) > 1:
         fewer = [
             (rest, values)
             for _, rest, values in without_each(best)
-            if possible(rest, growth.fitter.plant)
+            if is_possible(rest, growth.fitter.plant)
         ]
-        tries = [growth.fitter.refined(*each) for each in fewer]
-        simpler = min(tries, key=priced, default=best)
+        tries = [growth.fitter.refine(*each) for each in fewer]
+        simpler = min(tries, key=penalised_cost, default=best)
         if simpler is best or simpler.misfit - best.misfit > growth.least:
             break
-        best = growth.fitter.settled(simpler)
+        best = growth.fitter.refit_with_tolerances(simpler)
         found.append(best)
     return found
 
 
-def _replaced(best: Fit, tried: Sequence[Fit], growth: Growth, mapped: Mapped) -> list[Fit]:
+def _replace_each(best: Fit, tried: Sequence[Fit], growth: Growth, map_fits: MapFits) -> list[Fit]:
     """What may stand in each effect's place, now that the others are known."""
     known = {frozenset(fit.effects) for fit in tried}
     alike = [
         pair
-        for pair in growth.search.alike(best, growth.effects)
+        for pair in growth.search.propose_replacements(best, growth.effects)
         if frozenset(pair[0]) not in known
     ]
-    others = sorted(mapped(lambda pair: growth.search.refined(*pair), alike), key=priced)
+    others = sorted(map_fits(lambda pair: growth.search.refine(*pair), alike), key=penalised_cost)
     far = best.misfit + NEAR * max(growth.fitter.nothing.misfit - best.misfit, 0.0)
-    return mapped(growth.fitter.settled, [fit for fit in others[:REPLACED] if fit.misfit < far])
+    return map_fits(growth.fitter.refit_with_tolerances, [fit for fit in others[:REPLACED] if fit.misfit < far])

@@ -17,7 +17,7 @@ def number(estimate: Estimate) -> str:
     return f"{estimate.value:.4g}{unit} (95 %: {estimate.low:.4g} to {estimate.high:.4g}), nominal {nominal}"
 
 
-def described(diagnosis: Answer) -> str:
+def describe(diagnosis: Answer) -> str:
     """The answer, what it rests on, and what to do next."""
     lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
     for fault in diagnosis.faults:

@@ -16,7 +16,7 @@ HELD = 0.5
 
 
 @kernel
-def _followed(
+def _follow_command(
     wanted: Array,
     play: float,
     gain: float,
@@ -60,7 +60,7 @@ def _followed(
             out[step] = two
 
 
-def followed(
+def follow_command(
     actuator: PositionActuator, command: Array, late: float, period: float, steps: int
 ) -> Array:
     """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of the computer."""
@@ -84,7 +84,7 @@ def followed(
         second = np.ascontiguousarray(expm(both * h)[:2])
     out = np.empty(count)
     rate = actuator.rate_limit * h if actuator.rate_limit < UNLIMITED else UNLIMITED
-    _followed(
+    _follow_command(
         wanted,
         actuator.deadband,
         actuator.gain,

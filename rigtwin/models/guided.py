@@ -15,9 +15,9 @@ import numpy as np
 from controllers.compiled import compilable
 from controllers.formula import Program, run
 from rigtwin.components import Guide
-from rigtwin.components.conditioning import Actuator, ActuatorState, conditioned
-from rigtwin.components.guide import Friction, damping, dry_limits, resting, slid
-from rigtwin.components.sensors import Transducer, TransducerState, transduced
+from rigtwin.components.conditioning import Actuator, ActuatorState, condition
+from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
+from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
@@ -60,7 +60,7 @@ def gravity(inertia: Inertia, position: float) -> float:
 
 
 @kernel
-def carried(
+def inverse_dynamics(
     guide: Guide,
     dry_friction: Friction,
     inertia: Inertia,
@@ -74,16 +74,16 @@ def carried(
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
         x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
-        transmitted = inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest)
+        transmitted = inertia.mass * a + gravity(inertia, x) + position_force(guide, x, inertia.rest)
         forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry, by = slid(x - slider, 0.5 * guide.backlash, spring, forward, backward)
+        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
         slider += by
         viscous += share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
 
 
 @kernel
-def pushed(
+def integrate_pushed(
     guide: Guide,
     dry_friction: Friction,
     inertia: Inertia,
@@ -120,19 +120,19 @@ def pushed(
                 for each in range(len(sensors)):
                     if each == which:
                         true = x if kinds[each] == 0 else v
-                        sensed = transduced(sensors[each], states[each], true)
+                        sensed = transduce(sensors[each], states[each], true)
                         loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
             earlier = force
-            force = min(max(constant * conditioned(drive, held, command[tick]), -limit), limit)
+            force = min(max(constant * condition(drive, held, command[tick]), -limit), limit)
             coefficient = damping(guide, v)
             # About this position half a step passes under the old force and half under the new one.
             load = (
                 0.5 * (earlier + force)
                 + besides[tick]
                 - gravity(inertia, x)
-                - resting(guide, x, inertia.rest)
+                - position_force(guide, x, inertia.rest)
                 - (1.0 - share) * viscous
             )
             total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
@@ -143,7 +143,7 @@ def pushed(
             if apart > half or apart < -half:
                 edge = math.copysign(half, apart)
                 velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
-                dry, by = slid(x + h * velocity - slider, half, spring, forward, backward)
+                dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
                 if by != 0.0:
                     velocity = (rhs - h * dry) / total
                     slider = x + h * velocity - edge - dry / spring

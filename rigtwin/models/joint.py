@@ -13,17 +13,17 @@ from rigtwin.components import (
     PositionSensor,
     VelocitySensor,
 )
-from rigtwin.components.conditioning import actuator, holding
+from rigtwin.components.conditioning import actuator, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import fresh, seen, transducer
+from rigtwin.components.sensors import apply_sensor, start_transducer, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.following import followed
-from rigtwin.models.guided import RIGID, Inertia, Loop, carried, pushed
+from rigtwin.models.following import follow_command
+from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -96,18 +96,18 @@ class JointModel:
             and isinstance(getattr(machine.plant, name), PositionSensor | VelocitySensor)
         ]
         self._last: dict[tuple[object, ...], Array] = {}
-        self._start = self._started()
+        self._start = self._estimate_start()
 
-    def coarser(self) -> JointModel:
+    def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
 
-    def finer(self) -> JointModel:
+    def double_steps(self) -> JointModel:
         return self._with_steps(2 * self._steps)
 
     def _with_steps(self, steps: int) -> JointModel:
         return JointModel(self._machine, self._replay, self._recording, self._configuration, steps)
 
-    def _started(self) -> tuple[float, float]:
+    def _estimate_start(self) -> tuple[float, float]:
         """Position and velocity at the start, as measured."""
         measured = [row.channel for row in self.rows if row.kind == "position"]
         for name in self._sensors:
@@ -141,7 +141,7 @@ class JointModel:
             names += self._sensors
         return tuple(getattr(plant, name) for name in names if name is not None)
 
-    def moved(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
+    def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
         """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its
         prescribed motion, m; shape (ticks,)."""
         key = self._key(plant)
@@ -149,19 +149,19 @@ class JointModel:
             return self._last[key]
         mover = getattr(plant, self._mover.name)
         if isinstance(mover, ForceActuator):
-            out = self._pushed(
+            out = self._integrate_pushed(
                 plant, mover, np.zeros(len(self._command)) if force is None else force
             )
         else:
             if isinstance(mover, PositionActuator):
-                position = followed(
+                position = follow_command(
                     mover, self._command, plant.computer.delay, self._period, self._steps
                 )
                 error = 0.0
             else:
-                position = self._unsensed(mover)
+                position = self._undo_sensor(mover)
                 error = 0.0 if self._integrated else self._error / max(mover.gain, 1e-9)
-            out = self._carried(plant, position if shift is None else position + shift, error)
+            out = self._inverse_dynamics(plant, position if shift is None else position + shift, error)
             if force is not None:
                 out[2] -= force
         # A plant that is not stable runs away; it must be a bad explanation, not an impossible number.
@@ -170,7 +170,7 @@ class JointModel:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
-    def _unsensed(self, sensor: PositionSensor | VelocitySensor) -> Array:
+    def _undo_sensor(self, sensor: PositionSensor | VelocitySensor) -> Array:
         """The position behind a measured motion: the sensor's offset, gain, lag and delay undone. Of a velocity its mean is no
         motion, as what is tested does not move away."""
         assert self._motion is not None
@@ -183,7 +183,7 @@ class JointModel:
         signal = (signal - sensor.offset) / sensor.gain
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
-    def _carried(self, plant: Plant, position: Array, error: float) -> Array:
+    def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
@@ -196,10 +196,10 @@ class JointModel:
         )
         out = np.zeros((4, len(position)))
         out[:2] = motion[:2]
-        carried(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
+        inverse_dynamics(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
         return out
 
-    def _pushed(
+    def _integrate_pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
         """The joint under its force actuator. besides: another force on it, N, shape (ticks,); noise: of what a controller reads,
@@ -212,11 +212,11 @@ class JointModel:
         first = float(self._command[0])
         parts = [getattr(plant, name) for name in self._sensors] or [PositionSensor()]
         models = tuple(transducer(part, self._period) for part in parts)
-        states = tuple(fresh(model) for model in models)
+        states = tuple(start_transducer(model) for model in models)
         kinds = np.array([int(isinstance(part, VelocitySensor)) for part in parts])
         command = self._command.copy()
         out = np.zeros((4, len(command)))
-        pushed(
+        integrate_pushed(
             guide,
             friction(guide),
             inertia,
@@ -225,7 +225,7 @@ class JointModel:
             mover.constant,
             min(mover.force_limit, UNLIMITED),
             conditioning,
-            holding(conditioning, first),
+            hold(conditioning, first),
             models,
             states,
             kinds,
@@ -271,33 +271,33 @@ class JointModel:
             True, program, program.registers.copy(), control.formula.memory(), recorded, noise, which
         )
 
-    def true(self, plant: Plant) -> Array:
-        return self._rows(self.moved(plant))
+    def predict_true(self, plant: Plant) -> Array:
+        return self._rows(self.move(plant))
 
     def _rows(self, moved: Array) -> Array:
         places = {"position": 0, "velocity": 1, "force": 2, "command": 3}
         return moved[[places[row.kind] for row in self.rows]]
 
-    def _seen(self, plant: Plant, true: Array) -> Array:
+    def _apply_sensors(self, plant: Plant, true: Array) -> Array:
         found = true.copy()
         for number, row in enumerate(self.rows):
             if row.kind != "command":
-                found[number] = seen(getattr(plant, row.name), true[number], self._period)
+                found[number] = apply_sensor(getattr(plant, row.name), true[number], self._period)
         return found
 
-    def sensed(self, plant: Plant) -> Array:
-        return self._seen(plant, self.true(plant))
+    def predict(self, plant: Plant) -> Array:
+        return self._apply_sensors(plant, self.predict_true(plant))
 
-    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+    def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         if entry == "force":
-            return self._seen(plant, self._rows(self.moved(plant, force=amount)))
+            return self._apply_sensors(plant, self._rows(self.move(plant, force=amount)))
         if entry == "motion":
-            return self._seen(plant, self._rows(self.moved(plant, shift=amount)))
-        found = self.sensed(plant)
+            return self._apply_sensors(plant, self._rows(self.move(plant, shift=amount)))
+        found = self.predict(plant)
         found[[row.name for row in self.rows].index(entry)] += amount
         return found
 
-    def places(self) -> tuple[str, ...]:
+    def components(self) -> tuple[str, ...]:
         replay = self._replay
         moving = (
             [replay.guide, replay.mass]
@@ -312,11 +312,11 @@ class JointModel:
         return isinstance(getattr(self._machine.plant, self._mover.name), ForceActuator)
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
-        moved = self.moved(plant)
+        moved = self.move(plant)
         names = [row.name for row in self.rows]
         role, entry, signal = "guide", "force", moved[2]
         if component in names:
-            role, entry, signal = "sensor", component, self.sensed(plant)[names.index(component)]
+            role, entry, signal = "sensor", component, self.predict(plant)[names.index(component)]
         elif component == self._mover.name:
             role, entry, signal = (
                 ("force", "force", moved[2]) if self._free else ("position", "motion", moved[0])
@@ -325,18 +325,18 @@ class JointModel:
             role = "mass"
         return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._period))
 
-    def strength(self, entry: str) -> float:
-        moved = self.moved(self._machine.plant)
+    def disturbance_size(self, entry: str) -> float:
+        moved = self.move(self._machine.plant)
         if entry in ("force", "motion"):
             return SMALL * max(float(np.std(moved[2 if entry == "force" else 0])), 1e-9)
         number = [row.name for row in self.rows].index(entry)
         return SMALL * max(float(np.std(self._rows(moved)[number])), 1e-9)
 
     def motion(self, component: str, plant: Plant) -> Motion:  # noqa: ARG002
-        moved = self.moved(plant)
+        moved = self.move(plant)
         return Motion(moved[0], moved[1], moved[2])
 
-    def carried_noise(self, plant: Plant) -> Array | None:
+    def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
@@ -344,8 +344,8 @@ class JointModel:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smoothed(self._motion + level * random.standard_normal(ticks), self._period)
-            return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(
-                self.moved(plant)
+            return self._rows(self.move(plant, shift=again - self._motion)) - self._rows(
+                self.move(plant)
             )
         control = self._control
         if control is None or not self._sensors:
@@ -357,8 +357,8 @@ class JointModel:
             if channel in sensed:
                 noise[:, number] = white_noise(column) * random.standard_normal(ticks)
         mover = getattr(plant, self._mover.name)
-        disturbed = self._pushed(plant, mover, np.zeros(ticks), noise)
+        disturbed = self._integrate_pushed(plant, mover, np.zeros(ticks), noise)
         found = np.zeros((len(self.rows), ticks))
         commands = [row.kind == "command" for row in self.rows]
-        found[commands] = disturbed[3] - self.moved(plant)[3]
+        found[commands] = disturbed[3] - self.move(plant)[3]
         return found

@@ -18,19 +18,19 @@ from controllers import Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import Computer, Cylinder, Motor, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
+    discretise,
     next_position,
-    sampled,
-    settled,
+    rest_state,
 )
 from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
-from rigtwin.components.sensors import seen
+from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
@@ -38,9 +38,15 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import YIELDING, Contacts, contacts, deflected, stiffening
+from rigtwin.simulation.plant import (
+    YIELDING,
+    Contacts,
+    contacts,
+    initial_deflection,
+    stiffness_ratio,
+)
 
-PLACES = (
+COMPONENTS = (
     "motor",
     "rail",
     "tyre",
@@ -50,7 +56,7 @@ PLACES = (
     *Measurements._fields,
 )
 """Components that are disturbed in turn."""
-STRENGTH = {"m": 1e-4, "N": 4.0}
+DISTURBANCE_SIZE = {"m": 1e-4, "N": 4.0}
 """rms of each disturbance as tried; its response is taken as in proportion to it."""
 KEPT = 64
 """Motions of plates that are kept."""
@@ -115,11 +121,11 @@ def _plate(
         onward[tick] = next_position(model, state, held.memory[3])
         for step in range(steps):
             position[tick * steps + step] = state.position[0]
-            advance_cylinder(model, state, conditioned(conditioning, held, commands[tick]))
+            advance_cylinder(model, state, condition(conditioning, held, commands[tick]))
     position[len(commands) * steps] = state.position[0]
 
 
-def plate(
+def move_plate(
     cylinder: Cylinder,
     computer: Computer,
     commands: Array,
@@ -130,11 +136,11 @@ def plate(
 ) -> Plate:
     """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where that command holds it."""
     conditioning = actuator(cylinder, computer, timestep)
-    held = holding(conditioning, start)
+    held = hold(conditioning, start)
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
-    state = settled(cylinder, float(held.memory[3]) if at is None else at)
+    state = rest_state(cylinder, float(held.memory[3]) if at is None else at)
     _plate(
-        sampled(cylinder, timestep),
+        discretise(cylinder, timestep),
         state,
         conditioning,
         held,
@@ -147,7 +153,7 @@ def plate(
 
 
 @compilable
-def sliding(
+def solve_velocity(
     rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
 ) -> float:
     """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
@@ -256,18 +262,18 @@ def _mechanics(
             )
             rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
-                spring = now.stiffness * deflection * stiffening(now, deflection)
+                spring = now.stiffness * deflection * stiffness_ratio(now, deflection)
                 rhs, total = (
                     free + h * (spring + now.damping * ground_velocity),
                     inertia + h * now.damping,
                 )
-            velocity = sliding(rhs, total, rail, motor, plate_velocity)
+            velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
             tyre = 0.0
             if deflection > 0.0:
                 tyre = spring + now.damping * (ground_velocity - velocity)
                 if tyre < 0.0:
                     tyre, rhs, total = 0.0, free, inertia
-                    velocity = sliding(rhs, total, rail, motor, plate_velocity)
+                    velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
             dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
             cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
             if step < 0:
@@ -281,7 +287,7 @@ def _mechanics(
             ground_before, structure_before = now.yielded[0], now.yielded[1]
             now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
             now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
-            asked = conditioned(motor_drive, motor_command, voltage[tick])
+            asked = condition(motor_drive, motor_command, voltage[tick])
             asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
             force += carriage.motor_share * (carriage.motor_constant * asked - force)
             v = velocity
@@ -320,7 +326,7 @@ class QuarterCarModel:
         )
         return cls(ground, structure, voltage, configuration, steps)
 
-    def coarser(self) -> QuarterCarModel:
+    def halve_steps(self) -> QuarterCarModel:
         """The same with half as many steps."""
         return QuarterCarModel(
             self._ground,
@@ -330,7 +336,7 @@ class QuarterCarModel:
             max(1, self._steps // 2),
         )
 
-    def finer(self) -> QuarterCarModel:
+    def double_steps(self) -> QuarterCarModel:
         """The same with twice as many steps."""
         return QuarterCarModel(
             self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
@@ -350,13 +356,13 @@ class QuarterCarModel:
         if found is None:
             if len(self._plates) > KEPT:
                 self._plates.clear()
-            found = plate(
+            found = move_plate(
                 unloaded, computer, commands, start, at, self._period / self._steps, self._steps
             )
             self._plates[key] = found
         return found
 
-    def true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
+    def predict_true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
         """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
         does not know."""
         timestep = self._period / self._steps
@@ -364,15 +370,15 @@ class QuarterCarModel:
             plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
         )
         # The spring is uncompressed at the start, the tyre carries the preload.
-        start = float(ground.position[0]) - deflected(plant, self._preload)
+        start = float(ground.position[0]) - initial_deflection(plant, self._preload)
         structure = self._plate(
             plant.structure_cylinder, plant.computer, self._structure, self._start, start
         )
         nothing = np.zeros_like(self._voltage)
         besides = besides or Disturbances(nothing, nothing, nothing, nothing)
         ground, structure = (
-            self._displaced(ground, besides.ground),
-            self._displaced(structure, besides.structure),
+            self._displace(ground, besides.ground),
+            self._displace(structure, besides.structure),
         )
         motor: Motor = plant.motor
         carriage = Carriage(
@@ -390,7 +396,7 @@ class QuarterCarModel:
             carriage,
             contacts(plant, start, 0.0),
             conditioning,
-            holding(conditioning, self._preload / motor.constant),
+            hold(conditioning, self._preload / motor.constant),
             start,
             self._preload,
             self._steps,
@@ -404,7 +410,7 @@ class QuarterCarModel:
         )
         return out
 
-    def _displaced(self, of: Plate, by: Array) -> Plate:
+    def _displace(self, of: Plate, by: Array) -> Plate:
         if not by.any():
             return of
         ticks = np.arange(len(by) * self._steps + 1) / self._steps
@@ -412,32 +418,32 @@ class QuarterCarModel:
         ahead = motion[np.arange(len(by)) * self._steps + 1]
         return Plate(of.position + motion, of.onward + ahead)
 
-    def disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
+    def predict_disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
         """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
         Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
         if entry in Measurements._fields:
-            sensed = self.sensed(plant)
+            sensed = self.predict(plant)
             sensed[Measurements._fields.index(entry)] += amount
             return sensed
         amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
         amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
-        true = self.true(plant, Disturbances(**amounts))
+        true = self.predict_true(plant, Disturbances(**amounts))
         return np.stack(
             [
-                seen(sensor, row, self._period)
+                apply_sensor(sensor, row, self._period)
                 for sensor, row in zip(sensors(plant), true, strict=True)
             ]
         )
 
-    def places(self) -> tuple[str, ...]:
-        return PLACES
+    def components(self) -> tuple[str, ...]:
+        return COMPONENTS
 
     def forms(self, component: str, plant: RigPlant) -> list[Form]:
-        true, sensed = self.true(plant), self.sensed(plant)
+        true, sensed = self.predict_true(plant), self.predict(plant)
         wheel = true[1] - true[2]
         wheel_speed, sliding = np.gradient(wheel, self._period), np.gradient(true[2], self._period)
 
-        def made(
+        def build(
             role: str,
             entry: str,
             signal: Array,
@@ -448,21 +454,21 @@ class QuarterCarModel:
 
         if component in Measurements._fields:
             signal = sensed[Measurements._fields.index(component)]
-            return made("load cell" if component == "load_cell" else "sensor", component, signal)
+            return build("load cell" if component == "load_cell" else "sensor", component, signal)
         if component in ("ground_cylinder", "structure_cylinder"):
             place = component.removesuffix("_cylinder")
-            return made("cylinder", place, sensed[("ground", "structure").index(place)])
+            return build("cylinder", place, sensed[("ground", "structure").index(place)])
         if component == "motor":
-            return made("motor", "voltage", true[3], true[2], sliding)
+            return build("motor", "voltage", true[3], true[2], sliding)
         if component == "tyre":
-            return made("tyre", "force", np.maximum(true[0] - wheel, 0.0))
-        return made("rail" if component == "rail" else "mass", "force", wheel)
+            return build("tyre", "force", np.maximum(true[0] - wheel, 0.0))
+        return build("rail" if component == "rail" else "mass", "force", wheel)
 
-    def strength(self, entry: str) -> float:
-        return STRENGTH["N" if entry in ("voltage", "force", "load_cell") else "m"]
+    def disturbance_size(self, entry: str) -> float:
+        return DISTURBANCE_SIZE["N" if entry in ("voltage", "force", "load_cell") else "m"]
 
     def motion(self, component: str, plant: RigPlant) -> Motion:
-        true = self.true(plant)
+        true = self.predict_true(plant)
         if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
             position = true[2]
         elif component.startswith("ground"):
@@ -473,20 +479,20 @@ class QuarterCarModel:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
-    def carried_noise(self, plant: RigPlant) -> None:
+    def propagated_noise(self, plant: RigPlant) -> None:
         """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
 
-    def sensed(self, plant: RigPlant) -> Array:
+    def predict(self, plant: RigPlant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
         mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
         true = self._last.get(mechanical)
         if true is None:
-            true = self.true(plant)
+            true = self.predict_true(plant)
             # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack(
             [
-                seen(sensor, row, self._period)
+                apply_sensor(sensor, row, self._period)
                 for sensor, row in zip(sensors(plant), true, strict=True)
             ]
         )

@@ -10,7 +10,13 @@ import numpy as np
 from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import LoadCell, Lvdt, RigPlant
-from rigtwin.components.sensors import Transducer, TransducerState, fresh, transduced, transducer
+from rigtwin.components.sensors import (
+    Transducer,
+    TransducerState,
+    start_transducer,
+    transduce,
+    transducer,
+)
 from rigtwin.numerics.arrays import Array
 
 
@@ -32,12 +38,12 @@ class Sensing(NamedTuple):
     resolution: Measurements
 
 
-def sensing(plant: RigPlant, period: float) -> Sensing:
+def build_sensing(plant: RigPlant, period: float) -> Sensing:
     """The plant's sensors before their first sample. period in s."""
     one, two, three, four = (transducer(sensor, period) for sensor in sensors(plant))
     return Sensing(
         (one, two, three, four),
-        (fresh(one), fresh(two), fresh(three), fresh(four)),
+        (start_transducer(one), start_transducer(two), start_transducer(three), start_transducer(four)),
         resolutions(plant),
     )
 
@@ -74,7 +80,7 @@ class Disturbance:
 
 
 @compilable
-def converted(value: float, disturbance: float, resolution: float) -> float:
+def quantise(value: float, disturbance: float, resolution: float) -> float:
     """One sample as the DAQ delivers it."""
     raw = value + disturbance
     if resolution > 0.0:
@@ -83,24 +89,24 @@ def converted(value: float, disturbance: float, resolution: float) -> float:
 
 
 @compilable
-def sampled(sensing: Sensing, true: Measurements, disturbance: Array) -> Measurements:
+def sample_sensors(sensing: Sensing, true: Measurements, disturbance: Array) -> Measurements:
     """All samples of one tick; disturbance has shape (4,). Advances the sensors' states."""
     sensors, states, bits = sensing.transducers, sensing.states, sensing.resolution
     return Measurements(
-        converted(
-            transduced(sensors[0], states[0], true.ground_lvdt), disturbance[0], bits.ground_lvdt
+        quantise(
+            transduce(sensors[0], states[0], true.ground_lvdt), disturbance[0], bits.ground_lvdt
         ),
-        converted(
-            transduced(sensors[1], states[1], true.structure_lvdt),
+        quantise(
+            transduce(sensors[1], states[1], true.structure_lvdt),
             disturbance[1],
             bits.structure_lvdt,
         ),
-        converted(
-            transduced(sensors[2], states[2], true.suspension_lvdt),
+        quantise(
+            transduce(sensors[2], states[2], true.suspension_lvdt),
             disturbance[2],
             bits.suspension_lvdt,
         ),
-        converted(
-            transduced(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell
+        quantise(
+            transduce(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell
         ),
     )

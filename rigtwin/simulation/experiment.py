@@ -11,7 +11,7 @@ import numpy as np
 
 from controllers.formula import formula
 from rigtwin.components.rig import RigPlant
-from rigtwin.description.configuration import Configuration, rebased
+from rigtwin.description.configuration import Configuration, rebase
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -66,13 +66,13 @@ def experiments_of(machine: Machine) -> dict[str, Experiment]:
             return dict(known)
         base = machine.configuration
         return {
-            name: replace(e, configuration=rebased(e.configuration, base))
+            name: replace(e, configuration=rebase(e.configuration, base))
             for name, e in known.items()
         }
-    return {name: _described(machine, name, table) for name, table in machine.experiments.items()}
+    return {name: _from_table(machine, name, table) for name, table in machine.experiments.items()}
 
 
-def _described(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
+def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
     base = machine.configuration
     clocks = {key: float(table[key]) for key in ("duration", "period") if key in table}
     timing = base.timing._replace(**clocks)

@@ -14,7 +14,7 @@ from controllers.skyhook import semi_active_damping
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import deflected
+from rigtwin.simulation.plant import initial_deflection
 
 SUBSTEPS = 4
 """Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear suspension is exact with one."""
@@ -72,7 +72,7 @@ def _structure(settings: Settings) -> _Structure:
     )
 
 
-def ideal(configuration: Configuration, ground: Array) -> Ideal:
+def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
     """The system that a test emulates, started as the rig starts: a body or a cross of beams on a spring and damper with
     skyhook, on the ground (single mass) or on a wheel and its tyre (quarter car). ground: m, held over each tick."""
     settings, plant, period = (
@@ -120,14 +120,14 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     start = np.zeros(size)
     start[:count] = body.start
     if on_wheel:
-        start[-2] = ground[0] - deflected(plant, settings.preload)
+        start[-2] = ground[0] - initial_deflection(plant, settings.preload)
     substeps = (
         SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
     )
-    transition, step = _sampled(a, entry, period / substeps)
+    transition, step = _discretise(a, entry, period / substeps)
     states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
     rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
-    _simulated(settings, on_wheel, transition, step, inputs, rows, start, substeps, states, besides)
+    _simulate(settings, on_wheel, transition, step, inputs, rows, start, substeps, states, besides)
     inputs[:, 3] = besides
     wing = None if body.wing is None else states[:, :count] @ body.wing
     return Ideal(
@@ -139,7 +139,7 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     )
 
 
-def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
+def _discretise(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
     count = len(a)
     both = np.zeros((count + entry.shape[1],) * 2)
     both[:count, :count], both[:count, count:] = a, entry
@@ -150,7 +150,7 @@ def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
 
 
 @kernel
-def _simulated(
+def _simulate(
     settings: Settings,
     on_wheel: bool,
     transition: Array,

@@ -31,7 +31,7 @@ from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Sensing, sampled
+from rigtwin.simulation.converters import Sensing, sample_sensors
 from rigtwin.simulation.plant import Machine, advance, sense
 from rigtwin.simulation.rig import Rig
 from rigtwin.simulation.safety import Trip, Watch, judged, watching, watching_compiled
@@ -174,7 +174,7 @@ def _ticks(
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
         true = sense(machine)
-        measured = sampled(sensing, true, disturbance[tick])
+        measured = sample_sensors(sensing, true, disturbance[tick])
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
         commands = held
         if not missed[tick]:

@@ -13,7 +13,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
-from rigtwin.simulation.ideal import Ideal, ideal
+from rigtwin.simulation.ideal import Ideal, simulate_ideal
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Tracking:
     force_total: float
 
 
-def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
+def compute_tracking(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
     """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
     structure, load_cell: what was sensed, m and N."""
     position, force = commands[:, 1], commands[:, 2]
@@ -42,7 +42,7 @@ def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) 
     )
 
 
-def tracking(recording: Recording, configuration: Configuration) -> Tracking:
+def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
     """e1 and e2 of a recorded test. What was sensed is without noise where a twin knows it."""
     known = "/truth" in recording.columns
     structure = (
@@ -54,4 +54,4 @@ def tracking(recording: Recording, configuration: Configuration) -> Tracking:
     commands = np.column_stack(
         [recording.column("/command", name) for name in ("ground", "structure", "force")]
     )
-    return tracked(ideal(configuration, commands[:, 0]), commands, structure, load_cell)
+    return compute_tracking(simulate_ideal(configuration, commands[:, 0]), commands, structure, load_cell)

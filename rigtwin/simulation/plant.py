@@ -11,14 +11,14 @@ import numpy as np
 from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import GasSpring, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
+    discretise,
     next_position,
-    sampled,
-    settled,
+    rest_state,
 )
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import Friction, breakaway, friction, gap_at
@@ -97,7 +97,7 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
     )
 
 
-def deflected(plant: RigPlant, preload: float) -> float:
+def initial_deflection(plant: RigPlant, preload: float) -> float:
     """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
@@ -124,13 +124,13 @@ class Simulation:
             for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
         ]
         held = [
-            holding(drives[0], ground),
-            holding(drives[1], structure),
-            holding(drives[2], preload / plant.motor.constant),
+            hold(drives[0], ground),
+            hold(drives[1], structure),
+            hold(drives[2], preload / plant.motor.constant),
         ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - deflected(
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - initial_deflection(
             plant, preload
         )
         view.activation[0] = view.control[0] = preload / plant.motor.constant
@@ -139,12 +139,12 @@ class Simulation:
             view,
             substeps,
             not touching.changing and all(each.neutral for each in drives),
-            sampled(plant.ground_cylinder, timestep),
-            settled(plant.ground_cylinder, here),
+            discretise(plant.ground_cylinder, timestep),
+            rest_state(plant.ground_cylinder, here),
             drives[0],
             held[0],
-            sampled(plant.structure_cylinder, timestep),
-            settled(plant.structure_cylinder, carriage),
+            discretise(plant.structure_cylinder, timestep),
+            rest_state(plant.structure_cylinder, carriage),
             drives[1],
             held[1],
             drives[2],
@@ -173,7 +173,7 @@ def brace(mechanics: Handles) -> None:
 
 
 @compilable
-def stiffening(now: Contacts, deflection: float) -> float:
+def stiffness_ratio(now: Contacts, deflection: float) -> float:
     """How many times its nominal secant stiffness the tyre has at a deflection, m."""
     if now.hardening == 0.0 or deflection <= 0.0:
         return 1.0
@@ -202,7 +202,7 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
     mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
-    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffening(now, deflection)
+    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffness_ratio(now, deflection)
 
 
 @compilable
@@ -277,11 +277,11 @@ def advance(
             machine.ground_state.position[0] + yielded[0],
             machine.structure_state.position[0] + yielded[1],
         )
-        asked = conditioned(machine.ground_drive, machine.ground_command, ground_command)
+        asked = condition(machine.ground_drive, machine.ground_command, ground_command)
         advance_cylinder(machine.ground, machine.ground_state, asked)
-        asked = conditioned(machine.structure_drive, machine.structure_command, structure_command)
+        asked = condition(machine.structure_drive, machine.structure_command, structure_command)
         advance_cylinder(machine.structure, machine.structure_state, asked)
-        mechanics.control[0] = conditioned(machine.motor_drive, machine.motor_command, voltage)
+        mechanics.control[0] = condition(machine.motor_drive, machine.motor_command, voltage)
         if machine.contacts.changing:
             give_way(mechanics, machine.contacts)
         drive(mechanics, mechanics.ground, ground, machine.ground_state.position[0] + yielded[0])

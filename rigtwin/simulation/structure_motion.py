@@ -19,7 +19,7 @@ from controllers import (
     update,
 )
 from controllers.beam import MODES
-from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, override
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
@@ -63,7 +63,7 @@ def wing(settings: Settings, period: float, packed_states: Array) -> Array:
 
 def recorded_wing(recording: Recording) -> Array | None:
     """The same of a recording, or None if its structure model was not of beams."""
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    settings = override(Configuration(), {"controller": recording.controller}).controller
     if settings.structure != Structure.BEAM:
         return None
     measured = np.column_stack([recording.column("/sensor", name) for name in Measurements._fields])

@@ -10,7 +10,7 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Disturbance, sampled, sensing
+from rigtwin.simulation.converters import Disturbance, build_sensing, sample_sensors
 from rigtwin.simulation.plant import Machine, Simulation, advance, sense
 
 _advance = kernel(advance)
@@ -41,7 +41,7 @@ class Twin:
             preload=controller.preload,
         )
         self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
-        self.sensing = sensing(configuration.plant, configuration.timing.period)
+        self.sensing = build_sensing(configuration.plant, configuration.timing.period)
         self._missed = np.random.default_rng([seed, 2])
         self._share_missed = configuration.plant.computer.missed_ticks
         self.held = Commands(
@@ -56,7 +56,7 @@ class Twin:
         true = np.empty(4)
         _sense(self.simulation.machine, true)
         self.truth = Measurements(*true.tolist())
-        return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
+        return sample_sensors(self.sensing, self.truth, self.disturbance.take(1)[0])
 
     def misses(self, ticks: int) -> NDArray[np.bool_]:
         """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as they are."""

@@ -6,7 +6,7 @@ from functools import cache
 
 from experiments import EXPERIMENTS
 from rigtwin.description.catalogue import find as machine_of
-from rigtwin.description.configuration import Configuration, applied
+from rigtwin.description.configuration import Configuration, apply_effects
 from rigtwin.diagnosis.compare import configuration_of
 from rigtwin.diagnosis.diagnose import Outcome, diagnose
 from rigtwin.diagnosis.evidence import Evidence
@@ -22,7 +22,7 @@ def recorded(name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, see
     configuration = EXPERIMENTS[name].configuration
     configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
     demands = EXPERIMENTS[name].demands(configuration, seed)
-    return tried(name, applied(configuration, list(effects)), demands)
+    return tried(name, apply_effects(configuration, list(effects)), demands)
 
 
 def evidence_of(*recordings: Recording) -> Evidence:

@@ -21,7 +21,7 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Sensing, sampled, sensors
+from rigtwin.simulation.converters import Sensing, sample_sensors, sensors
 from rigtwin.simulation.plant import Machine, advance, sense
 from rigtwin.simulation.twin import Twin
 
@@ -38,7 +38,7 @@ def analogue(plant: RigPlant) -> RigPlant:
 @compilable
 def _sample(machine: Machine, sensing: Sensing, disturbance: Array, inputs: Conversion, truth: Array, volts: Array) -> None:
     true = sense(machine)
-    measured = sampled(sensing, true, disturbance)
+    measured = sample_sensors(sensing, true, disturbance)
     for column in range(4):
         truth[column], volts[column] = true[column], measured[column]
     volts_of(inputs, volts, volts)

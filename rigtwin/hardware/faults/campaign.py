@@ -15,7 +15,7 @@ import numpy as np
 
 from controllers import Commands
 from controllers import update as healthy
-from rigtwin.description.configuration import overridden
+from rigtwin.description.configuration import override
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import ChannelTable
@@ -97,7 +97,7 @@ def test_of(fault: Fault, table: ChannelTable) -> Test:
 
     experiment = find(fault.experiment)
     changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
-    configuration = overridden(experiment.configuration, changes)
+    configuration = override(experiment.configuration, changes)
     return Test(fault.experiment, configuration, experiment.demands(configuration, fault.seed), fault.seed, table)
 
 

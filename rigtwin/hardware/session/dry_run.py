@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.description.configuration import Configuration, flattened
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, written
 from rigtwin.numerics.arrays import Array
@@ -27,7 +27,7 @@ def predicted(recording: Recording, configuration: Configuration) -> tuple[Peak,
 
 def digest(experiment: str, configuration: Configuration, demands: Array, table: ChannelTable) -> str:
     """What makes a session another one: experiment, every setting, what is demanded, and the channel table."""
-    told = json.dumps([experiment, flattened(configuration), written(table)], sort_keys=True)
+    told = json.dumps([experiment, flatten(configuration), written(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
 
 

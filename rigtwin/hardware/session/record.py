@@ -10,7 +10,7 @@ from typing import Any
 
 from controllers import update
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, applied, flattened
+from rigtwin.description.configuration import Configuration, apply_effects, flatten
 from rigtwin.hardware.daq.card import Card, connected, require_client
 from rigtwin.hardware.daq.table import ChannelTable, fit, written
 from rigtwin.hardware.daq.terminals import Terminals
@@ -50,7 +50,7 @@ class Test:
 
     def terminals(self) -> Terminals:
         """The twin at the card's terminals, wired as the table says."""
-        return Terminals(applied(self.configuration, list(self.effects)), self.table, self.seed)
+        return Terminals(apply_effects(self.configuration, list(self.effects)), self.table, self.seed)
 
 
 def on_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
@@ -69,7 +69,7 @@ def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     """What a recording says beyond the test: the channel table, and how a twin made it."""
     told = {CARD_RECORD: {"table": written(test.table)}}
     if virtual:
-        told[TWIN_RECORD] = twin_values(test.seed, flattened(test.configuration), test.effects, __version__)
+        told[TWIN_RECORD] = twin_values(test.seed, flatten(test.configuration), test.effects, __version__)
     return told
 
 
@@ -78,7 +78,7 @@ def _writing(path: Path, test: Test) -> dict[str, Any]:
         "path": path,
         "experiment": test.experiment,
         "period": test.configuration.timing.period,
-        "controller": flattened(test.configuration)["controller"],
+        "controller": flatten(test.configuration)["controller"],
     }
 
 
