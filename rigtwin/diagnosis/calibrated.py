@@ -21,7 +21,9 @@ def toml(diagnosis: Diagnosis) -> str:
     answer = diagnosis.answer
     lines = [f"# {answer.verdict}: {answer.sentence}"]
     lines += [f"# from {recording}" for recording in answer.recordings]
-    lines += [f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each]
+    lines += [
+        f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
+    ]
     nominal = flatten(Configuration(plant=diagnosis.described.plant, controller=Nothing()))
     corrected = flatten(Configuration(plant=diagnosis.machine.plant, controller=Nothing()))
     for group in diagnosis.described.plant._fields:

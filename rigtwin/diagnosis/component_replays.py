@@ -69,7 +69,9 @@ class ComponentReplays:
     def _apply_lvdts(self, wheel: Array) -> Array:
         """The difference of both LVDTs for a true wheel position and the plate's motion."""
         plate = self.structure_motion.position
-        return self._apply_sensor("structure_lvdt", plate) - self._apply_sensor("suspension_lvdt", plate - wheel)
+        return self._apply_sensor("structure_lvdt", plate) - self._apply_sensor(
+            "suspension_lvdt", plate - wheel
+        )
 
     def _motion(self, name: str, expected: Array) -> Motion:
         """The true motion that a sensor measured, given what a replay expects of it."""
@@ -102,7 +104,9 @@ class ComponentReplays:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
         # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
-        uncompressed = self._ground_start - initial_deflection(self.configuration.plant, self.preload)
+        uncompressed = self._ground_start - initial_deflection(
+            self.configuration.plant, self.preload
+        )
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
@@ -119,7 +123,9 @@ class ComponentReplays:
     @cached_property
     def carriage_output(self) -> Array:
         sensor = self.configuration.plant.load_cell
-        force = undo_sensor(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
+        force = undo_sensor(
+            sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period
+        )
         return replay_carriage(
             self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload
         )
@@ -190,7 +196,9 @@ class ComponentReplays:
         force = self._apply_sensor("load_cell", self.mechanics_output.load_cell)
         pairs = {
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
-            "wheel": self._residual(self.wheel, self._apply_lvdts(self.mechanics_output.wheel), "m"),
+            "wheel": self._residual(
+                self.wheel, self._apply_lvdts(self.mechanics_output.wheel), "m"
+            ),
         }
         return combine_residuals(
             {n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period
@@ -220,15 +228,21 @@ class ComponentReplays:
             differences[name] = (
                 np.array([commands[number] for commands in replay.written]) - recorded
             )
-            outputs[name] = compute_residual(differences[name], rounding(recorded), unit, self.period)
+            outputs[name] = compute_residual(
+                differences[name], rounding(recorded), unit, self.period
+            )
         return combine_residuals(outputs, differences, self.period)
 
     def closed_loop(self) -> Residual:
         """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
-        truth = simulate(without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED).truth
+        truth = simulate(
+            without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED
+        ).truth
         units = ("m", "m", "m", "N")
         pairs = {
-            name: self._residual(self._sensor(name), self._apply_sensor(name, truth[:, number]), unit)
+            name: self._residual(
+                self._sensor(name), self._apply_sensor(name, truth[:, number]), unit
+            )
             for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
         }
         return combine_residuals(

@@ -141,7 +141,9 @@ class ControllerReplay:
         )[1]
 
 
-def _minimise(misfit: Callable[[float], float], told: float, meaning: Quantity) -> tuple[float, float]:
+def _minimise(
+    misfit: Callable[[float], float], told: float, meaning: Quantity
+) -> tuple[float, float]:
     """Smallest misfit over one setting, and where: a coarse look around the told value, then a bounded search."""
     size = max(abs(told), 0.01 * min(meaning.high, 1.0))
     # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.

@@ -13,6 +13,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
@@ -21,10 +22,6 @@ BLOCK = 0.5
 DRAWS = 1000
 SEED = 20
 """Of the bootstrap's draws."""
-WORSE = 1.05
-"""Times the gap without it from which a correction is rejected."""
-BETTER = 0.995
-"""The same for a rough model."""
 TAPER = 0.1
 """s, over which a part of a recording begins and ends to count."""
 
@@ -107,7 +104,7 @@ def interval(of: Blocks) -> Interval:
 
 @dataclass(frozen=True)
 class Validation:
-    """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
+    """What a correction does on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
     halves: the fits to each half of the recordings, where they were made."""
 
     predicted: float
@@ -141,17 +138,37 @@ def _fit_halves(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[A
     """The halves of the recordings, and the fit made again to each."""
     parts = halves(evidence.recordings)
     return parts, [
-        _refit(
-            Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit
-        )
+        _refit(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit)
         for part in parts
     ]
 
 
-def validate(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Validation:
-    """Judges a fit on evidence held out of it; without any, on each half of the recordings after a fit to the other."""
+def validate(
+    evidence: Evidence,
+    fit: Fit,
+    other: Evidence | None = None,
+    thresholds: Thresholds = STANDARD,
+) -> Validation:
+    """Validates a fit on data held out of it.
+
+    Parameters
+    ----------
+    evidence
+        What it was fitted to.
+    fit
+        The correction.
+    other
+        Evidence held out of it; without any, each half of the recordings after a fit to the other.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    Validation
+        How far the gap shrinks there, and which effects stay.
+    """
     # Where much is left, an effect must help to stay.
-    worse = BETTER if evidence.machine.rough else WORSE
+    worse = thresholds.better if evidence.machine.rough else thresholds.worse
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
@@ -200,7 +217,12 @@ def validate(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Val
     kept, rejected = reject_worsening(fit.effects, blocks_across, worse)
     data = "each half, fitted to the other"
     return Validation(
-        float(np.mean(predictions)), interval(blocks_across(kept)), kept, rejected, data, tuple(fits)
+        float(np.mean(predictions)),
+        interval(blocks_across(kept)),
+        kept,
+        rejected,
+        data,
+        tuple(fits),
     )
 
 
@@ -215,7 +237,7 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
 
 
 def reject_worsening(
-    effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE
+    effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worse
 ) -> tuple[Effects, Effects]:
     """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
     of the effects."""

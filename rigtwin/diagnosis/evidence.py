@@ -229,7 +229,9 @@ class Evidence:
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
         for each, model in zip(self.lines, self.models, strict=True):
-            change = each.fade * (model.predict(self.plant) - model.double_steps().predict(self.plant))
+            change = each.fade * (
+                model.predict(self.plant) - model.double_steps().predict(self.plant)
+            )
             power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
             for row in range(len(self.names)):
                 variance = COARSE * 0.5 * _smooth(power[row])

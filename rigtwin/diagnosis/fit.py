@@ -272,7 +272,9 @@ class Fitter:
             for _, response in self._responses[effect]
         )
 
-    def _responses_beside(self, effect: Effect, first: Fit) -> list[tuple[tuple[float, ...], Array]]:
+    def _responses_beside(
+        self, effect: Effect, first: Fit
+    ) -> list[tuple[tuple[float, ...], Array]]:
         """The responses of an effect: at the nominal plant, or beside `first` if it does nothing without that, as a play does
         nothing without friction."""
         if self.largest_response(effect) > NOTHING:
@@ -284,7 +286,9 @@ class Fitter:
             found.append((start, (here - there).astype(np.float32)))
         return found
 
-    def propose_additions(self, first: Fit, effects: Sequence[Effect], least: float) -> list[Proposal]:
+    def propose_additions(
+        self, first: Fit, effects: Sequence[Effect], least: float
+    ) -> list[Proposal]:
         """Second effects beside `first` that promise to explain at least `least`, by how well their responses at the nominal
         plant, or beside it, resemble what it leaves."""
         space = Space(self.evidence, first.plant)
@@ -310,14 +314,18 @@ class Fitter:
                 )
         return found
 
-    def _scale_start(self, effect: Effect, start: tuple[float, ...], share: float) -> tuple[float, ...]:
+    def _scale_start(
+        self, effect: Effect, start: tuple[float, ...], share: float
+    ) -> tuple[float, ...]:
         """A start with that share of its magnitude; limits, which nothing can be scaled from, as they are."""
         nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
         if effect.kind.name in LIMITS:
             return start
         return (nominal + share * (start[0] - nominal), *start[1:])
 
-    def propose_replacements(self, fit: Fit, effects: Sequence[Effect]) -> list[tuple[tuple[Effect, ...], Values]]:
+    def propose_replacements(
+        self, fit: Fit, effects: Sequence[Effect]
+    ) -> list[tuple[tuple[Effect, ...], Values]]:
         """The effects of a fit with each in turn replaced by those whose response is most like its own, and values to start
         from: what was found first may only resemble what is there."""
         found = []

@@ -11,16 +11,14 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
 from rigtwin.diagnosis.fit import Fit, Fitter, is_possible, without_each
 from rigtwin.diagnosis.localisation import locate
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit
 from rigtwin.signals.noise import rms
 
-OUTSTANDING = 1.3
-"""Times its noise from which a signal has something left, if that is more than no model is held to."""
 
-
-def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[Step, ...]:
+def steps(evidence: Evidence, chain: Sequence[Fit], held_out: Evidence) -> tuple[Step, ...]:
     """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal plant first."""
-    found = [Step("nominal", {}, remaining_rms(judged, evidence.plant))]
+    found = [Step("nominal", {}, remaining_rms(held_out, evidence.plant))]
     before: set[str] = set()
     for fit in chain:
         names = {effect.name for effect in fit.effects}
@@ -39,7 +37,7 @@ def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[S
             for part in (f"with {added}" if added else "", f"without {gone}" if gone else "")
             if part
         )
-        found.append(Step(said, values, remaining_rms(judged, fit.plant)))
+        found.append(Step(said, values, remaining_rms(held_out, fit.plant)))
         before = names
     return tuple(found)
 
@@ -69,7 +67,12 @@ def power_without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
     return found
 
 
-def leftovers(evidence: Evidence, plant: Plant, disturbed: Sequence[DisturbanceFit]) -> list[Place]:
+def leftovers(
+    evidence: Evidence,
+    plant: Plant,
+    disturbed: Sequence[DisturbanceFit],
+    thresholds: Thresholds = STANDARD,
+) -> list[Place]:
     """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
     differences = evidence.differences(plant)
     levels = remaining_rms(evidence, plant)
@@ -87,7 +90,9 @@ def leftovers(evidence: Evidence, plant: Plant, disturbed: Sequence[DisturbanceF
     for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
         noise = float(evidence.lines[0].noise[number])
         typical = rms(np.concatenate([each.measured[number] for each in evidence.lines]))
-        if levels[name] < max(OUTSTANDING * noise, evidence.machine.form_of(row) * typical):
+        if levels[name] < max(
+            thresholds.left_over * noise, evidence.machine.form_of(row) * typical
+        ):
             continue
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
         share = (levels[name] / noise) ** 2 / total

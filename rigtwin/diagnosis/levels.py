@@ -128,7 +128,11 @@ def _closed_loop(
         found[corrected, SEEDS[0]],
         found[corrected, SEEDS[1]],
     )
-    return Level(_spectral_distance(measured, one), _spectral_distance(measured, other), _spectral_distance(other, again))
+    return Level(
+        _spectral_distance(measured, one),
+        _spectral_distance(measured, other),
+        _spectral_distance(other, again),
+    )
 
 
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:

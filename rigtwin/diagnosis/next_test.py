@@ -47,7 +47,9 @@ def record_on_twin(
     )
 
 
-def propose_test(machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]) -> NextTest | None:
+def propose_test(
+    machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]
+) -> NextTest | None:
     """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
     if len(fits) < 2:
         return None

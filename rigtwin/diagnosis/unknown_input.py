@@ -109,10 +109,16 @@ def locate_disturbance(
     disturbances = [
         _Disturbance(component, evidence, plant) for component in evidence.models[0].components()
     ]
-    found = sorted((_fit_component(each, space, 1) for each in disturbances), key=lambda each: each.misfit)
+    found = sorted(
+        (_fit_component(each, space, 1) for each in disturbances), key=lambda each: each.misfit
+    )
     if follow:
         foremost = [each.component for each in found[:FOLLOWED]]
-        again = [_fit_component(each, space, ROUNDS) for each in disturbances if each.component in foremost]
+        again = [
+            _fit_component(each, space, ROUNDS)
+            for each in disturbances
+            if each.component in foremost
+        ]
         found = sorted([*again, *found[FOLLOWED:]], key=lambda each: each.misfit)
     return tuple(found)
 
