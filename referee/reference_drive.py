@@ -72,18 +72,18 @@ def drive(truth: Truth, configuration: Configuration, demands: Array, seed: int)
     commands, sensors, true = (np.empty((ticks, 4)) for _ in range(3))
     held = np.array([demands[0, 0], settings.start, settings.preload, settings.preload / 186.0])
     done, number = _ticks(
-        truth,
-        body,
-        controlling,
-        configuration.safety,
-        watching_compiled(),
-        np.array(packed(initial_state(controlling))),
-        np.ascontiguousarray(demands),
-        noise,
-        missed,
-        held,
-        commands,
-        sensors,
-        true,
+        truth=truth,
+        body=body,
+        controlling=controlling,
+        limits=configuration.safety,
+        watch=watching_compiled(),
+        memory=np.array(packed(initial_state(controlling))),
+        demands=np.ascontiguousarray(demands),
+        noise=noise,
+        missed=missed,
+        held=held,
+        commands_out=commands,
+        sensors_out=sensors,
+        truth_out=true,
     )
     return SimulationResult(commands[:done], sensors[:done], true[:done], Trip(number))

@@ -81,7 +81,7 @@ def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator) -> 
     ticks = len(demands)
     noise, absent = draw_noise(truth, ticks, random)
     commands, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
-    done = simulate(truth, law, np.ascontiguousarray(demands), np.empty(0), noise, absent, commands, sensors)
+    done = simulate(truth=truth, law=law, demands=np.ascontiguousarray(demands), voltages=np.empty(0), noise=noise, missed=absent, commands=commands, sensors=sensors)
     return commands[:done], sensors[:done]
 
 
@@ -102,5 +102,5 @@ def run_quiet(truth: Truth, law: Law, commands: Array) -> Array:
     ticks = len(commands)
     out, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
     demands, voltages = np.ascontiguousarray(commands[:, :3]), np.ascontiguousarray(commands[:, 3])
-    simulate(truth, law, demands, voltages, np.zeros((ticks, 4)), np.zeros(ticks), out, sensors)
+    simulate(truth=truth, law=law, demands=demands, voltages=voltages, noise=np.zeros((ticks, 4)), missed=np.zeros(ticks), commands=out, sensors=sensors)
     return sensors

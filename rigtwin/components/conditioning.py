@@ -66,14 +66,14 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
     )
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
     return Actuator(
-        neutral,
-        delay / timestep,
-        of.deadband,
-        not isinstance(of, Cylinder),
-        of.gain,
-        of.saturation,
-        rate * timestep if rate < UNLIMITED else UNLIMITED,
-        share,
+        neutral=neutral,
+        delay=delay / timestep,
+        deadband=of.deadband,
+        zero_centred=not isinstance(of, Cylinder),
+        gain=of.gain,
+        saturation=of.saturation,
+        rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
+        share=share,
     )
 
 

@@ -107,7 +107,9 @@ class Components:
             return
         joint = mechanism.joint_of(element, mjcf)
         self.types[name] = kind
-        self.values[name] = self._fill(name, where, kind, table, element, mjcf, joint)
+        self.values[name] = self._fill(
+            name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
+        )
         turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
@@ -133,7 +135,13 @@ class Components:
                     f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}",
                 )
         self.found[name] = Component(
-            name, element, mjcf, joint, channel, unit, self._kinds(where, kind, table)
+            name=name,
+            element=element,
+            mjcf=mjcf,
+            joint=joint,
+            channel=channel,
+            unit=unit,
+            kinds=self._kinds(where, kind, table),
         )
 
     def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:

@@ -236,7 +236,9 @@ def override(
                 raise RigtwinError(
                     f"unknown setting {group_name}.{key}; {group_name} has {', '.join(meanings)}"
                 )
-            group = group._replace(**{key: check_value(f"{group_name}.{key}", value, meanings[key])})
+            group = group._replace(
+                **{key: check_value(f"{group_name}.{key}", value, meanings[key])}
+            )
         if group_name in plant._fields:
             plant = plant._replace(**{group_name: group})
         else:

@@ -142,13 +142,13 @@ class Replays:
                 f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide",
             )
         return ReplayOf(
-            str(table.get("name", f"replay {number}")),
-            joint,
-            tuple(movers),
-            tuple(rows),
-            at["guide"][0] if at["guide"] else None,
-            at["mass"][0] if at["mass"] else None,
-            closed,
+            name=str(table.get("name", f"replay {number}")),
+            joint=joint,
+            moved_by=tuple(movers),
+            rows=tuple(rows),
+            guide=at["guide"][0] if at["guide"] else None,
+            mass=at["mass"][0] if at["mass"] else None,
+            closed=closed,
         )
 
     def _closes(self, mover: str) -> bool:

@@ -234,16 +234,16 @@ def _conclude(
     )
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
     return Attribution(
-        nothing,
-        expected,
-        named,
-        ranking,
-        explained if found else 0.0,
-        left,
-        more,
-        shares,
-        silent,
-        tuple(chain),
+        nothing=nothing,
+        expected=expected,
+        best=named,
+        ranking=ranking,
+        explained=explained if found else 0.0,
+        left=left,
+        unknown=more,
+        shares=shares,
+        silent=silent,
+        chain=tuple(chain),
     )
 
 

@@ -80,13 +80,13 @@ def replay_cylinder(
     state = rest_state(cylinder, float(command.memory[3]) if position is None else position)
     model = discretise(cylinder, timestep)
     _cylinder(
-        model,
-        state,
-        conditioning,
-        command,
-        np.ascontiguousarray(commands),
-        configuration.substeps,
-        out,
+        model=model,
+        state=state,
+        conditioning=conditioning,
+        command=command,
+        commands=np.ascontiguousarray(commands),
+        substeps=configuration.substeps,
+        out=out,
     )
     return out
 
@@ -167,18 +167,18 @@ def _run(
     conditioning = actuator(plant.motor, plant.computer, configuration.timing.timestep)
     out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
     _mechanics(
-        view,
-        contacts(plant, wheel, float(structure[0]) - wheel),
-        conditioning,
-        hold(conditioning, preload / plant.motor.constant),
-        substeps,
-        _interpolate(ground, substeps),
-        _interpolate(structure, substeps),
-        np.empty(0) if carriage is None else _interpolate(carriage, substeps),
-        np.ascontiguousarray(voltage),
-        np.ascontiguousarray(force),
-        out.load_cell,
-        out.wheel,
+        mechanics=view,
+        contacts=contacts(plant, wheel, float(structure[0]) - wheel),
+        motor_drive=conditioning,
+        motor_command=hold(conditioning, preload / plant.motor.constant),
+        substeps=substeps,
+        ground=_interpolate(ground, substeps),
+        structure=_interpolate(structure, substeps),
+        carriage=np.empty(0) if carriage is None else _interpolate(carriage, substeps),
+        voltage=np.ascontiguousarray(voltage),
+        force=np.ascontiguousarray(force),
+        load_cell_out=out.load_cell,
+        wheel_out=out.wheel,
     )
     return out
 
@@ -191,7 +191,17 @@ def replay_carriage(
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
     wheel = float(ground[0]) - initial_deflection(plant, preload)
-    return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
+    return _run(
+        plant=alone,
+        configuration=configuration,
+        ground=ground,
+        structure=nothing,
+        carriage=None,
+        voltage=nothing,
+        force=force,
+        preload=0.0,
+        wheel=wheel,
+    ).wheel
 
 
 def replay_mechanics(
@@ -201,15 +211,15 @@ def replay_mechanics(
     plant = configuration.plant
     wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
-        plant,
-        configuration,
-        ground,
-        structure,
-        None,
-        voltage,
-        np.zeros_like(voltage),
-        preload,
-        wheel,
+        plant=plant,
+        configuration=configuration,
+        ground=ground,
+        structure=structure,
+        carriage=None,
+        voltage=voltage,
+        force=np.zeros_like(voltage),
+        preload=preload,
+        wheel=wheel,
     )
 
 
@@ -222,5 +232,13 @@ def replay_motor(
     )
     nothing = np.zeros_like(travel)
     return _run(
-        alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0
+        plant=alone,
+        configuration=configuration,
+        ground=nothing - AWAY,
+        structure=travel,
+        carriage=nothing,
+        voltage=voltage,
+        force=nothing,
+        preload=preload,
+        wheel=0.0,
     ).load_cell

@@ -194,7 +194,13 @@ def validate(
             fit = Fitter(evidence).refit_with_tolerances(Fitter(evidence).refine(kept, values))
         apart = _fit_halves(evidence, fit)[1] if evidence.machine.rough else []
         return Validation(
-            predicted, interval(blocks_with(kept)), kept, rejected, data, tuple(apart), fit
+            predicted=predicted,
+            held_out=interval(blocks_with(kept)),
+            kept=kept,
+            rejected=rejected,
+            data=data,
+            halves=tuple(apart),
+            fit=fit,
         )
     parts, fits = _fit_halves(evidence, fit)
     predictions, outcomes = [], []

@@ -110,7 +110,16 @@ def lines(
     if carried is not None:
         floor = np.sqrt(floor**2 + np.var(carried, axis=1))
     floor = np.maximum(floor, 1e-300)
-    return Lines(frequency[kept], weight, spread, fade, measured, floor, resolution, length)
+    return Lines(
+        frequency=frequency[kept],
+        weight=weight,
+        spread=spread,
+        fade=fade,
+        measured=measured,
+        noise=floor,
+        bit=resolution,
+        length=length,
+    )
 
 
 def _smooth(power: Array, lines: int = SMOOTHED) -> Array:

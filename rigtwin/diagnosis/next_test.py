@@ -37,13 +37,13 @@ def record_on_twin(
     period = configuration.timing.period
     controller = flatten(configuration)["controller"]
     return Recording(
-        Path(name),
-        machine.name,
-        name,
-        period,
-        np.arange(len(ran.commands)) * period,
-        columns,
-        controller,
+        path=Path(name),
+        machine=machine.name,
+        experiment=name,
+        period=period,
+        time=np.arange(len(ran.commands)) * period,
+        columns=columns,
+        controller=controller,
     )
 
 

@@ -63,7 +63,9 @@ class Joints:
         number, _, own = entry.partition(":")
         return np.concatenate(
             [
-                each.predict_disturbed(plant, own, amount) if place == int(number) else each.predict(plant)
+                each.predict_disturbed(plant, own, amount)
+                if place == int(number)
+                else each.predict(plant)
                 for place, each in enumerate(self._joints)
             ]
         )

@@ -85,14 +85,14 @@ def follow_command(
     out = np.empty(count)
     rate = actuator.rate_limit * h if actuator.rate_limit < UNLIMITED else UNLIMITED
     _follow_command(
-        wanted,
-        actuator.deadband,
-        actuator.gain,
-        actuator.offset,
-        actuator.saturation,
-        rate,
-        shares,
-        second,
-        out,
+        wanted=wanted,
+        play=actuator.deadband,
+        gain=actuator.gain,
+        offset=actuator.offset,
+        limit=actuator.saturation,
+        rate=rate,
+        shares=shares,
+        second=second,
+        out=out,
     )
     return np.ascontiguousarray(out[::steps])

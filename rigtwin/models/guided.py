@@ -74,7 +74,9 @@ def inverse_dynamics(
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
         x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
-        transmitted = inertia.mass * a + gravity(inertia, x) + position_force(guide, x, inertia.rest)
+        transmitted = (
+            inertia.mass * a + gravity(inertia, x) + position_force(guide, x, inertia.rest)
+        )
         forward, backward = dry_limits(dry_friction, v, transmitted)
         dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
         slider += by

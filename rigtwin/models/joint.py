@@ -161,7 +161,9 @@ class JointModel:
             else:
                 position = self._undo_sensor(mover)
                 error = 0.0 if self._integrated else self._error / max(mover.gain, 1e-9)
-            out = self._inverse_dynamics(plant, position if shift is None else position + shift, error)
+            out = self._inverse_dynamics(
+                plant, position if shift is None else position + shift, error
+            )
             if force is not None:
                 out[2] -= force
         # A plant that is not stable runs away; it must be a bad explanation, not an impossible number.
@@ -196,7 +198,15 @@ class JointModel:
         )
         out = np.zeros((4, len(position)))
         out[:2] = motion[:2]
-        inverse_dynamics(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
+        inverse_dynamics(
+            guide=guide,
+            dry_friction=friction(guide),
+            inertia=inertia,
+            spring=1.0 / softest,
+            period=self._period,
+            motion=motion,
+            out=out[2],
+        )
         return out
 
     def _integrate_pushed(
@@ -217,24 +227,24 @@ class JointModel:
         command = self._command.copy()
         out = np.zeros((4, len(command)))
         integrate_pushed(
-            guide,
-            friction(guide),
-            inertia,
-            spring,
-            self._start,
-            mover.constant,
-            min(mover.force_limit, UNLIMITED),
-            conditioning,
-            hold(conditioning, first),
-            models,
-            states,
-            kinds,
-            self._loop(noise),
-            command,
-            np.ascontiguousarray(besides),
-            self._period,
-            self._steps,
-            out,
+            guide=guide,
+            dry_friction=friction(guide),
+            inertia=inertia,
+            spring=spring,
+            start=self._start,
+            constant=mover.constant,
+            limit=min(mover.force_limit, UNLIMITED),
+            drive=conditioning,
+            held=hold(conditioning, first),
+            sensors=models,
+            states=states,
+            kinds=kinds,
+            loop=self._loop(noise),
+            command=command,
+            besides=np.ascontiguousarray(besides),
+            period=self._period,
+            steps=self._steps,
+            out=out,
         )
         out[3] = command
         return out
@@ -244,13 +254,13 @@ class JointModel:
         if control is None:
             program = NO_COMMAND.program
             return Loop(
-                False,
-                program,
-                program.registers.copy(),
-                NO_COMMAND.memory(),
-                np.zeros((1, 1)),
-                np.zeros((1, 1)),
-                np.zeros(0, np.int64),
+                closed=False,
+                program=program,
+                registers=program.registers.copy(),
+                memory=NO_COMMAND.memory(),
+                recorded=np.zeros((1, 1)),
+                noise=np.zeros((1, 1)),
+                sensor=np.zeros(0, np.int64),
             )
         program = control.formula.with_settings(self._settings)
         names = [self._machine.components[name].channel for name in self._sensors]
@@ -268,7 +278,13 @@ class JointModel:
         if noise is None:
             noise = np.zeros_like(recorded)
         return Loop(
-            True, program, program.registers.copy(), control.formula.memory(), recorded, noise, which
+            closed=True,
+            program=program,
+            registers=program.registers.copy(),
+            memory=control.formula.memory(),
+            recorded=recorded,
+            noise=noise,
+            sensor=which,
         )
 
     def predict_true(self, plant: Plant) -> Array:

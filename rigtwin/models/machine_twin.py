@@ -88,7 +88,15 @@ def run_machine(
     ticks = len(next(iter(next(iter(columns.values())).values())))
     random = np.random.default_rng([seed, 3])
     for replay in machine.replays:
-        _simulate(machine, replay, actual, columns, ticks, random, controller)
+        _simulate(
+            machine=machine,
+            replay=replay,
+            configuration=actual,
+            columns=columns,
+            ticks=ticks,
+            random=random,
+            controller=controller,
+        )
     settings = flatten(configuration)
     told = settings.get("controller", {}) if controller is None else {}
     fields = {topic: tuple(names) for topic, names in columns.items()}
@@ -112,7 +120,9 @@ BLOCK = 250
 FINISHED = "completed"
 
 
-def _check_demands(machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]) -> Columns:
+def _check_demands(
+    machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]
+) -> Columns:
     columns: Columns = {}
     names = {f"{topic}.{name}" for topic, name in wanted} | {name for _, name in wanted}
     if unknown := [name for name in demands if name not in names]:
@@ -173,7 +183,15 @@ def _simulate(
     for _, (topic, name) in sensors:
         made.setdefault(topic, {}).setdefault(name, np.zeros(ticks))
     time = np.arange(ticks) * period
-    recording = Recording(Path("test"), machine.name, "", period, time, made, {})
+    recording = Recording(
+        path=Path("test"),
+        machine=machine.name,
+        experiment="",
+        period=period,
+        time=time,
+        columns=made,
+        controller={},
+    )
     model = MujocoModel(machine, replay, recording, configuration, configuration.substeps)
     model.sensor_noise = {name: _noise(plant, name, ticks, period, random) for name, _ in sensors}
     model.controller = controller
@@ -192,7 +210,9 @@ def _simulate(
             reading = model.read[name]
         else:
             row = {PositionSensor: 0, VelocitySensor: 1, ForceSensor: 2}[type(getattr(plant, name))]
-            reading = apply_sensor(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
+            reading = (
+                apply_sensor(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
+            )
             bit = getattr(plant, name).resolution
             reading = np.round(reading / bit) * bit if bit > 0.0 else reading
         columns.setdefault(topic, {})[field] = reading

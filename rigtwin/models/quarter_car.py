@@ -140,14 +140,14 @@ def move_plate(
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
     state = rest_state(cylinder, float(held.memory[3]) if at is None else at)
     _plate(
-        discretise(cylinder, timestep),
-        state,
-        conditioning,
-        held,
-        commands,
-        steps,
-        out.position,
-        out.onward,
+        model=discretise(cylinder, timestep),
+        state=state,
+        conditioning=conditioning,
+        held=held,
+        commands=commands,
+        steps=steps,
+        position=out.position,
+        onward=out.onward,
     )
     return out
 
@@ -357,7 +357,13 @@ class QuarterCarModel:
             if len(self._plates) > KEPT:
                 self._plates.clear()
             found = move_plate(
-                unloaded, computer, commands, start, at, self._period / self._steps, self._steps
+                cylinder=unloaded,
+                computer=computer,
+                commands=commands,
+                start=start,
+                at=at,
+                timestep=self._period / self._steps,
+                steps=self._steps,
             )
             self._plates[key] = found
         return found
@@ -382,31 +388,31 @@ class QuarterCarModel:
         )
         motor: Motor = plant.motor
         carriage = Carriage(
-            timestep,
-            plant.carriage.mass,
-            plant.rail.viscous,
-            motor.viscous,
-            motor.constant,
-            1.0 - math.exp(-timestep / motor.time_constant),
-            min(motor.voltage_limit, motor.force_limit / motor.constant),
+            timestep=timestep,
+            mass=plant.carriage.mass,
+            rail_viscous=plant.rail.viscous,
+            motor_viscous=motor.viscous,
+            motor_constant=motor.constant,
+            motor_share=1.0 - math.exp(-timestep / motor.time_constant),
+            voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
         )
         conditioning = actuator(motor, plant.computer, timestep)
         out = np.empty((4, len(self._voltage)))
         _mechanics(
-            carriage,
-            contacts(plant, start, 0.0),
-            conditioning,
-            hold(conditioning, self._preload / motor.constant),
-            start,
-            self._preload,
-            self._steps,
-            ground.position,
-            ground.onward,
-            structure.position,
-            structure.onward,
-            self._voltage + besides.voltage,
-            besides.force,
-            out,
+            carriage=carriage,
+            now=contacts(plant, start, 0.0),
+            motor_drive=conditioning,
+            motor_command=hold(conditioning, self._preload / motor.constant),
+            start=start,
+            preload=self._preload,
+            steps=self._steps,
+            ground=ground.position,
+            ground_onward=ground.onward,
+            structure=structure.position,
+            structure_onward=structure.onward,
+            voltage=self._voltage + besides.voltage,
+            pushed=besides.force,
+            out=out,
         )
         return out
 

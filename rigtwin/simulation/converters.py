@@ -43,7 +43,12 @@ def build_sensing(plant: RigPlant, period: float) -> Sensing:
     one, two, three, four = (transducer(sensor, period) for sensor in sensors(plant))
     return Sensing(
         (one, two, three, four),
-        (start_transducer(one), start_transducer(two), start_transducer(three), start_transducer(four)),
+        (
+            start_transducer(one),
+            start_transducer(two),
+            start_transducer(three),
+            start_transducer(four),
+        ),
         resolutions(plant),
     )
 
@@ -106,7 +111,5 @@ def sample_sensors(sensing: Sensing, true: Measurements, disturbance: Array) -> 
             disturbance[2],
             bits.suspension_lvdt,
         ),
-        quantise(
-            transduce(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell
-        ),
+        quantise(transduce(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell),
     )

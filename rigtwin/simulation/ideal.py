@@ -127,7 +127,18 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
     transition, step = _discretise(a, entry, period / substeps)
     states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
     rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
-    _simulate(settings, on_wheel, transition, step, inputs, rows, start, substeps, states, besides)
+    _simulate(
+        settings=settings,
+        on_wheel=on_wheel,
+        transition=transition,
+        step=step,
+        inputs=inputs,
+        rows=rows,
+        start=start,
+        substeps=substeps,
+        states=states,
+        besides=besides,
+    )
     inputs[:, 3] = besides
     wing = None if body.wing is None else states[:, :count] @ body.wing
     return Ideal(

@@ -205,19 +205,19 @@ def run_compiled(
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
         done, number, column = _ticks(
-            twin.simulation.machine,
-            controlling,
-            configuration.safety,
-            watch,
-            twin.sensing,
-            memory,
-            twin.held,
-            asked,
-            twin.misses(len(asked)),
-            twin.disturbance.take(len(asked)),
-            commands,
-            measured,
-            truth,
+            machine=twin.simulation.machine,
+            controlling=controlling,
+            limits=configuration.safety,
+            watch=watch,
+            sensing=twin.sensing,
+            memory=memory,
+            held=twin.held,
+            demands=asked,
+            missed=twin.misses(len(asked)),
+            disturbance=twin.disturbance.take(len(asked)),
+            commands_out=commands,
+            measured_out=measured,
+            truth_out=truth,
         )
         trip = Trip(number)
         yield Block(first, commands[:done], measured[:done], truth[:done], trip, column)

@@ -28,7 +28,9 @@ class Tracking:
     force_total: float
 
 
-def compute_tracking(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
+def compute_tracking(
+    target: Ideal, commands: Array, structure: Array, load_cell: Array
+) -> Tracking:
     """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
     structure, load_cell: what was sensed, m and N."""
     position, force = commands[:, 1], commands[:, 2]
@@ -54,4 +56,6 @@ def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
     commands = np.column_stack(
         [recording.column("/command", name) for name in ("ground", "structure", "force")]
     )
-    return compute_tracking(simulate_ideal(configuration, commands[:, 0]), commands, structure, load_cell)
+    return compute_tracking(
+        simulate_ideal(configuration, commands[:, 0]), commands, structure, load_cell
+    )

@@ -136,20 +136,20 @@ class Simulation:
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0)
         self.machine = Machine(
-            view,
-            substeps,
-            not touching.changing and all(each.neutral for each in drives),
-            discretise(plant.ground_cylinder, timestep),
-            rest_state(plant.ground_cylinder, here),
-            drives[0],
-            held[0],
-            discretise(plant.structure_cylinder, timestep),
-            rest_state(plant.structure_cylinder, carriage),
-            drives[1],
-            held[1],
-            drives[2],
-            held[2],
-            touching,
+            mechanics=view,
+            substeps=substeps,
+            plain=not touching.changing and all(each.neutral for each in drives),
+            ground=discretise(plant.ground_cylinder, timestep),
+            ground_state=rest_state(plant.ground_cylinder, here),
+            ground_drive=drives[0],
+            ground_command=held[0],
+            structure=discretise(plant.structure_cylinder, timestep),
+            structure_state=rest_state(plant.structure_cylinder, carriage),
+            structure_drive=drives[1],
+            structure_command=held[1],
+            motor_drive=drives[2],
+            motor_command=held[2],
+            contacts=touching,
         )
 
 
