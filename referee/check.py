@@ -1,4 +1,5 @@
-"""Runs the withheld-effect check: the referee in one process, diagnoses in others, the key opened last."""
+"""Runs the withheld-effect check: the referee in one process, diagnoses in others, the key opened
+last."""
 
 from __future__ import annotations
 
@@ -16,14 +17,15 @@ from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
-"""Contents of a case's recordings: the one that is diagnosed, and the one held out. A worker needs no disk in common."""
+"""Contents of a case's recordings: the one that is diagnosed, and the one held out. A worker needs
+no disk in common."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON document a case; crude:
-    what the black-box baseline named, of the cases it was tried on; commitment: SHA-256 of salt and key, given before any
-    answer."""
+    """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON
+    document a case; crude: what the black-box baseline named, of the cases it was tried on;
+    commitment: SHA-256 of salt and key, given before any answer."""
 
     seed: int
     commitment: str
@@ -40,15 +42,18 @@ def check(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Result:
-    """The whole check. folder: recordings and answers; answers that are there for the same recordings are kept, so that an
-    interrupted check goes on. progress is called once a recording and once an answer.
+    """The whole check. folder: recordings and answers; answers that are there for the same
+    recordings are kept, so that an interrupted check goes on. progress is called once a recording
+    and once an answer.
 
     Raises RigtwinError if the referee fails, or its key is not the one that it committed itself to.
     """
     recordings = folder / f"seed-{seed}"
     recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as referee:
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as referee:
         assert referee.stdin is not None
         assert referee.stdout is not None
         commitment = ""
@@ -78,7 +83,9 @@ def check(
     return Result(seed, commitment, json.loads(opened), given, crude)
 
 
-def _diagnose_all(recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]) -> list[dict[str, Any]]:
+def _diagnose_all(
+    recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]
+) -> list[dict[str, Any]]:
     def jobs() -> Iterator[tuple[str, Files]]:
         for number in range(cases):
             files = [path.read_bytes() for path in _paths(recordings, number)]
@@ -96,11 +103,14 @@ def _paths(recordings: Path, number: int) -> tuple[Path, Path]:
 
 def _key(recordings: Path, number: int) -> str:
     """Of a case: another recording is another question."""
-    return hashlib.sha256(b"".join(path.read_bytes() for path in _paths(recordings, number))).hexdigest()
+    return hashlib.sha256(
+        b"".join(path.read_bytes() for path in _paths(recordings, number))
+    ).hexdigest()
 
 
 def answer(files: Files) -> dict[str, Any]:
-    """One case's answer, of its recording and the one held out. Runs where there are neither the key nor the other cases."""
+    """One case's answer, of its recording and the one held out. Runs where there are neither the
+    key nor the other cases."""
     from rigtwin.description.catalogue import find
     from rigtwin.description.configuration import Configuration
     from rigtwin.diagnosis import diagnose as module
@@ -112,7 +122,9 @@ def answer(files: Files) -> dict[str, Any]:
         for name, content in zip(names, files, strict=True):
             (Path(folder) / name).write_bytes(content)
         recording, held_out = (load(Path(folder) / name) for name in names)
-        return module.diagnose(find(DEFAULT_MACHINE), [recording], Configuration(), [held_out]).diagnosis.document()
+        return module.diagnose(
+            find(DEFAULT_MACHINE), [recording], Configuration(), [held_out]
+        ).diagnosis.document()
 
 
 def name_effect(content: bytes) -> str:
@@ -128,5 +140,13 @@ def name_effect(content: bytes) -> str:
 def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
     from referee.crude import TRIED
 
-    jobs = ((str(number), _paths(recordings, number)[0].read_bytes()) for number in range(min(cases, TRIED)))
-    return {int(number): name for number, name in sorted(iterate_results(workers, name_effect, jobs), key=lambda pair: int(pair[0]))}
+    jobs = (
+        (str(number), _paths(recordings, number)[0].read_bytes())
+        for number in range(min(cases, TRIED))
+    )
+    return {
+        int(number): name
+        for number, name in sorted(
+            iterate_results(workers, name_effect, jobs), key=lambda pair: int(pair[0])
+        )
+    }

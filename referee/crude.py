@@ -1,4 +1,5 @@
-"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit named."""
+"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit
+named."""
 
 from __future__ import annotations
 
@@ -32,9 +33,17 @@ def black_box(path: Path) -> str:
     machine = find(DEFAULT_MACHINE)
     configuration = machine.configuration_of(recording)
     ticks = min(recording.ticks, round(SECONDS / recording.period))
-    free = without_limits(configuration._replace(timing=configuration.timing._replace(timestep=0.5 * recording.period)))
-    demands = np.column_stack([recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")])
-    measured = np.stack([recording.column("/sensor", name)[:ticks] for name in Measurements._fields])
+    free = without_limits(
+        configuration._replace(
+            timing=configuration.timing._replace(timestep=0.5 * recording.period)
+        )
+    )
+    demands = np.column_stack(
+        [recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")]
+    )
+    measured = np.stack(
+        [recording.column("/sensor", name)[:ticks] for name in Measurements._fields]
+    )
     noise = np.array([white_noise(row) for row in measured])
 
     def misfit(plant: RigPlant) -> float:
@@ -45,7 +54,9 @@ def black_box(path: Path) -> str:
     swing = swings(machine, (recording,))
     for effect in candidates(configuration.plant):
         if effect.searched:
-            starts = effect.starts(configuration.plant, swing.get(effect.component, Swing()), lambda: NO_SIZES)
+            starts = effect.starts(
+                configuration.plant, swing.get(effect.component, Swing()), lambda: NO_SIZES
+            )
             for start in starts.values[:8]:
                 if (value := misfit(with_values(configuration.plant, (effect,), (start,)))) < best:
                     best, name = value, effect.name

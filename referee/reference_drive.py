@@ -1,4 +1,5 @@
-"""The rig's own controller on the referee's plant: what a test would be on a rig that the twin is not."""
+"""The rig's own controller on the referee's plant: what a test would be on a rig that the twin is
+not."""
 
 from __future__ import annotations
 
@@ -50,21 +51,35 @@ def _ticks(
         row = sensors_out[tick]
         measured = Measurements(row[0], row[1], row[2], row[3])
         if missed[tick] == 0.0:
-            state, commands = update(controlling, state, measured, Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]))
+            state, commands = update(
+                controlling,
+                state,
+                measured,
+                Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]),
+            )
             for signal in range(4):
                 held[signal] = commands[signal]
         for signal in range(4):
             commands_out[tick, signal] = held[signal]
             truth_out[tick, signal] = values[signal]
-        trip, _ = judged(limits, controlling.period, watch, measured, Commands(held[0], held[1], held[2], held[3]))
+        trip, _ = judged(
+            limits,
+            controlling.period,
+            watch,
+            measured,
+            Commands(held[0], held[1], held[2], held[3]),
+        )
         if trip != Trip.NONE.value:
             return tick + 1, trip
         advance(truth, body, held, tick * controlling.period)
     return len(demands), Trip.NONE.value
 
 
-def drive(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> SimulationResult:
-    """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant is not looked at."""
+def drive(
+    truth: Truth, configuration: Configuration, demands: Array, seed: int
+) -> SimulationResult:
+    """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant
+    is not looked at."""
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)
     body = at_rest(truth, float(demands[0, 0]), settings.start, settings.preload)

@@ -1,4 +1,5 @@
-"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit, lag, in that order.
+"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit,
+lag, in that order.
 
 All of them are neutral in the nominal machine, whose commands pass as they are.
 """
@@ -32,8 +33,9 @@ from rigtwin.numerics.delay import delayed, ring
 
 
 class Actuator(NamedTuple):
-    """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or about the last position (a
-    valve's overlap). rate: greatest change a timestep. share: of the way to its input that the lag goes in a timestep."""
+    """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or
+    about the last position (a valve's overlap). rate: greatest change a timestep. share: of the way
+    to its input that the lag goes in a timestep."""
 
     neutral: bool
     delay: float
@@ -46,14 +48,16 @@ class Actuator(NamedTuple):
 
 
 class ActuatorState(NamedTuple):
-    """history: past commands, a ring; memory: where the ring stands, the deadband's output, the rate limit's, the lag's."""
+    """history: past commands, a ring; memory: where the ring stands, the deadband's output, the
+    rate limit's, the lag's."""
 
     history: Array
     memory: Array
 
 
 def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep: float) -> Actuator:
-    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's command."""
+    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's
+    command."""
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
     neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (

@@ -1,4 +1,5 @@
-"""Whatever slides along a guide: its friction, springs and waves; their law, and the effects of them.
+"""Whatever slides along a guide: its friction, springs and waves; their law, and the effects of
+them.
 
 Dry friction is set-valued: while nothing moves it bears any force up to the limits that
 `dry_limits` gives. `docs/theory.md` has the equations.
@@ -39,7 +40,8 @@ WAVES = 1.5
 
 
 class Rail(NamedTuple):
-    """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor too."""
+    """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor
+    too."""
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1000.0, "breakaway, thesis §6.1.3")] = 50.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e4, NONE)] = 0.0
@@ -54,9 +56,9 @@ class Rail(NamedTuple):
 class Guide(NamedTuple):
     """Whatever acts between the moving part and the frame: a guide's friction, a damper, a spring.
 
-    force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v| + stiffness·x + offset
-    + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction. Dry friction acts through a play of `backlash` and a
-    spring of `compliance` in series with it.
+    force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v| +
+    stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction. Dry
+    friction acts through a play of `backlash` and a spring of `compliance` in series with it.
     """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0

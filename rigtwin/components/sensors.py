@@ -1,4 +1,5 @@
-"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and quantisation apart."""
+"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and
+quantisation apart."""
 
 from __future__ import annotations
 
@@ -90,7 +91,8 @@ Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
 
 
 class Transducer(NamedTuple):
-    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the lag goes in a tick."""
+    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the
+    lag goes in a tick."""
 
     neutral: bool
     gain: float
@@ -100,7 +102,8 @@ class Transducer(NamedTuple):
 
 
 class TransducerState(NamedTuple):
-    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the lag's output."""
+    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the
+    lag's output."""
 
     history: Array
     memory: Array
@@ -146,7 +149,8 @@ def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
 
 
 def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
-    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
+    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay
+    undone, not its offset.
 
     The lag's inverse is limited to 80 Hz, or it would make much of the noise.
     """

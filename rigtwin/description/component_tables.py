@@ -57,8 +57,9 @@ QUARTER_CAR = {
 
 
 class Components:
-    """Components as they are read. found, types, values: name → component, type, NamedTuple of its values; sources, told: of
-    `component.parameter`, a text, and the controller's setting that says it in recordings."""
+    """Components as they are read. found, types, values: name → component, type, NamedTuple of its
+    values; sources, told: of `component.parameter`, a text, and the controller's setting that says
+    it in recordings."""
 
     def __init__(self, mechanism: Mechanism, mistakes: Mistakes) -> None:
         self._mechanism, self.mistakes = mechanism, mistakes
@@ -93,7 +94,8 @@ class Components:
         if len(elements) != 1:
             self.mistakes.note(
                 where,
-                f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}",
+                f"expected one of {', '.join(ELEMENTS)} to say what "
+                f"of the MJCF it is, found {len(elements)}",
             )
             return
         element, mjcf = elements[0], str(table[elements[0]])
@@ -122,7 +124,8 @@ class Components:
             if table.get("unit", unit) != unit:
                 self.mistakes.note(
                     where,
-                    f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts",
+                    f"unit {table['unit']!r}: recordings are in SI, "
+                    f"here {unit!r}; rigtwin import converts",
                 )
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
@@ -132,7 +135,8 @@ class Components:
             if key in table and not fits:
                 self.mistakes.note(
                     where,
-                    f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}",
+                    f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; "
+                    f"this is a {kind}",
                 )
         self.found[name] = Component(
             name=name,
@@ -254,7 +258,8 @@ class Components:
             else:
                 self.mistakes.note(
                     here,
-                    f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"',
+                    f"tolerance {width!r}: expected a number in "
+                    f'{meaning.unit} or a percentage such as "1 %"',
                 )
         return component
 

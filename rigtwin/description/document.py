@@ -1,4 +1,5 @@
-"""Reads a machine's description, one TOML beside an MJCF, and explains every mistake in it in one line."""
+"""Reads a machine's description, one TOML beside an MJCF, and explains every mistake in it in one
+line."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def load(path: Path) -> Machine:
 
 
 def examine(path: Path) -> tuple[Machine | None, list[str]]:
-    """The machine of a description, and all mistakes in it, one line each; no machine if there are any."""
+    """The machine of a description, and all mistakes in it, one line each; no machine if there are
+    any."""
     mistakes = Mistakes()
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))

@@ -42,7 +42,8 @@ class Replays:
         ):
             self._mistakes.note(
                 "",
-                "it has no [[replays]]; expected one that says what moves the joint and what is observed",
+                "it has no [[replays]]; expected one that says what "
+                "moves the joint and what is observed",
             )
             return ()
         found = []
@@ -77,7 +78,8 @@ class Replays:
             if mover not in known:
                 self._mistakes.note(
                     where,
-                    f"moved_by {mover!r} is no actuator or sensor of the motion; {near(mover, known)}",
+                    f"moved_by {mover!r} is no actuator or sensor "
+                    f"of the motion; {near(mover, known)}",
                 )
         rows = [
             row
@@ -91,7 +93,8 @@ class Replays:
         if len(movers) > 1 and not quarter_car:
             self._mistakes.note(
                 where,
-                f"moved by {len(movers)} components; expected one, and another replay for each other joint",
+                f"moved by {len(movers)} components; expected one, "
+                "and another replay for each other joint",
             )
             return None
         if not joint_name and not quarter_car:
@@ -128,18 +131,21 @@ class Replays:
                 if other is not None and other.joint != joint_name:
                     self._mistakes.note(
                         where,
-                        f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}",
+                        f"{row.name} is of joint {other.joint or 'none'}, "
+                        f"{movers[0]} moves {joint_name}",
                     )
         closed = self._closes(movers[0])
         if self._components.types[movers[0]] == "force actuator" and not at["mass"]:
             self._mistakes.note(
                 where,
-                f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass",
+                f"{movers[0]} pushes joint {joint_name}, whose mass "
+                "is no component; add one of type mass",
             )
         if self._components.types[movers[0]] == "force actuator" and not at["guide"]:
             self._mistakes.note(
                 where,
-                f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide",
+                f"{movers[0]} pushes joint {joint_name}, which "
+                "is no component; add one of type guide",
             )
         return ReplayOf(
             name=str(table.get("name", f"replay {number}")),
@@ -197,8 +203,8 @@ class Replays:
         return None
 
     def tolerate_timing(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since the period is the
-        recording's."""
+        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since
+        the period is the recording's."""
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
             names = [

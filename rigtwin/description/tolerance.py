@@ -1,4 +1,5 @@
-"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a diagnosis, never a finding."""
+"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a
+diagnosis, never a finding."""
 
 from __future__ import annotations
 
@@ -11,8 +12,8 @@ MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's unit, or as a share of its
-    value if relative, or in ticks."""
+    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's
+    unit, or as a share of its value if relative, or in ticks."""
 
     group: str
     parameter: str

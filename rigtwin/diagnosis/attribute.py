@@ -1,4 +1,5 @@
-"""Which effects explain the evidence: every candidate fitted, pairs where one is not enough, and how sure that is."""
+"""Which effects explain the evidence: every candidate fitted, pairs where one is not enough, and
+how sure that is."""
 
 from __future__ import annotations
 
@@ -51,10 +52,11 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Attribution:
-    """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be named, None for none;
-    ranking: all tried, the likeliest first; explained: share of the gap; left: χ² per degree of freedom above 1 after it;
-    unknown: whether what is left is a gap; shares: of the gap, of each effect named; silent: effects that no size tried makes
-    noticeable on this evidence; chain: the fits as effects were found one after another, the first alone first."""
+    """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be
+    named, None for none; ranking: all tried, the likeliest first; explained: share of the gap;
+    left: χ² per degree of freedom above 1 after it; unknown: whether what is left is a gap; shares:
+    of the gap, of each effect named; silent: effects that no size tried makes noticeable on this
+    evidence; chain: the fits as effects were found one after another, the first alone first."""
 
     nothing: Fit
     expected: float
@@ -210,7 +212,8 @@ def _conclude(
     temper = thresholds.temper + thresholds.form_temper * max(best.misfit - expected, 0.0)
     apart = np.array([(cost(fit) - cost(best)) / (2.0 * temper) for fit in pool])
     if evidence.machine.rough:
-        # What is left is no noise but the model's error: as many pieces of it as are independent speak for one against another.
+        # What is left is no noise but the model's error: as many pieces of it as are independent
+        # speak for one against another.
         relative = np.array([(cost(fit) + expected) / (cost(best) + expected) for fit in pool])
         apart = 0.5 * _count_independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
@@ -248,8 +251,8 @@ def _conclude(
 
 
 def _count_independent(evidence: Evidence, plant: Plant) -> float:
-    """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
-    imaginary parts."""
+    """How many independent pieces what a plant leaves consists of: the lines that share its power,
+    twice, for real and imaginary parts."""
     total = square = 0.0
     for transform in evidence.transforms(evidence.differences(plant)):
         power = np.abs(transform) ** 2
@@ -259,7 +262,8 @@ def _count_independent(evidence: Evidence, plant: Plant) -> float:
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:
-    """The share of the gap of each effect: what would come back without it, of what would for all."""
+    """The share of the gap of each effect: what would come back without it, of what would for
+    all."""
     if len(fit.effects) == 1:
         return {fit.name: explained}
     whole = float(np.sum(evidence.residual(fit.plant) ** 2))

@@ -1,4 +1,5 @@
-"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from the nominal machine."""
+"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from
+the nominal machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The first look at a gap: a recording against the twin, replay by replay, or against another recording of the same test."""
+"""The first look at a gap: a recording against the twin, replay by replay, or against another
+recording of the same test."""
 
 from __future__ import annotations
 
@@ -22,8 +23,9 @@ from rigtwin.signals.noise import white_noise, without_mains
 
 @dataclass(frozen=True)
 class Comparison:
-    """What each replay of a recording leaves, by its name, and what could not be replayed and why. gap: rms of all signals less
-    what the twin predicts of them, in units of their white noise; 1 is noise alone."""
+    """What each replay of a recording leaves, by its name, and what could not be replayed and why.
+    gap: rms of all signals less what the twin predicts of them, in units of their white noise; 1 is
+    noise alone."""
 
     replays: dict[str, Residual]
     left_out: dict[str, str]
@@ -112,7 +114,8 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":
         notes.append(
-            "with a model in the loop a limit cycle drifts in phase, so two runs of one rig differ too"
+            "with a model in the loop a limit cycle drifts in "
+            "phase, so two runs of one rig differ too"
         )
     return tuple(notes)
 
@@ -120,13 +123,15 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
 def compare_recordings(
     machine: Machine, first: Recording, second: Recording
 ) -> dict[str, Residual]:
-    """Two recordings of one test, sensor by sensor over their common length. The floor is both sensors' noise together.
+    """Two recordings of one test, sensor by sensor over their common length. The floor is both
+    sensors' noise together.
 
     Raises RigtwinError if their periods differ or they share no sensor.
     """
     if first.period != second.period:
         raise RigtwinError(
-            f"periods differ: {first.path} has {first.period:g} s, {second.path} has {second.period:g} s"
+            f"periods differ: {first.path} has {first.period:g} "
+            f"s, {second.path} has {second.period:g} s"
         )
     ticks = min(first.ticks, second.ticks)
     if ticks < SHORTEST:

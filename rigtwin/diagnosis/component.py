@@ -1,6 +1,8 @@
-"""Component replays: recorded signals drive one component alone, and its output is put beside what was measured.
+"""Component replays: recorded signals drive one component alone, and its output is put beside what
+was measured.
 
-All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces than a test does.
+All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces
+than a test does.
 """
 
 from __future__ import annotations
@@ -43,7 +45,8 @@ AWAY = 1.0
 
 @dataclass(frozen=True)
 class Output:
-    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m; shape (ticks,)."""
+    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m;
+    shape (ticks,)."""
 
     load_cell: Array
     wheel: Array
@@ -72,8 +75,8 @@ def replay_cylinder(
     start: float,
     position: float | None = None,
 ) -> Array:
-    """Command → plate position at every tick, m, unloaded, from rest at `position` under the command `start`; by default
-    where that command holds it."""
+    """Command → plate position at every tick, m, unloaded, from rest at `position` under the
+    command `start`; by default where that command holds it."""
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
     command = hold(conditioning, start)
@@ -106,7 +109,8 @@ def _mechanics(
     load_cell_out: Array,
     wheel_out: Array,
 ) -> None:
-    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage free."""
+    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage
+    free."""
     driven = len(carriage) > 0
     ticks = len(voltage)
     for tick in range(ticks):
@@ -138,8 +142,8 @@ def _mechanics(
 
 
 def _interpolate(motion: Array, substeps: int) -> Array:
-    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity must not jump, or a motor
-    that sticks would have to pass on the blow."""
+    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity
+    must not jump, or a motor that sticks would have to pass on the blow."""
     ticks = len(motion)
     spline = CubicSpline(np.arange(ticks), motion)
     fine = spline(np.arange(substeps * (ticks - 1) + 1) / substeps)
@@ -186,7 +190,8 @@ def _run(
 def replay_carriage(
     configuration: Configuration, ground: Array, force: Array, preload: float
 ) -> Array:
-    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both are out of it."""
+    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both
+    are out of it."""
     plant = configuration.plant
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
@@ -207,7 +212,8 @@ def replay_carriage(
 def replay_mechanics(
     configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float
 ) -> Output:
-    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
+    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and
+    carriage together."""
     plant = configuration.plant
     wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
@@ -226,7 +232,8 @@ def replay_mechanics(
 def replay_motor(
     configuration: Configuration, travel: Array, voltage: Array, preload: float
 ) -> Array:
-    """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
+    """Travel and voltage → load cell force, N. Friction at standstill is not determined by
+    these."""
     alone = configuration.plant._replace(
         carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring()
     )

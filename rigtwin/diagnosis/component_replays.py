@@ -1,4 +1,5 @@
-"""The replays of one recording: every component alone, driven by measured signals; the mechanics together; the closed loop."""
+"""The replays of one recording: every component alone, driven by measured signals; the mechanics
+together; the closed loop."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ from rigtwin.simulation.replay import Replay
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
-"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""
+"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from
+standstill."""
 CERTAIN = 3.0
 """Standard deviations of a velocity beyond which its sign is certain."""
 CLOSED_LOOP_SEED = 2**31 - 1
@@ -41,7 +43,8 @@ class Undetermined(Exception):
 
 
 class ComponentReplays:
-    """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
+    """The replays of one recording by the twin of one configuration. Motions are estimated once and
+    shared.
 
     The data have to be fit for a comparison, see `data_checks`.
     """
@@ -103,7 +106,8 @@ class ComponentReplays:
     def structure_cylinder_output(self) -> Array:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
-        # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
+        # A test starts with its spring uncompressed: the plate stands where the preload holds the
+        # wheel.
         uncompressed = self._ground_start - initial_deflection(
             self.configuration.plant, self.preload
         )
@@ -143,7 +147,8 @@ class ComponentReplays:
 
     @cached_property
     def travel_motion(self) -> Motion:
-        """Of plate against wheel, by the difference that the carriage's replay leaves between the LVDTs."""
+        """Of plate against wheel, by the difference that the carriage's replay leaves between the
+        LVDTs."""
         mains = self.configuration.plant.mains.frequency
         found = motion(self.wheel, self._apply_lvdts(self.carriage_output), self.period, mains)
         sensor = self.configuration.plant.suspension_lvdt
@@ -166,7 +171,8 @@ class ComponentReplays:
         return compute_residual(difference, white_noise(measured), unit, self.period), difference
 
     def motor(self) -> Residual:
-        """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
+        """Only where the motor is known to slide: voltage and travel do not determine its friction
+        at standstill."""
         measured, travel = self._sensor("load_cell"), self.travel_motion
         output = replay_motor(
             self.configuration, travel.position, self._command("voltage"), self.preload
@@ -234,7 +240,8 @@ class ComponentReplays:
         return combine_residuals(outputs, differences, self.period)
 
     def closed_loop(self) -> Residual:
-        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
+        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the
+        loop limit-cycles."""
         truth = simulate(
             without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED
         ).truth

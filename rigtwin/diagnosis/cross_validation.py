@@ -31,8 +31,8 @@ Effects = tuple[Effect, ...]
 
 @dataclass(frozen=True)
 class Blocks:
-    """Power of what is left, in units of the sensors' white noise power, by blocks of time: with the nominal plant and with the
-    corrected one. Shape (blocks,) each."""
+    """Power of what is left, in units of the sensors' white noise power, by blocks of time: with
+    the nominal plant and with the corrected one. Shape (blocks,) each."""
 
     before: Array
     after: Array
@@ -44,7 +44,8 @@ class Blocks:
 
 
 def power(evidence: Evidence, plant: Plant) -> list[Array]:
-    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
+    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,)
+    for each recording."""
     found = []
     for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
         relative = (each.measured - predicted) / each.noise[:, None]
@@ -53,7 +54,8 @@ def power(evidence: Evidence, plant: Plant) -> list[Array]:
 
 
 def gap_level(evidence: Evidence, plant: Plant) -> float:
-    """rms of all signals less what a plant predicts, in units of their white noise, where a test counts."""
+    """rms of all signals less what a plant predicts, in units of their white noise, where a test
+    counts."""
     powers = [
         each[lines.fade.max(axis=0) > 0.5]
         for each, lines in zip(power(evidence, plant), evidence.lines, strict=True)
@@ -83,7 +85,8 @@ def blocks(evidence: Evidence, before: Plant, after: Plant, counted: Sequence[Ar
 
 
 def shrinkage(before: float, after: float) -> float:
-    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's; negative if worse."""
+    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's;
+    negative if worse."""
     gap, left = math.sqrt(max(before - 1.0, 0.0)), math.sqrt(max(after - 1.0, 0.0))
     return 1.0 - left / gap if gap > 0.0 else 0.0
 
@@ -104,8 +107,9 @@ def interval(of: Blocks) -> Interval:
 
 @dataclass(frozen=True)
 class Validation:
-    """What a correction does on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
-    halves: the fits to each half of the recordings, where they were made."""
+    """What a correction does on data held out of its fit. kept: effects that do not worsen them;
+    rejected: those that do; halves: the fits to each half of the recordings, where they were
+    made."""
 
     predicted: float
     held_out: Interval
@@ -245,8 +249,8 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
 def reject_worsening(
     effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worse
 ) -> tuple[Effects, Effects]:
-    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
-    of the effects."""
+    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times.
+    across: what is left with some of the effects."""
     kept = effects
     while kept:
         left = across(kept)

@@ -49,8 +49,9 @@ UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
 
 @dataclass(frozen=True)
 class SimilarityLimits:
-    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign is wrong; unit: above which
-    a scale is judged; far: scale, either way, that is no gain whatever it is; close: how near a scale must be to a unit's."""
+    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign
+    is wrong; unit: above which a scale is judged; far: scale, either way, that is no gain whatever
+    it is; close: how near a scale must be to a unit's."""
 
     sign: float
     unit: float
@@ -65,8 +66,8 @@ ROUGH = SimilarityLimits(sign=0.8, unit=0.8, far=np.inf, close=0.15)
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with the data. kind: short name; where: the channel, or the recording; message: one line; fatal: no
-    comparison makes sense."""
+    """One thing wrong with the data. kind: short name; where: the channel, or the recording;
+    message: one line; fatal: no comparison makes sense."""
 
     kind: str
     where: str
@@ -107,7 +108,8 @@ def find_faults(
 def require_fit(
     machine: Machine, recording: Recording, configuration: Configuration
 ) -> tuple[Fault, ...]:
-    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that does."""
+    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that
+    does."""
     faults = find_faults(machine, recording, configuration)
     if fatal := [fault.message for fault in faults if fault.fatal]:
         raise RigtwinError(f"{recording.path}: {'; '.join(fatal)}")
@@ -148,7 +150,10 @@ def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
             f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}",
         )
     elif lasts < SHORTEST_TIME:
-        message = f"it lasts {lasts:.3g} s; a comparison needs at least {SHORTEST_TIME:g} s (is the time's unit right?)"
+        message = (
+            f"it lasts {lasts:.3g} s; a comparison needs at least "
+            f"{SHORTEST_TIME:g} s (is the time's unit right?)"
+        )
         yield Fault("too short", "recording", message)
 
 
@@ -157,7 +162,10 @@ def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
         first = gaps[0]
-        message = f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} s at {recording.time[first]:.3f} s"
+        message = (
+            f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} "
+            f"s at {recording.time[first]:.3f} s"
+        )
         yield Fault("gap", "recording", message)
     for topic, name in channels(machine):
         signal, where = recording.column(topic, name), f"{topic}.{name}"
@@ -259,7 +267,8 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
         if least < total(tuple(names)) / 3:
-            # Orders that fit about as well differ in what these data cannot tell; the fewest swaps are the likeliest.
+            # Orders that fit about as well differ in what these data cannot tell; the fewest swaps
+            # are the likeliest.
             likely = [order for order in orders if total(order) < 1.5 * least]
             best = min(
                 likely, key=lambda order: sum(n != m for n, m in zip(names, order, strict=True))
@@ -278,7 +287,8 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
     odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
         signal, where = recording.column(*row.channel), ".".join(row.channel)
-        # Motions have a zero that may be displaced; a known force has its preload, which says its scale even at rest.
+        # Motions have a zero that may be displaced; a known force has its preload, which says its
+        # scale even at rest.
         whole = row.kind == "force" and not machine.rough
         a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
@@ -313,7 +323,8 @@ def _unexplained_scales(
     found = dict(odd)
     for row in odd:
         if row.kind == "force" and _is_wound_up(machine, recording):
-            # A loop at its limit says that the force is not to be had; whose fault it is, is for the diagnosis.
+            # A loop at its limit says that the force is not to be had; whose fault it is, is for
+            # the diagnosis.
             del found[row]
     for unit in {row.unit for row in odd}:
         alike = [row for row in odd if row.unit == unit]

@@ -1,7 +1,7 @@
 """The diagnosis: recordings in, one answer out.
 
-checks → evidence → attribution (replays of the whole plant) and what needs no model (controller, sensors' sampling) →
-where → judged on held-out data → the next test.
+checks → evidence → attribution (replays of the whole plant) and what needs no model (controller,
+sensors' sampling) → where → judged on held-out data → the next test.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def diagnose(
     base
         The twin that they are compared with; by default the described one.
     held_out
-        Recordings that the correction is judged on; without any, each half of the others on a fit to the other half.
+        Recordings that the correction is judged on; without any, each half of the others on a fit
+        to the other half.
     tests
         The menu that a next test is chosen from.
     progress
@@ -169,7 +170,8 @@ def _diagnose(
         evidence.plant,
     )
     attributed = _findings(found, validation, evidence, thresholds)
-    # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
+    # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed
+    # to be the cause.
     lost = power_without_each(evidence, best) if evidence.machine.rough else {}
     traces = tuple(
         each
@@ -287,7 +289,8 @@ def _findings(
     fit = outcome.fit or found.best.fit
     widths = [
         tuple(
-            # A rough model's error is no noise: how far it leads astray shows between one half of the data and the other.
+            # A rough model's error is no noise: how far it leads astray shows between one half of
+            # the data and the other.
             max(width, abs(one - other) / thresholds.wider) if evidence.machine.rough else width
             for width, one, other in zip(
                 own, *(half.values[number] for half in outcome.halves), strict=True

@@ -1,8 +1,10 @@
-"""What recordings say of a plant: the difference between predicted and measured sensors, whitened, frequency by frequency.
+"""What recordings say of a plant: the difference between predicted and measured sensors, whitened,
+frequency by frequency.
 
-Commands are known exactly, so whatever a plant's prediction leaves is noise or a gap. Each line of the difference's
-spectrum is weighed by what may be there without meaning: the sensor's white noise, estimated from the data, and a small
-share of the signal, since no model is exact. The mains line says nothing of the plant and is left out.
+Commands are known exactly, so whatever a plant's prediction leaves is noise or a gap. Each line of
+the difference's spectrum is weighed by what may be there without meaning: the sensor's white noise,
+estimated from the data, and a small share of the signal, since no model is exact. The mains line
+says nothing of the plant and is left out.
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ STARTED = 0.7
 UNSEEN = 0.3
 """Share of that which does not count at all."""
 COARSER = 30.0
-"""How much more variance than rounding the prediction shows is put down to a coarse sensor's bits."""
+"""How much more variance than rounding the prediction shows is put down to a coarse sensor's
+bits."""
 COARSE_BIT = 2.0
 """Bits of this many times the noise, which they themselves then are, are seen in the signal."""
 JUMPS = ("force", "command")
@@ -55,10 +58,11 @@ WIDELY = 32
 
 @dataclass(frozen=True)
 class Lines:
-    """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
-    multiplied by, shape (rows, lines); spread: variance of noise alone in each line, shape (rows, lines); fade: what a
-    difference is multiplied by before, shape (rows, ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape
-    (rows,); bit: size of one of each signal, shape (rows,)."""
+    """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a
+    difference's transform is multiplied by, shape (rows, lines); spread: variance of noise alone in
+    each line, shape (rows, lines); fade: what a difference is multiplied by before, shape (rows,
+    ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape (rows,); bit: size of
+    one of each signal, shape (rows,)."""
 
     frequency: Array
     weight: Array
@@ -73,8 +77,8 @@ class Lines:
 def lines(
     machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
 ) -> Lines:
-    """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1,
-    shape (ticks,)."""
+    """The lines of a recording's signals, and their weights about a plant. counted: how much each
+    tick counts, 0 to 1, shape (ticks,)."""
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
@@ -135,7 +139,8 @@ def _fade(ticks: int, period: float) -> Array:
 
 @kernel
 def despike(signal: Array, height: float) -> None:
-    """Replaces what stands out of the median of seven neighbours by more than `height`, in place."""
+    """Replaces what stands out of the median of seven neighbours by more than `height`, in
+    place."""
     ticks = len(signal)
     if ticks < 7:
         return
@@ -166,8 +171,9 @@ def despike(signal: Array, height: float) -> None:
 class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
-    Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if nothing but white noise is
-    left. Several recordings stand one after another. models: under each one's inputs.
+    Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if
+    nothing but white noise is left. Several recordings stand one after another. models: under each
+    one's inputs.
     """
 
     def __init__(
@@ -178,8 +184,8 @@ class Evidence:
         counted: Sequence[Array] | None = None,
         steps: int = 4,
     ) -> None:
-        """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0
-        to 1; steps: of integration a tick."""
+        """configurations: of the twin, one for each recording, alike in their plant; counted: how
+        much each tick counts, 0 to 1; steps: of integration a tick."""
         counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.machine, self.recordings, self.configurations = (
             machine,
@@ -247,7 +253,8 @@ class Evidence:
                 each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def _round(self) -> None:
-        """Adds what the bits of a coarse sensor leave, which is no white noise but follows the signal."""
+        """Adds what the bits of a coarse sensor leave, which is no white noise but follows the
+        signal."""
         for each, predicted in zip(self.lines, self.predict(self.plant), strict=True):
             for row in range(len(self.names)):
                 bit = float(each.bit[row])
@@ -264,8 +271,9 @@ class Evidence:
         return [model.predict(plant) for model in self.models]
 
     def differences(self, plant: Plant) -> list[Array]:
-        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early
-        or late leaves says nothing of its size, and jumps when anything changes."""
+        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that
+        changes sign a tick early or late leaves says nothing of its size, and jumps when anything
+        changes."""
         return self._subtract(self.predict(plant))
 
     def _subtract(self, predictions: Sequence[Array]) -> list[Array]:
@@ -316,7 +324,8 @@ class Evidence:
         return plant
 
     def tolerance_responses(self, plant: Plant) -> Array:
-        """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""
+        """What each tolerance's half width does to the prediction at a plant, shape (size,
+        tolerances)."""
         before = self.predict(plant)
         columns = []
         for tolerance in self.machine.tolerances:

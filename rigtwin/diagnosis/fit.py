@@ -1,4 +1,5 @@
-"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their prior beside them."""
+"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their
+prior beside them."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ REFINED = 3
 WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
 LOOKALIKES, RESEMBLES = 3, 0.6
-"""Effects that are tried in another's place at most, if they can explain this share of what it does."""
+"""Effects that are tried in another's place at most, if they can explain this share of what it
+does."""
 LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
 NOTHING = 1e-3
@@ -41,8 +43,8 @@ Values = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their prior; widths: standard
-    deviation of each value; plant: with them."""
+    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their
+    prior; widths: standard deviation of each value; plant: with them."""
 
     effects: tuple[Effect, ...]
     values: Values
@@ -56,7 +58,8 @@ class Fit:
 
 
 def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
-    """The plant with effects of these values, one tuple an effect in the order of its parameters."""
+    """The plant with effects of these values, one tuple an effect in the order of its
+    parameters."""
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
         plant = with_parameters(plant, effect.group, changes)
@@ -70,8 +73,8 @@ def clashes(effect: Effect, others: Sequence[Effect]) -> bool:
 
 
 def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
-    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry
-    friction."""
+    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is
+    nothing without its dry friction."""
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide
@@ -93,7 +96,8 @@ def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]
 
 
 class Space:
-    """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
+    """The tolerances about one plant: what they can take up of a residual at what price, none
+    beyond its bound."""
 
     def __init__(
         self,
@@ -102,7 +106,8 @@ class Space:
         used: Array | None = None,
         effects: Sequence[Effect] = (),
     ) -> None:
-        """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
+        """used: by how many half widths the plant already uses each tolerance. An effect's own
+        parameters have none."""
         self._columns = evidence.tolerance_responses(plant)
         machine = evidence.machine
         own = [
@@ -152,8 +157,8 @@ class Space:
         return float(left @ left + PRIOR * found @ found)
 
     def normal_equations(self, jacobian: Array, residual: Array) -> tuple[Array, Array]:
-        """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's columns, with all
-        tolerances that are not at their bound free beside them."""
+        """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's
+        columns, with all tolerances that are not at their bound free beside them."""
         found = self.estimate_tolerances(residual)
         free = np.abs(found) < BEYOND
         columns = self._columns[:, free]
@@ -166,7 +171,8 @@ class Space:
 
 @dataclass(frozen=True)
 class Proposal:
-    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start from; space: tolerances."""
+    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start
+    from; space: tolerances."""
 
     promised: float
     effects: tuple[Effect, ...]
@@ -192,7 +198,8 @@ class Fitter:
         return effect.starts(self.plant, own, lambda: self._scale(effect.group))
 
     def _scale(self, component: str) -> Scales:
-        """What a component goes through on these recordings, by the nominal plant and by what is measured of the force."""
+        """What a component goes through on these recordings, by the nominal plant and by what is
+        measured of the force."""
         if component not in self._scales:
             longest = max(
                 range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
@@ -229,7 +236,8 @@ class Fitter:
         if found.quadrature:
             scored += self._blend(effect, responses)
         scored.sort()
-        # Another start is followed too where it comes near the best; where none helps, the best is followed alone.
+        # Another start is followed too where it comes near the best; where none helps, the best is
+        # followed alone.
         enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
         followed = [
             start
@@ -266,7 +274,8 @@ class Fitter:
         ]
 
     def largest_response(self, effect: Effect) -> float:
-        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
+        """χ² of the most that any size tried of an effect changes, beyond what tolerances take
+        up."""
         return max(
             self.space.misfit(response.astype(np.float64))
             for _, response in self._responses[effect]
@@ -275,8 +284,8 @@ class Fitter:
     def _responses_beside(
         self, effect: Effect, first: Fit
     ) -> list[tuple[tuple[float, ...], Array]]:
-        """The responses of an effect: at the nominal plant, or beside `first` if it does nothing without that, as a play does
-        nothing without friction."""
+        """The responses of an effect: at the nominal plant, or beside `first` if it does nothing
+        without that, as a play does nothing without friction."""
         if self.largest_response(effect) > NOTHING:
             return self._responses[effect]
         here = self.evidence.residual(first.plant)
@@ -289,8 +298,8 @@ class Fitter:
     def propose_additions(
         self, first: Fit, effects: Sequence[Effect], least: float
     ) -> list[Proposal]:
-        """Second effects beside `first` that promise to explain at least `least`, by how well their responses at the nominal
-        plant, or beside it, resemble what it leaves."""
+        """Second effects beside `first` that promise to explain at least `least`, by how well their
+        responses at the nominal plant, or beside it, resemble what it leaves."""
         space = Space(self.evidence, first.plant)
         left = space.subtract_tolerances(self.evidence.residual(first.plant))
         found = []
@@ -317,7 +326,8 @@ class Fitter:
     def _scale_start(
         self, effect: Effect, start: tuple[float, ...], share: float
     ) -> tuple[float, ...]:
-        """A start with that share of its magnitude; limits, which nothing can be scaled from, as they are."""
+        """A start with that share of its magnitude; limits, which nothing can be scaled from, as
+        they are."""
         nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
         if effect.kind.name in LIMITS:
             return start
@@ -326,8 +336,8 @@ class Fitter:
     def propose_replacements(
         self, fit: Fit, effects: Sequence[Effect]
     ) -> list[tuple[tuple[Effect, ...], Values]]:
-        """The effects of a fit with each in turn replaced by those whose response is most like its own, and values to start
-        from: what was found first may only resemble what is there."""
+        """The effects of a fit with each in turn replaced by those whose response is most like its
+        own, and values to start from: what was found first may only resemble what is there."""
         found = []
         here = self.evidence.residual(fit.plant)
         for number in range(len(fit.effects)):
@@ -368,7 +378,8 @@ class Fitter:
         return found
 
     def refit_with_tolerances(self, fit: Fit) -> Fit:
-        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant itself."""
+        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant
+        itself."""
         tolerances = self.evidence.machine.tolerances
         used = np.zeros(len(tolerances))
         space = Space(self.evidence, fit.plant, used, fit.effects)
@@ -387,8 +398,8 @@ class Fitter:
         return fit
 
     def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
-        """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
-        Gauss-Newton does not climb it."""
+        """The fit, or a better one a little further away: where a stick begins or is missed, the
+        misfit has a step, and Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):
             nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
             if effect.kind.name in LIMITS:
@@ -418,8 +429,8 @@ class Fitter:
         space: Space | None = None,
         base: Plant | None = None,
     ) -> Fit:
-        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
-        base: the plant without the effects."""
+        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those
+        about the nominal plant; base: the plant without the effects."""
         space, base = space or self.space, base or self.plant
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)

@@ -17,7 +17,8 @@ from rigtwin.signals.noise import rms
 
 
 def steps(evidence: Evidence, chain: Sequence[Fit], held_out: Evidence) -> tuple[Step, ...]:
-    """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal plant first."""
+    """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal
+    plant first."""
     found = [Step("nominal", {}, remaining_rms(held_out, evidence.plant))]
     before: set[str] = set()
     for fit in chain:
@@ -56,7 +57,8 @@ def remaining_rms(evidence: Evidence, plant: Plant) -> dict[str, float]:
 
 
 def power_without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
-    """Effect → power of what is left without it, the others fitted again, as a multiple of what is left with it."""
+    """Effect → power of what is left without it, the others fitted again, as a multiple of what is
+    left with it."""
     fitter = Fitter(evidence)
     found = {}
     for effect, others, values in without_each(fit):
@@ -73,7 +75,8 @@ def leftovers(
     disturbed: Sequence[DisturbanceFit],
     thresholds: Thresholds = STANDARD,
 ) -> list[Place]:
-    """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
+    """Where what is left lies, signal by signal, and what it goes with at the component that
+    explains it best."""
     differences = evidence.differences(plant)
     levels = remaining_rms(evidence, plant)
     found = []
@@ -96,6 +99,9 @@ def leftovers(
             continue
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
         share = (levels[name] / noise) ** 2 / total
-        words = f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} times its noise; {goes_with}"
+        words = (
+            f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} "
+            f"times its noise; {goes_with}"
+        )
         found.append(locate(evidence, name, share, own, words))
     return sorted(found, key=lambda place: -place.share)

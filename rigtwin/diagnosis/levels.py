@@ -1,4 +1,5 @@
-"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and after a correction."""
+"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and
+after a correction."""
 
 from __future__ import annotations
 
@@ -100,8 +101,8 @@ def _signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
 def _closed_loop(
     recording: Recording, before: Configuration, after: Configuration, own: RigPlant
 ) -> Level | None:
-    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too
-    short. own: the corrected plant with the noise that the recording has.
+    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra;
+    None if the test is too short. own: the corrected plant with the noise that the recording has.
     """
     if recording.ticks * recording.period < SHORTEST:
         return None

@@ -51,7 +51,8 @@ def distance_since_reversal(position: Array) -> Array:
 
 
 def region(difference: Array, motion: Motion, period: float) -> str:
-    """The operating region in which a difference, shape (ticks,), is concentrated, or `throughout`."""
+    """The operating region in which a difference, shape (ticks,), is concentrated, or
+    `throughout`."""
     speed, force, power = motion.speed, motion.force, difference**2
     total = float(np.sum(power))
     if total <= 0.0:

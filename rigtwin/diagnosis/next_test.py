@@ -1,4 +1,5 @@
-"""Which test to run next, where explanations remain: the one whose outcome they predict most differently."""
+"""Which test to run next, where explanations remain: the one whose outcome they predict most
+differently."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def record_on_twin(
 def propose_test(
     machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]
 ) -> NextTest | None:
-    """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
+    """The test of a menu that separates explanations best; None if none would. fits: the likeliest
+    first."""
     if len(fits) < 2:
         return None
     best: NextTest | None = None

@@ -16,9 +16,10 @@ SIGNIFICANT_DIGITS = 8
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor: what the sensors' white
-    noise alone would leave; ratio: of the two; band_hz: where the middle 80 % of the residual's power lies. unit "1": several
-    outputs together, each in units of its own noise floor, and `outputs` has them apart."""
+    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor:
+    what the sensors' white noise alone would leave; ratio: of the two; band_hz: where the middle 80
+    % of the residual's power lies. unit "1": several outputs together, each in units of its own
+    noise floor, and `outputs` has them apart."""
 
     residual: float
     noise_floor: float
@@ -46,7 +47,8 @@ def combine_residuals(
 
 
 def rounding(recorded: Array) -> float:
-    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit for a column of zeros."""
+    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit
+    for a column of zeros."""
     largest = float(np.max(np.abs(recorded)))
     if largest == 0.0:
         return 1e-12

@@ -1,4 +1,5 @@
-"""What the signals themselves say of their sensors: white noise, mains line, size of one bit. No model is needed."""
+"""What the signals themselves say of their sensors: white noise, mains line, size of one bit. No
+model is needed."""
 
 from __future__ import annotations
 
@@ -15,16 +16,17 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, smallest_step, white_noise, without_mains
 
 OUTSTANDING = 1.6
-"""Times its nominal value, and times what the other sensors have more than nominal, from which a sensor's noise, hum or bit
-is a finding. What all sensors have more is the laboratory's noise, which nobody declares exactly."""
+"""Times its nominal value, and times what the other sensors have more than nominal, from which a
+sensor's noise, hum or bit is a finding. What all sensors have more is the laboratory's noise, which
+nobody declares exactly."""
 LEVELS = 64
 """A signal with fewer values than these per swing is coarse enough for its bits to matter."""
 
 
 @dataclass(frozen=True)
 class SensorProperty:
-    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value, nominal: in the sensor's
-    unit."""
+    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value,
+    nominal: in the sensor's unit."""
 
     component: str
     kind: str
@@ -34,7 +36,8 @@ class SensorProperty:
 
 
 def properties(recording: Recording, name: str, predicted: Array, plant: Plant) -> dict[str, float]:
-    """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should read."""
+    """White noise rms, mains amplitude and bit of one sensor. predicted: what a twin says it should
+    read."""
     signal = recording.column("/sensor", name)
     difference = signal - predicted
     line = difference - without_mains(difference, recording.period, plant.mains.frequency)
@@ -50,8 +53,9 @@ def find_outstanding(
     predicted: Sequence[Sequence[Array]],
     plant: Plant,
 ) -> tuple[SensorProperty, ...]:
-    """What stands out of nominal, and of what the other sensors have, of those whose noise is declared. sensors: names in the
-    order of the rows of predicted: one list a recording, one array a sensor."""
+    """What stands out of nominal, and of what the other sensors have, of those whose noise is
+    declared. sensors: names in the order of the rows of predicted: one list a recording, one array
+    a sensor."""
     declared = [name for name in sensors if getattr(getattr(plant, name, None), "white", 0.0) > 0.0]
     if not declared:
         return ()

@@ -1,7 +1,8 @@
-"""Effects found one after another: the best explanation gets one more, as long as that explains enough of what is left.
+"""Effects found one after another: the best explanation gets one more, as long as that explains
+enough of what is left.
 
-What is found first may only resemble what is there, so two leaders are followed: the best of all, and the best with dry
-friction, without which a play, a spring or a Stribeck peak is nothing.
+What is found first may only resemble what is there, so two leaders are followed: the best of all,
+and the best with dry friction, without which a play, a spring or a Stribeck peak is nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from rigtwin.diagnosis.thresholds import STANDARD, NamingRules, Thresholds
 CONTAINED = {"two_lags": "lag"}
 """Kind → the simpler one that it becomes at the end of its range."""
 TRIED, SETTLED = 8, 3
-"""Further effects that are fitted beside a leader, and those fitted again with the tolerances taken at them."""
+"""Further effects that are fitted beside a leader, and those fitted again with the tolerances taken
+at them."""
 REPLACED = 6
 """Explanations with one effect replaced that are settled at most."""
 GATEWAY = "coulomb"
@@ -126,7 +128,8 @@ class Growth:
 def fit_stepwise(
     tried: Sequence[Fit], first: Fit, growth: Growth, map_fits: MapFits
 ) -> tuple[list[Fit], list[Fit]]:
-    """(further fits, the chain of fits that leads to the best one, from its first effect on). tried: of one and two."""
+    """(further fits, the chain of fits that leads to the best one, from its first effect on).
+    tried: of one and two."""
     found: list[Fit] = []
     before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
     level = sorted(
@@ -192,7 +195,8 @@ def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
 
 
 def _gateway_starts(leader: Fit, growth: Growth) -> list[Start]:
-    """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly resembles friction alone."""
+    """Starts for a gateway and what acts through it at once: friction behind a soft spring hardly
+    resembles friction alone."""
     search, found = growth.search, []
     for gate in growth.effects:
         if gate.kind.name != GATEWAY or gate.of is not Guide or clashes(gate, leader.effects):
@@ -225,7 +229,8 @@ def _pair_start(
 
 
 def _unfold(leader: Fit, growth: Growth) -> list[Start]:
-    """Starts with a lag and a delay where the leader has one effect of second order: at low frequencies they are alike."""
+    """Starts with a lag and a delay where the leader has one effect of second order: at low
+    frequencies they are alike."""
     found = []
     for effect, rest, values in without_each(leader):
         pair = [
@@ -243,7 +248,8 @@ def _unfold(leader: Fit, growth: Growth) -> list[Start]:
 
 
 def _prune(best: Fit, growth: Growth) -> list[Fit]:
-    """The fit with one effect after another taken out that explains nothing any more, now that the others are there."""
+    """The fit with one effect after another taken out that explains nothing any more, now that the
+    others are there."""
     found: list[Fit] = []
     while len(best.effects) > 1:
         fewer = [

@@ -1,8 +1,10 @@
-"""Where an effect acts that nobody has a name for: which component, disturbed in any way it could be, explains most.
+"""Where an effect acts that nobody has a name for: which component, disturbed in any way it could
+be, explains most.
 
-Each component gets a set of disturbances at its place, functions of what it goes through: its motion, speed, force, the time.
-Their strengths are fitted together, linearly. A sensor's disturbance shows in that sensor alone; an actuator's moves all that
-hangs on it; a force on what moves shows wherever that motion is seen.
+Each component gets a set of disturbances at its place, functions of what it goes through: its
+motion, speed, force, the time. Their strengths are fitted together, linearly. A sensor's
+disturbance shows in that sensor alone; an actuator's moves all that hangs on it; a force on what
+moves shows wherever that motion is seen.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ FOLLOWED = 6
 
 @dataclass(frozen=True)
 class DisturbanceFit:
-    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the disturbance goes with, the
-    strongest first."""
+    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the
+    disturbance goes with, the strongest first."""
 
     component: str
     misfit: float
@@ -103,8 +105,9 @@ class _Disturbance:
 def locate_disturbance(
     evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True
 ) -> tuple[DisturbanceFit, ...]:
-    """Every component disturbed freely, the one that explains most first. plant: with the effects that are known already;
-    follow: fit the foremost anew at what was found, as large disturbances need."""
+    """Every component disturbed freely, the one that explains most first. plant: with the effects
+    that are known already; follow: fit the foremost anew at what was found, as large disturbances
+    need."""
     space = Space(evidence, plant, None, effects)
     disturbances = [
         _Disturbance(component, evidence, plant) for component in evidence.models[0].components()

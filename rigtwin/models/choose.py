@@ -1,4 +1,5 @@
-"""The model of a machine under one recording's inputs: which one is chosen by the machine's structure alone."""
+"""The model of a machine under one recording's inputs: which one is chosen by the machine's
+structure alone."""
 
 from __future__ import annotations
 
@@ -48,7 +49,7 @@ def model_of(
 
 
 class Joints:
-    """Joints joints of one recording, their rows one after another."""
+    """All joints of one recording, their rows one after another."""
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)

@@ -27,8 +27,8 @@ def _follow_command(
     second: Array,
     out: Array,
 ) -> None:
-    """wanted, out: shape (steps,); rate: greatest change a step; shares: of each lag a step; second: transition of the
-    resonance and its entry, shape (2, 3), or of no size."""
+    """wanted, out: shape (steps,); rate: greatest change a step; shares: of each lag a step;
+    second: transition of the resonance and its entry, shape (2, 3), or of no size."""
     passed = wanted[0]
     limited = min(max(gain * passed + offset, -limit), limit)
     one = two = before = limited
@@ -63,7 +63,8 @@ def _follow_command(
 def follow_command(
     actuator: PositionActuator, command: Array, late: float, period: float, steps: int
 ) -> Array:
-    """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of the computer."""
+    """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of
+    the computer."""
     ticks, h = len(command), period / steps
     count = (ticks - 1) * steps + 1
     time = np.arange(count) * h

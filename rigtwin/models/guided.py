@@ -1,8 +1,9 @@
 """One joint's equation of motion: pushed by a force, or moved as prescribed. Compiled.
 
-Dry friction acts through a play and a spring in series with it. Where the description gives no spring it is as stiff as the
-step allows, which holds a sticking joint where it is. The step is implicit in friction and viscous forces, so it neither
-chatters nor creeps; positions are taken at the steps, velocities midway between them.
+Dry friction acts through a play and a spring in series with it. Where the description gives no
+spring it is as stiff as the step allows, which holds a sticking joint where it is. The step is
+implicit in friction and viscous forces, so it neither chatters nor creeps; positions are taken at
+the steps, velocities midway between them.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ RIGID = 1e6
 
 
 class Inertia(NamedTuple):
-    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions; rest: where the guide's
-    spring is slack."""
+    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions;
+    rest: where the guide's spring is slack."""
 
     mass: float
     first: float
@@ -37,8 +38,9 @@ class Inertia(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are recorded signals, shape
-    (ticks, inputs), or sensors with `noise` added, of that shape too: sensor[i] is −1 or the number of the sensor that input i comes from."""
+    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are
+    recorded signals, shape (ticks, inputs), or sensors with `noise` added, of that shape too:
+    sensor[i] is −1 or the number of the sensor that input i comes from."""
 
     closed: bool
     program: Program
@@ -69,7 +71,8 @@ def inverse_dynamics(
     motion: Array,
     out: Array,
 ) -> None:
-    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape (3, ticks)."""
+    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape
+    (3, ticks)."""
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
@@ -105,9 +108,9 @@ def integrate_pushed(
     steps: int,
     out: Array,
 ) -> None:
-    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity; command: as recorded, shape
-    (ticks,), replaced by the controller's if the loop is closed; besides: another force, N; out: position, velocity, force of
-    the actuator, shape (3, ticks)."""
+    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity;
+    command: as recorded, shape (ticks,), replaced by the controller's if the loop is closed;
+    besides: another force, N; out: position, velocity, force of the actuator, shape (3, ticks)."""
     h = period / steps
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0

@@ -1,4 +1,5 @@
-"""A joint replayed: its motion prescribed by a sensor or a position actuator, or pushed by a force actuator."""
+"""A joint replayed: its motion prescribed by a sensor or a position actuator, or pushed by a force
+actuator."""
 
 from __future__ import annotations
 
@@ -142,8 +143,8 @@ class JointModel:
         return tuple(getattr(plant, name) for name in names if name is not None)
 
     def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
-        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its
-        prescribed motion, m; shape (ticks,)."""
+        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on
+        it, N; shift: of its prescribed motion, m; shape (ticks,)."""
         key = self._key(plant)
         if force is None and shift is None and key in self._last:
             return self._last[key]
@@ -166,15 +167,16 @@ class JointModel:
             )
             if force is not None:
                 out[2] -= force
-        # A plant that is not stable runs away; it must be a bad explanation, not an impossible number.
+        # A plant that is not stable runs away; it must be a bad explanation, not an impossible
+        # number.
         out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
     def _undo_sensor(self, sensor: PositionSensor | VelocitySensor) -> Array:
-        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone. Of a velocity its mean is no
-        motion, as what is tested does not move away."""
+        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone.
+        Of a velocity its mean is no motion, as what is tested does not move away."""
         assert self._motion is not None
         signal = self._motion
         if sensor.lag > 0.0:
@@ -212,8 +214,8 @@ class JointModel:
     def _integrate_pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
-        """The joint under its force actuator. besides: another force on it, N, shape (ticks,); noise: of what a controller reads,
-        shape (ticks, inputs)."""
+        """The joint under its force actuator. besides: another force on it, N, shape (ticks,);
+        noise: of what a controller reads, shape (ticks, inputs)."""
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * max(inertia.mass, 1e-12) / h**2
@@ -353,7 +355,8 @@ class JointModel:
         return Motion(moved[0], moved[1], moved[2])
 
     def propagated_noise(self, plant: Plant) -> Array | None:
-        """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
+        """What the noise of a measured motion makes of the force, or that of a controller's sensors
+        of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
         if self._motion is not None and self._error > 0.0 and not self._integrated:

@@ -25,8 +25,9 @@ Columns = dict[str, dict[str, Array]]
 
 
 def demanded_channels(machine: Machine) -> list[Channel]:
-    """What a test has to demand of a machine: (topic, field) of commands that no described controller computes, of what the
-    controller is given besides its own sensors, and of motions that are prescribed."""
+    """What a test has to demand of a machine: (topic, field) of commands that no described
+    controller computes, of what the controller is given besides its own sensors, and of motions
+    that are prescribed."""
     found: list[Channel] = []
     for replay in machine.replays:
         mover = machine.components[replay.moved_by[0]]
@@ -147,7 +148,8 @@ def _check_demands(
         columns.setdefault(topic, {})[name] = values
     if len(lengths) > 1:
         raise RigtwinError(
-            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} ticks; expected one length"
+            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} "
+            "ticks; expected one length"
         )
     return columns
 

@@ -1,4 +1,5 @@
-"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any plant."""
+"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any
+plant."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ P = TypeVar("P", bound=Plant, contravariant=True)
 
 @dataclass(frozen=True)
 class Form:
-    """One way to disturb a component freely. entry: where it enters, as `disturbed` takes it; signal: shape (ticks,)."""
+    """One way to disturb a component freely. entry: where it enters, as `predict_disturbed` takes it;
+    signal: shape (ticks,)."""
 
     name: str
     entry: str
@@ -23,7 +25,8 @@ class Form:
 
 
 class Model(Protocol[P]):
-    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in their order."""
+    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in
+    their order."""
 
     def predict(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
@@ -34,7 +37,7 @@ class Model(Protocol[P]):
         ...
 
     def predict_disturbed(self, plant: P, entry: str, amount: Array) -> Array:
-        """The same as `sensed` with a disturbance, shape (ticks,), entering somewhere."""
+        """The same as `predict` with a disturbance, shape (ticks,), entering somewhere."""
         ...
 
     def components(self) -> Sequence[str]:
@@ -54,8 +57,8 @@ class Model(Protocol[P]):
         ...
 
     def propagated_noise(self, plant: P) -> Array | None:
-        """What the noise of the signals that drive the model makes of the observed ones, shape (rows, ticks); None if they
-        are known exactly."""
+        """What the noise of the signals that drive the model makes of the observed ones, shape
+        (rows, ticks); None if they are known exactly."""
         ...
 
     def halve_steps(self) -> Model[P]:

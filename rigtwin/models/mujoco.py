@@ -1,4 +1,5 @@
-"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the twin that is run.
+"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the
+twin that is run.
 
 MuJoCo has the masses, the geometry and gravity; the components' laws act on the joint tick by tick.
 It is slow, and takes no shortcut that needs the joint to be alone. Contacts, joint limits and the
@@ -40,7 +41,7 @@ class MujocoModel(JointModel):
     """One joint of a machine in MuJoCo."""
 
     read: dict[str, Array]
-    """Sensor → what the controller read, after `moved`."""
+    """Sensor → what the controller read, after `move`."""
     sensor_noise: Mapping[str, Array] = {}
     """Sensor → what is added to its reading, shape (ticks,)."""
     controller: Tick | None = None
@@ -70,8 +71,8 @@ class MujocoModel(JointModel):
         return model, mujoco.MjData(model), place, at
 
     def prescribe(self, plant: Plant, signal: Array) -> Array:
-        """The joint under a prescribed motion, shape (4, ticks) as `moved`. signal: what an ideal sensor that moves it would
-        read, shape (ticks,)."""
+        """The joint under a prescribed motion, shape (4, ticks) as `move`. signal: what an ideal
+        sensor that moves it would read, shape (ticks,)."""
         position = (
             np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
         )
@@ -139,7 +140,8 @@ class MujocoModel(JointModel):
         return out
 
     def _reader(self, plant: Plant) -> Callable[[int, float, float], float]:
-        """The command of a tick for the joint's position and velocity, as the controller sees them."""
+        """The command of a tick for the joint's position and velocity, as the controller sees
+        them."""
         names = self._sensors or self.sensors_of_joint()
         parts = [getattr(plant, name) for name in names]
         models = [transducer(part, self._period) for part in parts]

@@ -1,10 +1,13 @@
-"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to search with.
+"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to
+search with.
 
-The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod has no inertia. So one
-scalar inclusion a step, solved exactly, replaces the simulator: rail and motor friction are set-valued. What depends on
-the effects (actuators, cylinders, breakaway, sensors) is the twin's own code; tests hold it against the twin.
+The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod
+has no inertia. So one scalar inclusion a step, solved exactly, replaces the simulator: rail and
+motor friction are set-valued. What depends on the effects (actuators, cylinders, breakaway,
+sensors) is the twin's own code; tests hold it against the twin.
 
-Positions are taken at the steps and velocities midway between them, which makes the scheme second order.
+Positions are taken at the steps and velocities midway between them, which makes the scheme second
+order.
 """
 
 from __future__ import annotations
@@ -77,16 +80,17 @@ MECHANICAL = (
 
 
 class Plate(NamedTuple):
-    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks + 1,); onward: where the
-    command held before a tick would take it one step later, shape (ticks,)."""
+    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks +
+    1,); onward: where the command held before a tick would take it one step later, shape
+    (ticks,)."""
 
     position: Array
     onward: Array
 
 
 class Disturbances(NamedTuple):
-    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m, voltage V, force on the carriage
-    N."""
+    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m,
+    voltage V, force on the carriage N."""
 
     ground: Array
     structure: Array
@@ -134,7 +138,8 @@ def move_plate(
     timestep: float,
     steps: int,
 ) -> Plate:
-    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where that command holds it."""
+    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where
+    that command holds it."""
     conditioning = actuator(cylinder, computer, timestep)
     held = hold(conditioning, start)
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
@@ -156,8 +161,9 @@ def move_plate(
 def solve_velocity(
     rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
 ) -> float:
-    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
-    against positive and negative v; motor: against positive and negative plate − v, plate being the plate's velocity."""
+    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses,
+    Ns, that it can bear against positive and negative v; motor: against positive and negative plate
+    − v, plate being the plate's velocity."""
     below = (rhs + rail[1] + motor[0]) / inertia
     if below < min(0.0, plate):
         return below
@@ -192,7 +198,8 @@ def motor_friction(
     elif velocity < 0.0:
         left -= rail[1]
     else:
-        # Both stick: the rail carries what it can, as at the start of a test before anything has moved.
+        # Both stick: the rail carries what it can, as at the start of a test before anything has
+        # moved.
         left += min(max(-left, -rail[1]), rail[0])
     return min(max(left, -motor[1]), motor[0])
 
@@ -214,7 +221,8 @@ def _mechanics(
     pushed: Array,
     out: Array,
 ) -> None:
-    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values, shape (4, ticks)."""
+    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values,
+    shape (4, ticks)."""
     h = carriage.timestep
     x, v, force = start, 0.0, preload
     ground_before = structure_before = 0.0
@@ -222,7 +230,8 @@ def _mechanics(
     share = h / (YIELDING + h)
     for tick in range(len(voltage)):
         for step in range(-1, steps):
-            # Before the tick's commands act, once as if the old ones went on: that is what the sensors see.
+            # Before the tick's commands act, once as if the old ones went on: that is what the
+            # sensors see.
             place = tick * steps + max(step, 0)
             ground_here, structure_here = ground[place], structure[place]
             if step < 0:
@@ -295,7 +304,8 @@ def _mechanics(
 
 
 class QuarterCarModel:
-    """The plant under the commands of one test. Plates' motions are kept: most candidates leave them as they are."""
+    """The plant under the commands of one test. Plates' motions are kept: most candidates leave
+    them as they are."""
 
     def __init__(
         self,
@@ -305,7 +315,8 @@ class QuarterCarModel:
         configuration: Configuration,
         steps: int,
     ) -> None:
-        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a tick."""
+        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a
+        tick."""
         self._ground, self._structure, self._voltage = (
             np.ascontiguousarray(c) for c in (ground, structure, voltage)
         )
@@ -369,8 +380,8 @@ class QuarterCarModel:
         return found
 
     def predict_true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
-        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
-        does not know."""
+        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what
+        acts on the plant that it does not know."""
         timestep = self._period / self._steps
         ground = self._plate(
             plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
@@ -425,8 +436,9 @@ class QuarterCarModel:
         return Plate(of.position + motion, of.onward + ahead)
 
     def predict_disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
-        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
-        Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
+        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a
+        sensor's name, or a field of Disturbances, whose voltage is taken in N; amount: shape
+        (ticks,)."""
         if entry in Measurements._fields:
             sensed = self.predict(plant)
             sensed[Measurements._fields.index(entry)] += amount
@@ -486,7 +498,8 @@ class QuarterCarModel:
         return Motion(position, np.gradient(position, self._period), true[3])
 
     def propagated_noise(self, plant: RigPlant) -> None:
-        """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
+        """Sensors' noise reaches the plant only through recorded commands, which are known
+        exactly."""
 
     def predict(self, plant: RigPlant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
@@ -494,7 +507,8 @@ class QuarterCarModel:
         true = self._last.get(mechanical)
         if true is None:
             true = self.predict_true(plant)
-            # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
+            # Candidates at sensors leave the mechanics as they are, so what was worked out last
+            # often serves again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack(
             [

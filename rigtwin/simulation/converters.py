@@ -1,4 +1,5 @@
-"""Sensors and converters between the plant and the controller: white noise, mains hum with random phase, 16 bits."""
+"""Sensors and converters between the plant and the controller: white noise, mains hum with random
+phase, 16 bits."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def resolutions(plant: RigPlant) -> Measurements:
 
 
 class Sensing(NamedTuple):
-    """All transducers in the order of Measurements, and the size of one bit of each channel in its unit."""
+    """All transducers in the order of Measurements, and the size of one bit of each channel in its
+    unit."""
 
     transducers: tuple[Transducer, Transducer, Transducer, Transducer]
     states: tuple[TransducerState, TransducerState, TransducerState, TransducerState]
@@ -56,8 +58,8 @@ def build_sensing(plant: RigPlant, period: float) -> Sensing:
 class Disturbance:
     """Noise and hum of all sensors, one tick after another, from a seed.
 
-    Every channel draws from a stream of its own, so that changing one leaves the others as they were, and the numbers do
-    not depend on how many ticks are asked for at a time.
+    Every channel draws from a stream of its own, so that changing one leaves the others as they
+    were, and the numbers do not depend on how many ticks are asked for at a time.
     """
 
     def __init__(self, plant: RigPlant, period: float, seed: int) -> None:

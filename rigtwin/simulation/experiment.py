@@ -1,4 +1,5 @@
-"""What an experiment is: a configuration, and what it demands of the machine; and those that a machine has."""
+"""What an experiment is: a configuration, and what it demands of the machine; and those that a
+machine has."""
 
 from __future__ import annotations
 
@@ -17,8 +18,9 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 Demands = Array | Mapping[str, Array]
-"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3): ground m, structure m, force N,
-the last two for imposed tests only. Of another machine, each demanded channel's values by its name, shape (ticks,)."""
+"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3):
+ground m, structure m, force N, the last two for imposed tests only. Of another machine, each
+demanded channel's values by its name, shape (ticks,)."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ class FormulaDemands:
 
 
 def experiments_of(machine: Machine) -> dict[str, Experiment]:
-    """The experiments of a machine by name: those of the Python module that its description names, or its own tables."""
+    """The experiments of a machine by name: those of the Python module that its description names,
+    or its own tables."""
     if isinstance(machine.experiments, str):
         known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
         if machine.plant == RigPlant():

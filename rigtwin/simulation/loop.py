@@ -1,7 +1,7 @@
 """The control loop: read → update → write, tick by tick, until the test is over or a limit trips.
 
-`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving compiled code; both
-give the same numbers.
+`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving
+compiled code; both give the same numbers.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ BLOCK = 250
 
 @dataclass(frozen=True)
 class Block:
-    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape (ticks, 4), truth None for
-    a rig that does not know it; trip: why the test ends with this block's last tick, or Trip.NONE; column: that tripped, of
-    Measurements or, from 4 on, of Commands."""
+    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape
+    (ticks, 4), truth None for a rig that does not know it; trip: why the test ends with this
+    block's last tick, or Trip.NONE; column: that tripped, of Measurements or, from 4 on, of
+    Commands."""
 
     first: int
     commands: Array
@@ -168,8 +169,9 @@ def _ticks(
     measured_out: Array,
     truth_out: Array,
 ) -> tuple[int, int, int]:
-    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object
-    can run into a pending Ctrl-C, which compiled code does not survive."""
+    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only:
+    making any other Python object can run into a pending Ctrl-C, which compiled code does not
+    survive."""
     state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):

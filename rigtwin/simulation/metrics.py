@@ -1,6 +1,8 @@
-"""How well a test emulates what it should: the ideal system beside the model's output and what was sensed.
+"""How well a test emulates what it should: the ideal system beside the model's output and what was
+sensed.
 
-e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error); thesis Eq. 3.1, 3.2.
+e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error);
+thesis Eq. 3.1, 3.2.
 """
 
 from __future__ import annotations
@@ -18,7 +20,8 @@ from rigtwin.simulation.ideal import Ideal, simulate_ideal
 
 @dataclass(frozen=True)
 class Tracking:
-    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2 at every tick."""
+    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2
+    at every tick."""
 
     position_e1: float
     position_e2: float
@@ -31,8 +34,8 @@ class Tracking:
 def compute_tracking(
     target: Ideal, commands: Array, structure: Array, load_cell: Array
 ) -> Tracking:
-    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
-    structure, load_cell: what was sensed, m and N."""
+    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands:
+    shape (ticks, 3 or more); structure, load_cell: what was sensed, m and N."""
     position, force = commands[:, 1], commands[:, 2]
     return Tracking(
         position_e1=rms(target.structure - position),

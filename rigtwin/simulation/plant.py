@@ -1,4 +1,5 @@
-"""The running plant: MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code."""
+"""The running plant: MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled
+code."""
 
 from __future__ import annotations
 
@@ -28,12 +29,13 @@ from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
 
 YIELDING = 5e-3
-"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no common solution."""
+"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no
+common solution."""
 
 
 class Contacts(NamedTuple):
-    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape (1,) each; yielded: of
-    the ground and structure plate under load, m, shape (2,)."""
+    """What changes with the motion in the mechanics, and its states. gaps: of the backlashes, shape
+    (1,) each; yielded: of the ground and structure plate under load, m, shape (2,)."""
 
     changing: bool
     rail: Friction
@@ -54,8 +56,8 @@ class Contacts(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """All that compiled code needs to run one plant. plain: whether its commands act as they are and its contacts do not
-    change with the motion, as in the nominal rig."""
+    """All that compiled code needs to run one plant. plain: whether its commands act as they are
+    and its contacts do not change with the motion, as in the nominal rig."""
 
     mechanics: Handles
     substeps: int
@@ -98,13 +100,14 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
 
 
 def initial_deflection(plant: RigPlant, preload: float) -> float:
-    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended gas spring."""
+    """The tyre's deflection at the start, m: it carries the motor's preload (N) and the extended
+    gas spring."""
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 class Simulation:
-    """One plant at its start: ground at its first command, spring uncompressed, tyre and motor carrying the preload, all
-    at rest. Owns the MuJoCo structures that `machine` looks into."""
+    """One plant at its start: ground at its first command, spring uncompressed, tyre and motor
+    carrying the preload, all at rest. Owns the MuJoCo structures that `machine` looks into."""
 
     def __init__(
         self,
@@ -115,7 +118,8 @@ class Simulation:
         structure: float,
         preload: float,
     ) -> None:
-        """timestep s; ground and structure: commands at the start, m; preload: motor force at the start, N."""
+        """timestep s; ground and structure: commands at the start, m; preload: motor force at the
+        start, N."""
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
@@ -184,7 +188,8 @@ def stiffness_ratio(now: Contacts, deflection: float) -> float:
 
 @compilable
 def touch(mechanics: Handles, now: Contacts) -> None:
-    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's slope."""
+    """Writes into the mechanics what depends on the motion: dry friction, cogging, the tyre's
+    slope."""
     if not now.changing:
         return
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
@@ -231,8 +236,9 @@ def true_measurements(mechanics: Handles) -> Measurements:
 def sense(machine: Machine) -> Measurements:
     """Ideal measurements now, under the commands held until now.
 
-    The plates move over the coming timestep as those commands would move them: a motor that sticks passes on the force
-    that accelerates the carriage with the plate, which a velocity one timestep old would not show.
+    The plates move over the coming timestep as those commands would move them: a motor that sticks
+    passes on the force that accelerates the carriage with the plate, which a velocity one timestep
+    old would not show.
     """
     mechanics, yielded = machine.mechanics, machine.contacts.yielded
     ground, structure = (
@@ -309,7 +315,8 @@ def advance_plain(
     structure_command: float,
     voltage: float,
 ) -> None:
-    """The same for a machine whose commands act as they are and whose contacts do not change: a third faster."""
+    """The same for a machine whose commands act as they are and whose contacts do not change: a
+    third faster."""
     mechanics.control[0] = voltage
     for _ in range(substeps):
         ground_here, structure_here = ground_state.position[0], structure_state.position[0]

@@ -21,7 +21,8 @@ from rigtwin.simulation.twin import Twin
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it early."""
+    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it
+    early."""
 
     path: Path
     ticks: int
@@ -31,8 +32,8 @@ class RunResult:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of controllers.Commands, .Measurements;
-    trip: why it ended early, or Trip.NONE."""
+    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of
+    controllers.Commands, .Measurements; trip: why it ended early, or Trip.NONE."""
 
     commands: Array
     measurements: Array

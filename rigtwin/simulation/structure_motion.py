@@ -46,8 +46,9 @@ def _states(
 
 
 def states(settings: Settings, period: float, measured: Array, demands: Array) -> Array:
-    """The controller's packed state after every tick, shape (ticks, SIZE). measured: shape (ticks, 4), columns of
-    controllers.Measurements; demands: shape (ticks, 3), of controllers.Demand; period: s."""
+    """The controller's packed state after every tick, shape (ticks, SIZE). measured: shape (ticks,
+    4), columns of controllers.Measurements; demands: shape (ticks, 3), of controllers.Demand;
+    period: s."""
     controlling = controller(settings, period)
     out = np.empty((len(measured), SIZE))
     start = np.array(packed(initial_state(controlling)))
@@ -56,7 +57,8 @@ def states(settings: Settings, period: float, measured: Array, demands: Array) -
 
 
 def wing(settings: Settings, period: float, packed_states: Array) -> Array:
-    """Of the cross of beams: height over its centre at 0, 1, 2 and 3 beams from it, m, shape (ticks, 4)."""
+    """Of the cross of beams: height over its centre at 0, 1, 2 and 3 beams from it, m, shape
+    (ticks, 4)."""
     heights = packed_states[:, MODAL] @ controller(settings, period).modes.wing
     return heights - heights[:, :1]
 

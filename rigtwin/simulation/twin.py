@@ -24,13 +24,15 @@ def _sense(machine: Machine, out: Array) -> None:
 
 
 class Twin:
-    """A simulated rig. The same configuration, first ground command and seed give the same measurements to the bit.
+    """A simulated rig. The same configuration, first ground command and seed give the same
+    measurements to the bit.
 
     `truth` holds the last measurements before noise and quantisation.
     """
 
     def __init__(self, configuration: Configuration, ground: float, seed: int) -> None:
-        """ground: the first ground command, m. Raises RigtwinError unless the period is a multiple of the timestep."""
+        """ground: the first ground command, m. Raises RigtwinError unless the period is a multiple
+        of the timestep."""
         controller = configuration.controller
         self.simulation = Simulation(
             configuration.plant,
@@ -59,7 +61,8 @@ class Twin:
         return sample_sensors(self.sensing, self.truth, self.disturbance.take(1)[0])
 
     def misses(self, ticks: int) -> NDArray[np.bool_]:
-        """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as they are."""
+        """Which of the next ticks the computer misses, shape (ticks,): its outputs then stay as
+        they are."""
         return self._missed.random(ticks) < self._share_missed
 
     def write(self, commands: Commands) -> None:
