@@ -20,7 +20,7 @@ from controllers import Compensator, Structure
 from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
 from rigtwin.description.catalogue import find
-from rigtwin.description.configuration import Safety, Timing, applied
+from rigtwin.description.configuration import Safety, Timing, apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.numerics.compiling import kernel, step
@@ -148,7 +148,7 @@ def _diagnosed(seconds: float) -> Callable[[], object]:
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
     rig, demands = find("suspension-rig"), imposed.demands(configuration, 0)
-    configuration = applied(configuration, ["coulomb@motor=20"])
+    configuration = apply_effects(configuration, ["coulomb@motor=20"])
     recording = record_on_twin(rig, "imposed", configuration, demands)
     return lambda: diagnose(rig, [recording])
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from referee.bench_cases import Case, drawn, recorded
+from referee.bench_cases import Case, draw_case, record
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording
@@ -19,7 +19,7 @@ from rigtwin.recording import Recording
 
 def recording_of(case: Case, again: int = 0) -> Recording:
     """The case as a file would hold it."""
-    data = recorded(case, again)
+    data = record(case, again)
     time = np.arange(len(data.first)) * case.period
     if case.machine == "actuator":
         columns = {"/command": {"position": data.first}, "/sensor": {"position": data.second}}
@@ -30,7 +30,7 @@ def recording_of(case: Case, again: int = 0) -> Recording:
 
 def answered(number: int, seed: int) -> tuple[Case, str, frozenset[str], frozenset[str], float]:
     """(the case, verdict, kinds named, those in any class, seconds)."""
-    case = drawn(number, seed)
+    case = draw_case(number, seed)
     recording = recording_of(case)
     machine = find(recording.machine)
     found = diagnose(machine, [recording], held_out=[recording_of(case, 1)])

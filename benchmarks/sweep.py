@@ -18,7 +18,7 @@ import numpy as np
 
 from experiments import EXPERIMENTS
 from rigtwin.console import table
-from rigtwin.description.configuration import overridden
+from rigtwin.description.configuration import override
 from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
 from rigtwin.studies.tuning.run import Run, run
 
@@ -32,7 +32,7 @@ EXPERIMENT = EXPERIMENTS["active"]
 
 def asked(seconds: float, count: int, first: int = 0) -> Iterator[tuple[str, Run]]:
     """Runs that have not been made."""
-    configuration = overridden(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
+    configuration = override(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
     for seed in range(first, first + count):
         one = Run(EXPERIMENT, configuration, seed, 0.0, ("ride", "road_holding"))
         yield one.key, one

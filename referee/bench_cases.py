@@ -13,7 +13,7 @@ from referee.benches import (
     DamperTruth,
     actuator_position,
     damper_force,
-    sampled,
+    sample,
     wander,
 )
 
@@ -23,7 +23,8 @@ SECONDS = 20.0
 
 @dataclass(frozen=True)
 class Case:
-    """machine: actuator or damper; names: of the effects that are in it, kinds, none for a null; truth: with their sizes."""
+    """machine: actuator or damper; names: of the effects that are in it, kinds, none for a null;
+    truth: with their sizes."""
 
     machine: str
     names: frozenset[str]
@@ -33,14 +34,25 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """What its sensors read. first: command or displacement m; second: position m or force N; shape (ticks,)."""
+class BenchRecording:
+    """What its sensors read. first: command or displacement m; second: position m or force N; shape
+    (ticks,)."""
 
     first: Array
     second: Array
 
 
-ACTUATORS = ("none", "lag", "two_lags", "delay", "lag delay", "resonance", "lag gain", "lag rate_limit", "lag deadband")
+ACTUATORS = (
+    "none",
+    "lag",
+    "two_lags",
+    "delay",
+    "lag delay",
+    "resonance",
+    "lag gain",
+    "lag rate_limit",
+    "lag deadband",
+)
 DAMPERS = (
     "none",
     "viscous",
@@ -56,15 +68,19 @@ DAMPERS = (
 )
 
 
-def drawn(number: int, seed: int) -> Case:
+def draw_case(number: int, seed: int) -> Case:
     """The case of that number: every sort in turn, its sizes at random."""
     random = np.random.default_rng([seed, number])
     period = float(random.choice([5e-4, 1e-3, 2e-3]))
     if number % 2:
         sort = DAMPERS[number // 2 % len(DAMPERS)]
-        return Case("damper", frozenset(sort.split()) - {"none"}, _damper(sort, random), period, number)
+        return Case(
+            "damper", frozenset(sort.split()) - {"none"}, _damper(sort, random), period, number
+        )
     sort = ACTUATORS[number // 2 % len(ACTUATORS)]
-    return Case("actuator", frozenset(sort.split()) - {"none"}, _actuator(sort, random), period, number)
+    return Case(
+        "actuator", frozenset(sort.split()) - {"none"}, _actuator(sort, random), period, number
+    )
 
 
 def _spread(random: np.random.Generator, low: float, high: float) -> float:
@@ -82,8 +98,12 @@ def _actuator(sort: str, random: np.random.Generator) -> ActuatorTruth:
     return ActuatorTruth(
         lags=lags,
         late=_spread(random, 0.006, 0.03) if "delay" in parts else 0.0,
-        own=(_spread(random, 3.0, 15.0), float(random.uniform(0.15, 0.7))) if "resonance" in parts else None,
-        scale=float(1.0 + random.choice([-1, 1]) * random.uniform(0.02, 0.1)) if "gain" in parts else 1.0,
+        own=(_spread(random, 3.0, 15.0), float(random.uniform(0.15, 0.7)))
+        if "resonance" in parts
+        else None,
+        scale=float(1.0 + random.choice([-1, 1]) * random.uniform(0.02, 0.1))
+        if "gain" in parts
+        else 1.0,
         fastest=float(random.uniform(0.08, 0.13)) if "rate_limit" in parts else math.inf,
         lost=_spread(random, 5e-4, 4e-3) if "deadband" in parts else 0.0,
     )
@@ -105,17 +125,18 @@ def _damper(sort: str, random: np.random.Generator) -> DamperTruth:
     )
 
 
-def recorded(case: Case, again: int = 0) -> Recorded:
+def record(case: Case, again: int = 0) -> BenchRecording:
     """A test of the bench. again: another one of the same bench."""
     random = np.random.default_rng([case.seed, 77, again])
     reach = float(random.uniform(0.02, 0.04))
     if isinstance(case.truth, ActuatorTruth):
         command = wander(random, SECONDS, case.period, reach, 0.1, 8.0)
-        position = sampled(random, actuator_position(case.truth, command, case.period), 2e-5, 1e-6)
-        return Recorded(command, position)
+        position = sample(random, actuator_position(case.truth, command, case.period), 2e-5, 1e-6)
+        return BenchRecording(command, position)
     fine = 4
     motion = wander(random, SECONDS, case.period / fine, reach, 0.1, 3.0)
     force = damper_force(case.truth, motion, np.gradient(motion, case.period / fine))[::fine]
-    return Recorded(
-        sampled(random, motion[::fine], 5e-6, 1e-6), sampled(random, force, 0.01 * float(np.std(force)) + 0.3, 0.05)
+    return BenchRecording(
+        sample(random, motion[::fine], 5e-6, 1e-6),
+        sample(random, force, 0.01 * float(np.std(force)) + 0.3, 0.05),
     )

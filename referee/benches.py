@@ -1,8 +1,9 @@
-"""Two benches of the referee's: a positioning actuator and a damper. Written from their physics and from nothing of the twin.
+"""Two benches of the referee's: a positioning actuator and a damper. Written from their physics and
+from nothing of the twin.
 
-The actuator is integrated in steps of 50 us: each lag by the trapezoidal rule, a delay by shifting the command. The
-damper's dry
-friction is a stop operator in the stretch of what stands between piston and rod: the play, then the spring, then the slider.
+The actuator is integrated in steps of 50 us: each lag by the trapezoidal rule, a delay by shifting
+the command. The damper's dry friction is a stop operator in the stretch of what stands between
+piston and rod: the play, then the spring, then the slider.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ FINE = 20
 
 @dataclass(frozen=True)
 class ActuatorTruth:
-    """lags: s, one after another; late: s; own: (natural frequency Hz, damping ratio) or none; fastest: m/s; lost: m of
-    play."""
+    """lags: s, one after another; late: s; own: (natural frequency Hz, damping ratio) or none;
+    fastest: m/s; lost: m of play."""
 
     lags: tuple[float, ...] = ()
     late: float = 0.0
@@ -34,8 +35,8 @@ class ActuatorTruth:
 
 @dataclass(frozen=True)
 class DamperTruth:
-    """slip: N; spring: N/m in series with it, infinite if rigid; lost: m of play in series; viscous: Ns/m when extending
-    and when compressing; rate: N/m beside them; charge: N."""
+    """slip: N; spring: N/m in series with it, infinite if rigid; lost: m of play in series;
+    viscous: Ns/m when extending and when compressing; rate: N/m beside them; charge: N."""
 
     slip: float = 0.0
     spring: float = math.inf
@@ -46,19 +47,32 @@ class DamperTruth:
     square: float = 0.0
 
 
-def wander(random: np.random.Generator, seconds: float, period: float, reach: float, lowest: float, highest: float) -> Array:
-    """A motion without end of many sines of falling size, at most `reach` m from its middle, from rest."""
+def wander(
+    random: np.random.Generator,
+    seconds: float,
+    period: float,
+    reach: float,
+    lowest: float,
+    highest: float,
+) -> Array:
+    """A motion without end of many sines of falling size, at most `reach` m from its middle, from
+    rest."""
     time = np.arange(round(seconds / period)) * period
     frequencies = np.geomspace(lowest, highest, 25) * random.uniform(0.97, 1.03, 25)
     phases = random.uniform(0.0, 2.0 * math.pi, 25)
-    motion = sum(np.sin(2 * math.pi * f * time + p) / (1.0 + f) for f, p in zip(frequencies, phases, strict=True))
+    motion = sum(
+        np.sin(2 * math.pi * f * time + p) / (1.0 + f)
+        for f, p in zip(frequencies, phases, strict=True)
+    )
     eased = np.clip(time / 0.5, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(time / 0.5, 0.0, 1.0))
     motion = np.asarray(motion) * eased
     return reach * motion / float(np.max(np.abs(motion)))
 
 
 @numba.njit
-def _integrated(wanted: Array, lags: Array, own: Array, fastest: float, half: float, step: float) -> Array:
+def _integrate(
+    wanted: Array, lags: Array, own: Array, fastest: float, half: float, step: float
+) -> Array:
     levels = np.full(len(lags), wanted[0])
     place, speed, out, held = wanted[0], 0.0, np.empty(len(wanted)), wanted[0]
     carried = wanted[0]
@@ -93,14 +107,18 @@ def actuator_position(truth: ActuatorTruth, command: Array, period: float) -> Ar
     if behind:
         held = np.concatenate([np.full(behind, held[0]), held[:-behind]])
     own = np.array(truth.own or (0.0, 0.0))
-    moved = _integrated(held, np.array(truth.lags, float), own, truth.fastest, 0.5 * truth.lost, step)
+    moved = _integrate(
+        held, np.array(truth.lags, float), own, truth.fastest, 0.5 * truth.lost, step
+    )
     # A sample is taken before the command of its tick acts.
     return np.concatenate([[held[0]], moved[FINE - 1 :: FINE][:-1]])
 
 
 def damper_force(truth: DamperTruth, motion: Array, speed: Array) -> Array:
     """The force that moves the piston so, at every tick."""
-    viscous = np.where(speed > 0.0, truth.viscous[0], truth.viscous[1]) * speed + truth.square * speed * np.abs(speed)
+    viscous = np.where(
+        speed > 0.0, truth.viscous[0], truth.viscous[1]
+    ) * speed + truth.square * speed * np.abs(speed)
     spring = min(truth.spring, 1e9)
     most = truth.slip / spring + 0.5 * truth.lost
     stretch, dry = 0.0, np.empty(len(motion))
@@ -113,7 +131,7 @@ def damper_force(truth: DamperTruth, motion: Array, speed: Array) -> Array:
     return dry + viscous + truth.rate * motion + truth.charge
 
 
-def sampled(random: np.random.Generator, signal: Array, noise: float, bit: float) -> Array:
+def sample(random: np.random.Generator, signal: Array, noise: float, bit: float) -> Array:
     """What a converter makes of a signal."""
     noisy = signal + noise * random.standard_normal(len(signal))
     return np.round(noisy / bit) * bit if bit > 0.0 else noisy

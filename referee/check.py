@@ -68,7 +68,7 @@ def check(
             raise RigtwinError("the referee ended before it committed itself to a key")
         (recordings / "commitment.txt").write_text(commitment + "\n")
         try:
-            given = _diagnosed(recordings, cases, workers, progress)
+            given = _diagnose_all(recordings, cases, workers, progress)
             crude = _crude(recordings, cases, workers) if baselines else {}
         except BaseException:
             referee.kill()
@@ -83,7 +83,7 @@ def check(
     return Result(seed, commitment, json.loads(opened), given, crude)
 
 
-def _diagnosed(
+def _diagnose_all(
     recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]
 ) -> list[dict[str, Any]]:
     def jobs() -> Iterator[tuple[str, Files]]:
@@ -121,11 +121,13 @@ def answer(files: Files) -> dict[str, Any]:
         for name, content in zip(names, files, strict=True):
             (Path(folder) / name).write_bytes(content)
         recording, held_out = (load(Path(folder) / name) for name in names)
-        found = diagnose(find(DEFAULT_MACHINE), [recording], held_out=[held_out])
+        found = diagnose(
+            find(DEFAULT_MACHINE), [recording], held_out=[held_out]
+        )
         return found.document()
 
 
-def named(content: bytes) -> str:
+def name_effect(content: bytes) -> str:
     """What the black-box baseline names in a recording."""
     from referee.crude import black_box
 
@@ -145,6 +147,6 @@ def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
     return {
         int(number): name
         for number, name in sorted(
-            iterate_results(workers, named, jobs), key=lambda pair: int(pair[0])
+            iterate_results(workers, name_effect, jobs), key=lambda pair: int(pair[0])
         )
     }

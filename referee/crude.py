@@ -1,4 +1,5 @@
-"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit named."""
+"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit
+named."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from rigtwin.diagnosis.swing import swings
 from rigtwin.recording import load
 from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.signals.noise import white_noise
-from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.simulation.runner import simulate, without_limits
 
 TRIED = 24
 """Cases that it is tried on: it runs the twin some two hundred times for each."""
@@ -32,20 +33,30 @@ def black_box(path: Path) -> str:
     machine = find(DEFAULT_MACHINE)
     configuration = machine.configuration_of(recording)
     ticks = min(recording.ticks, round(SECONDS / recording.period))
-    free = unlimited(configuration._replace(timing=configuration.timing._replace(timestep=0.5 * recording.period)))
-    demands = np.column_stack([recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")])
-    measured = np.stack([recording.column("/sensor", name)[:ticks] for name in Measurements._fields])
+    free = without_limits(
+        configuration._replace(
+            timing=configuration.timing._replace(timestep=0.5 * recording.period)
+        )
+    )
+    demands = np.column_stack(
+        [recording.column("/command", name)[:ticks] for name in ("ground", "structure", "force")]
+    )
+    measured = np.stack(
+        [recording.column("/sensor", name)[:ticks] for name in Measurements._fields]
+    )
     noise = np.array([white_noise(row) for row in measured])
 
     def misfit(plant: RigPlant) -> float:
-        truth = simulated(free._replace(plant=plant), demands, 0).truth.T
+        truth = simulate(free._replace(plant=plant), demands, 0).truth.T
         return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
 
     best, name = BETTER * misfit(configuration.plant), "none"
     swing = swings(machine, (recording,))
     for effect in candidates(configuration.plant):
         if effect.searched:
-            starts = effect.starts(configuration.plant, swing.get(effect.component, Swing()), lambda: NO_SIZES)
+            starts = effect.starts(
+                configuration.plant, swing.get(effect.component, Swing()), lambda: NO_SIZES
+            )
             for start in starts.values[:8]:
                 if (value := misfit(with_values(configuration.plant, (effect,), (start,)))) < best:
                     best, name = value, effect.name

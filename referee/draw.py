@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 
 from referee.reference_plant import CELL, LVDT, Array, Truth
-from referee.reference_rig import Law, quiet
+from referee.reference_rig import Law, run_quiet
 
 Random = np.random.Generator
 Change = Callable[[Truth, Law], tuple[Truth, Law]]
 SENSORS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
 MATERIAL = 1.0
-"""A defect that changes some sensor by less than this many times its white noise, rms, is a trace."""
+"""A defect that changes some sensor by less than this many times its white noise, rms, is a
+trace."""
 
 
 @dataclass(frozen=True)
 class Defect:
-    """One defect. kind, component: its name in the vocabulary of reports, or outside it; value: of the first parameter, as a
-    report would give it; nominal: that parameter's; inside: whether reports know this kind; change: of the rig and of the
-    controller's real settings."""
+    """One defect. kind, component: its name in the vocabulary of reports, or outside it; value: of
+    the first parameter, as a report would give it; nominal: that parameter's; inside: whether
+    reports know this kind; change: of the rig and of the controller's real settings."""
 
     kind: str
     component: str
@@ -55,7 +56,9 @@ def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
     base, big = (50.0, 1.0) if component == "rail" else (14.0, 0.3)
 
     def coulomb() -> Defect:
-        value = base * (1.0 + (_log(random, 0.15, 1.5) if random.random() < 0.7 else -_log(random, 0.2, 0.7)))
+        value = base * (
+            1.0 + (_log(random, 0.15, 1.5) if random.random() < 0.7 else -_log(random, 0.2, 0.7))
+        )
         return Defect("coulomb", component, value, base, True, _to(component, coulomb=value))
 
     def viscous() -> Defect:
@@ -79,7 +82,9 @@ def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
     return [coulomb, viscous, stribeck, asymmetry, backlash]
 
 
-def _actuator(component: str, path: str, largest: float, fastest: float, random: Random) -> list[Callable[[], Defect]]:
+def _actuator(
+    component: str, path: str, largest: float, fastest: float, random: Random
+) -> list[Callable[[], Defect]]:
     """largest, fastest: what its command reaches, in its unit and in its unit a second."""
     motor = component == "motor"
 
@@ -108,15 +113,24 @@ def _actuator(component: str, path: str, largest: float, fastest: float, random:
             value = fastest * random.uniform(0.05, 0.5)
             return Defect("rate_limit", component, value, np.inf, True, _to(path, rate=value))
         value = min(fastest, 0.3) * random.uniform(0.2, 0.7)
-        return Defect("rate_limit", component, value, 0.3, True, _to(f"{path}_hydraulic", speed=value))
+        return Defect(
+            "rate_limit", component, value, 0.3, True, _to(f"{path}_hydraulic", speed=value)
+        )
 
     def compliance() -> Defect:
         value = _log(random, 2e-7, 3e-6)
-        return Defect("compliance", component, value, 0.0, True, _to(f"{path}_hydraulic", yields=value))
+        return Defect(
+            "compliance", component, value, 0.0, True, _to(f"{path}_hydraulic", yields=value)
+        )
 
     def cogging() -> Defect:
         value = _log(random, 2.0, 15.0)
-        change = _to("", ripple=value, ripple_pitch=_log(random, 0.012, 0.05), ripple_phase=random.uniform(-3.0, 3.0))
+        change = _to(
+            "",
+            ripple=value,
+            ripple_pitch=_log(random, 0.012, 0.05),
+            ripple_phase=random.uniform(-3.0, 3.0),
+        )
         return Defect("cogging", component, value, 0.0, True, change)
 
     return [gain, lag, delay, saturation, deadband, rate_limit, cogging if motor else compliance]
@@ -194,7 +208,7 @@ def _others(random: Random) -> list[Callable[[], Defect]]:
     return [mass, stiffness, damping, hardening, late, missed, setting]
 
 
-def outside(random: Random) -> list[Callable[[], Defect]]:
+def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
     """Defects that no report has a name for."""
     any_lvdt = str(random.choice(SENSORS[:3]))
     any_cylinder = str(random.choice(["ground", "structure"]))
@@ -202,24 +216,57 @@ def outside(random: Random) -> list[Callable[[], Defect]]:
     def unnamed(kind: str, component: str, value: float, change: Change) -> Callable[[], Defect]:
         return lambda: Defect(kind, component, value, 0.0, False, change)
 
-    relaxing, wave, fading = _log(random, 0.15, 0.6), _log(random, 0.25, 0.8), _either(random, 0.15, 0.5)
-    drag, bend, drift = _log(random, 150.0, 1500.0), _either(random, 0.03, 0.15), _either(random, 3e-5, 3e-4)
-    slower, creep, pick = _log(random, 0.04, 0.2), _either(random, 3e-5, 2e-4), _either(random, 1.0, 6.0)
+    relaxing, wave, fading = (
+        _log(random, 0.15, 0.6),
+        _log(random, 0.25, 0.8),
+        _either(random, 0.15, 0.5),
+    )
+    drag, bend, drift = (
+        _log(random, 150.0, 1500.0),
+        _either(random, 0.03, 0.15),
+        _either(random, 3e-5, 3e-4),
+    )
+    slower, creep, pick = (
+        _log(random, 0.04, 0.2),
+        _either(random, 3e-5, 2e-4),
+        _either(random, 1.0, 6.0),
+    )
     return [
-        unnamed("viscoelastic", "tyre", relaxing, _to("", relaxing=relaxing, relaxing_time=_log(random, 0.02, 0.3))),
-        unnamed("uneven way", "rail", wave, _to("rail", wave=wave, wave_length=_log(random, 0.006, 0.03))),
+        unnamed(
+            "viscoelastic",
+            "tyre",
+            relaxing,
+            _to("", relaxing=relaxing, relaxing_time=_log(random, 0.02, 0.3)),
+        ),
+        unnamed(
+            "uneven way",
+            "rail",
+            wave,
+            _to("rail", wave=wave, wave_length=_log(random, 0.006, 0.03)),
+        ),
         unnamed("heating", "motor", fading, _to("voltage", fading=3.0 * fading)),
         unnamed("quadratic drag", "rail", drag, _to("rail", drag=drag)),
         unnamed("bend", any_lvdt, bend, _to(any_lvdt, bend=bend)),
         unnamed("drift", any_lvdt, drift, _to(any_lvdt, drift=drift)),
-        unnamed("slow valve", f"{any_cylinder}_cylinder", slower, _to(f"{any_cylinder}_hydraulic", slower=slower)),
-        unnamed("creep", f"{any_cylinder}_cylinder", creep, _to(f"{any_cylinder}_hydraulic", creep=creep)),
+        unnamed(
+            "slow valve",
+            f"{any_cylinder}_cylinder",
+            slower,
+            _to(f"{any_cylinder}_hydraulic", slower=slower),
+        ),
+        unnamed(
+            "creep",
+            f"{any_cylinder}_cylinder",
+            creep,
+            _to(f"{any_cylinder}_hydraulic", creep=creep),
+        ),
         unnamed("crosstalk", "load_cell", pick, _to("load_cell", picks_up=pick)),
     ]
 
 
 def library(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]:
-    """Every defect that reports have a name for, by component. commands: of the test without defects, shape (ticks, 4)."""
+    """Every defect that reports have a name for, by component. commands: of the test without
+    defects, shape (ticks, 4)."""
 
     def reach(column: int) -> tuple[float, float]:
         rates = np.abs(np.diff(commands[:, column])) / 1e-3
@@ -237,8 +284,9 @@ def library(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]
     ]
 
 
-def tolerated(random: Random) -> Truth:
-    """A rig within its tolerances, in a laboratory with noise of its own, its friction set-valued or a stiff bristle."""
+def draw_tolerated(random: Random) -> Truth:
+    """A rig within its tolerances, in a laboratory with noise of its own, its friction set-valued
+    or a stiff bristle."""
 
     def near(value: float, share: float) -> float:
         return value * (1.0 + random.uniform(-share, share))
@@ -272,11 +320,14 @@ def tolerated(random: Random) -> Truth:
 
 
 def effect_size(rig: Truth, law: Law, defect: Defect, commands: Array) -> float:
-    """By how many times its white noise a defect changes the sensor that it changes most, under the same commands."""
-    if defect.kind in ("hum", "noise", "quantisation", "missed_ticks") or defect.kind.startswith("setting"):
+    """By how many times its white noise a defect changes the sensor that it changes most, under the
+    same commands."""
+    if defect.kind in ("hum", "noise", "quantisation", "missed_ticks") or defect.kind.startswith(
+        "setting"
+    ):
         return float("inf")
     with_it, real = defect.change(rig, law)
-    change = quiet(with_it, real, commands) - quiet(rig, law, commands)
+    change = run_quiet(with_it, real, commands) - run_quiet(rig, law, commands)
     noise = np.array([getattr(rig, name).white for name in SENSORS])
     return float(np.max(np.sqrt(np.mean(change**2, axis=0)) / noise))
 

@@ -1,8 +1,9 @@
-"""The referee: draws rigs, runs them, writes recordings without a hint, commits itself to a key, and opens it when asked.
+"""The referee: draws rigs, runs them, writes recordings without a hint, commits itself to a key,
+and opens it when asked.
 
-Run as a process of its own: `python -m referee.referee FOLDER CASES SEED`. It answers on standard output: one line
-a case, then `commitment SHA-256`; after a line on its standard input, `salt S` and the key. It imports nothing of the twin, its
-effects or its controllers.
+Run as a process of its own: `python -m referee.referee FOLDER CASES SEED`. It answers on standard
+output: one line a case, then `commitment SHA-256`; after a line on its standard input, `salt S` and
+the key. It imports nothing of the twin, its effects or its controllers.
 """
 
 from __future__ import annotations
@@ -16,10 +17,18 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from referee.draw import MATERIAL, Defect, effect_size, library, outside, summary, tolerated
+from referee.draw import (
+    MATERIAL,
+    Defect,
+    draw_tolerated,
+    draw_unnamed,
+    effect_size,
+    library,
+    summary,
+)
 from referee.reference_plant import Array
 from referee.reference_rig import Law, run
-from referee.test_signals import TESTS, asked
+from referee.test_signals import TESTS, draw_demands
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
 """Of all cases."""
@@ -36,28 +45,32 @@ def sorts(cases: int, random: np.random.Generator) -> list[str]:
     return names
 
 
-def chosen(groups: list[list[Any]], random: np.random.Generator) -> Defect:
+def choose(groups: list[list[Any]], random: np.random.Generator) -> Defect:
     """One defect: the component first, so that none is rare because it has few kinds."""
     group = groups[int(random.integers(len(groups)))]
     return group[int(random.integers(len(group)))]()
 
 
-def case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
-    """The key's entry of one case, and its recordings: what the operator set, commands and sensors; the second is held out."""
-    rig = tolerated(random)
+def draw_case(
+    sort: str, random: np.random.Generator
+) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
+    """The key's entry of one case, and its recordings: what the operator set, commands and sensors;
+    the second is held out."""
+    rig = draw_tolerated(random)
     test = str(random.choice(TESTS if sort != "pair" else TESTS[:3]))
-    law, demands = asked(test, random)
+    law, demands = draw_demands(test, random)
     plain, _ = run(rig, law, demands, np.random.default_rng(0))
     defects: list[Defect] = []
     sizes: list[float] = []
     while len(defects) < {"single": 1, "null": 0, "pair": 2, "outside": 1}[sort]:
         if sort == "outside":
-            options = outside(random)
+            options = draw_unnamed(random)
             drawn = options[int(random.integers(len(options)))]()
         else:
-            drawn = chosen(library(plain, random), random)
+            drawn = choose(library(plain, random), random)
         size = effect_size(rig, law, drawn, plain)
-        # A defect that this test does not show is asked for only where it is alone and inside the library.
+        # A defect that this test does not show is asked for only where it is alone and inside the
+        # library.
         shown = sort == "single" or size >= MATERIAL
         if shown and drawn.component not in [other.component for other in defects]:
             defects.append(drawn)
@@ -66,7 +79,7 @@ def case(sort: str, random: np.random.Generator) -> tuple[dict[str, Any], list[t
     for defect in defects:
         truth, real = defect.change(truth, real)
     recordings = [(law, *run(truth, real, demands, random))]
-    _, again = asked("imposed" if test == "tripped" else test, random)
+    _, again = draw_demands("imposed" if test == "tripped" else test, random)
     recordings.append((law, *run(truth, real, again, random)))
     entry = {
         "sort": sort,
@@ -111,7 +124,13 @@ def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start()
         config = json.dumps({"controller": operator(law)})
-        about = {"format": "1", "machine": "suspension-rig", "experiment": "withheld", "period": "0.001", "config": config}
+        about = {
+            "format": "1",
+            "machine": "suspension-rig",
+            "experiment": "withheld",
+            "period": "0.001",
+            "config": config,
+        }
         writer.add_metadata("rigtwin", about)
         channels = []
         for topic, names in (("/command", COMMANDS), ("/sensor", READ)):
@@ -120,8 +139,12 @@ def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
             number = writer.register_schema(topic[1:], "jsonschema", schema)
             channels.append((writer.register_channel(topic, "json", number), names))
         for tick in range(len(commands)):
-            for (channel, names), row in zip(channels, (commands[tick], sensors[tick]), strict=True):
-                message = json.dumps(dict(zip(names, (float(f"{value:.9g}") for value in row), strict=True))).encode()
+            for (channel, names), row in zip(
+                channels, (commands[tick], sensors[tick]), strict=True
+            ):
+                message = json.dumps(
+                    dict(zip(names, (float(f"{value:.9g}") for value in row), strict=True))
+                ).encode()
                 writer.add_message(channel, tick * 1_000_000, message, tick * 1_000_000)
         writer.finish()
 
@@ -133,8 +156,10 @@ def main(arguments: list[str]) -> int:
     key = []
     for number, sort in enumerate(order):
         # Each case has a stream of its own, so that one more case leaves the others as they are.
-        entry, recordings = case(sort, np.random.default_rng([seed, 1, number]))
-        for name, recording in zip((f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), recordings, strict=True):
+        entry, recordings = draw_case(sort, np.random.default_rng([seed, 1, number]))
+        for name, recording in zip(
+            (f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), recordings, strict=True
+        ):
             write(folder / name, *recording)
         key.append(entry)
         print(f"case {number}", flush=True)

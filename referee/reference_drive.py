@@ -1,4 +1,5 @@
-"""The rig's own controller on the referee's plant: what a test would be on a rig that the twin is not."""
+"""The rig's own controller on the referee's plant: what a test would be on a rig that the twin is
+not."""
 
 from __future__ import annotations
 
@@ -18,11 +19,11 @@ from controllers import (
     update,
 )
 from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
-from referee.reference_rig import disturbed
+from referee.reference_rig import draw_noise
 from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.runner import Ran
+from rigtwin.simulation.runner import SimulationResult
 from rigtwin.simulation.safety import LimitMemory, Trip, empty_memory_arrays, judge_limits
 
 
@@ -50,40 +51,54 @@ def _ticks(
         row = sensors_out[tick]
         measured = Measurements(row[0], row[1], row[2], row[3])
         if missed[tick] == 0.0:
-            state, commands = update(controlling, state, measured, Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]))
+            state, commands = update(
+                controlling,
+                state,
+                measured,
+                Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2]),
+            )
             for signal in range(4):
                 held[signal] = commands[signal]
         for signal in range(4):
             commands_out[tick, signal] = held[signal]
             truth_out[tick, signal] = values[signal]
-        trip, _ = judge_limits(limits, controlling.period, watch, measured, Commands(held[0], held[1], held[2], held[3]))
+        trip, _ = judge_limits(
+            limits,
+            controlling.period,
+            watch,
+            measured,
+            Commands(held[0], held[1], held[2], held[3]),
+        )
         if trip != Trip.NONE.value:
             return tick + 1, trip
         advance(truth, body, held, tick * controlling.period)
     return len(demands), Trip.NONE.value
 
 
-def driven(truth: Truth, configuration: Configuration, demands: Array, seed: int) -> Ran:
-    """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant is not looked at."""
+def drive(
+    truth: Truth, configuration: Configuration, demands: Array, seed: int
+) -> SimulationResult:
+    """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant
+    is not looked at."""
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)
     body = at_rest(truth, float(demands[0, 0]), settings.start, settings.preload)
-    noise, missed = disturbed(truth, ticks, np.random.default_rng([seed, 5]))
+    noise, missed = draw_noise(truth, ticks, np.random.default_rng([seed, 5]))
     commands, sensors, true = (np.empty((ticks, 4)) for _ in range(3))
     held = np.array([demands[0, 0], settings.start, settings.preload, settings.preload / 186.0])
     done, number = _ticks(
-        truth,
-        body,
-        controlling,
-        configuration.safety,
-        empty_memory_arrays(),
-        np.array(packed(initial_state(controlling))),
-        np.ascontiguousarray(demands),
-        noise,
-        missed,
-        held,
-        commands,
-        sensors,
-        true,
+        truth=truth,
+        body=body,
+        controlling=controlling,
+        limits=configuration.safety,
+        watch=empty_memory_arrays(),
+        memory=np.array(packed(initial_state(controlling))),
+        demands=np.ascontiguousarray(demands),
+        noise=noise,
+        missed=missed,
+        held=held,
+        commands_out=commands,
+        sensors_out=sensors,
+        truth_out=true,
     )
-    return Ran(commands[:done], sensors[:done], true[:done], Trip(number))
+    return SimulationResult(commands[:done], sensors[:done], true[:done], Trip(number))

@@ -1,8 +1,9 @@
 """The referee's rig: written from the same description as the twin, and from nothing of the twin.
 
-Steps of 50 us; hydraulics as a chain of integrators advanced by the midpoint rule; dry friction either set-valued, solved
-by projection, or as a bristle that yields before it slides; a tyre whose contact sets in over a tenth of a millimetre. Every
-defect that the referee can give the rig is a number of `Truth`; its defaults are the rig without defects.
+Steps of 50 us; hydraulics as a chain of integrators advanced by the midpoint rule; dry friction
+either set-valued, solved by projection, or as a bristle that yields before it slides; a tyre whose
+contact sets in over a tenth of a millimetre. Every defect that the referee can give the rig is a
+number of `Truth`; its defaults are the rig without defects.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ NEVER = 1e9
 
 
 class Slider(NamedTuple):
-    """Something that slides. lost: play in series with the friction, m; wave: share by which friction changes along the
-    way; drag: friction with the square of the speed, N/(m/s)²."""
+    """Something that slides. lost: play in series with the friction, m; wave: share by which
+    friction changes along the way; drag: friction with the square of the speed, N/(m/s)²."""
 
     coulomb: float
     viscous: float = 0.0
@@ -39,7 +40,8 @@ class Slider(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """What happens to a command. fading: share of the gain lost over a minute; dead is a dead zone."""
+    """What happens to a command. fading: share of the gain lost over a minute; dead is a dead
+    zone."""
 
     gain: float = 1.0
     lag: float = 0.0
@@ -51,7 +53,8 @@ class Drive(NamedTuple):
 
 
 class Hydraulic(NamedTuple):
-    """speed m/s; yields m/N; slower: its natural frequencies are lower by this share; creep: m/s of its own motion."""
+    """speed m/s; yields m/N; slower: its natural frequencies are lower by this share; creep: m/s of
+    its own motion."""
 
     speed: float = 0.3
     yields: float = 0.0
@@ -60,8 +63,8 @@ class Hydraulic(NamedTuple):
 
 
 class Sensor(NamedTuple):
-    """white, mains, bit in the sensor's unit; bend: share of the full swing lost at its end; drift: unit/s; picks_up: of
-    the carriage's acceleration, unit/(m/s²)."""
+    """white, mains, bit in the sensor's unit; bend: share of the full swing lost at its end; drift:
+    unit/s; picks_up: of the carriage's acceleration, unit/(m/s²)."""
 
     white: float
     mains: float
@@ -81,8 +84,9 @@ CELL = Sensor(1.5, 5.0, 0.076, full=400.0)
 
 
 class Truth(NamedTuple):
-    """The whole rig. bristle: N/m, 0 for set-valued friction; relaxing: share of the tyre's stiffness that relaxes, in
-    `relaxing_time` s; yielding: s, a cylinder's lag behind its load; late: computation delay, s; missed: share of ticks."""
+    """The whole rig. bristle: N/m, 0 for set-valued friction; relaxing: share of the tyre's
+    stiffness that relaxes, in `relaxing_time` s; yielding: s, a cylinder's lag behind its load;
+    late: computation delay, s; missed: share of ticks."""
 
     mass: float = 34.0
     rail: Slider = Slider(50.0)
@@ -114,15 +118,25 @@ class Truth(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def dry(of: Slider, speed: float, place: float) -> tuple[float, float]:
-    """The bounds of dry friction at this speed and place: in positive and in negative direction, N."""
+    """The bounds of dry friction at this speed and place: in positive and in negative direction,
+    N."""
     size = of.coulomb + of.peak * math.exp(-((abs(speed) / of.peak_speed) ** of.peak_shape))
     size *= 1.0 + of.wave * math.sin(2.0 * math.pi * place / of.wave_length)
     return max(size + 0.5 * of.uneven, 0.0), max(size - 0.5 * of.uneven, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)
-def solved(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: float, rod_down: float, plate: float) -> float:
-    """The carriage's velocity by bisection on the monotone balance of impulses; rod friction acts on plate − v."""
+def solve(
+    rhs: float,
+    mass: float,
+    rail_up: float,
+    rail_down: float,
+    rod_up: float,
+    rod_down: float,
+    plate: float,
+) -> float:
+    """The carriage's velocity by bisection on the monotone balance of impulses; rod friction acts
+    on plate − v."""
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
     for guess in (0.0, plate):
@@ -147,8 +161,15 @@ def solved(rhs: float, mass: float, rail_up: float, rail_down: float, rod_up: fl
 
 
 @numba.njit(cache=True, nogil=True)
-def passed(
-    drive: Drive, memory: Array, history: Array, count: int, command: float, centred: bool, time: float, late: float
+def pass_command(
+    drive: Drive,
+    memory: Array,
+    history: Array,
+    count: int,
+    command: float,
+    centred: bool,
+    time: float,
+    late: float,
 ) -> float:
     """A command through a drive, one step. memory: rate limit's, lag's and dead zone's output."""
     length = len(history)
@@ -160,7 +181,9 @@ def passed(
     wanted = one + part * (other - one)
     if drive.dead > 0.0:
         if centred:
-            wanted = 0.0 if abs(wanted) <= drive.dead else wanted - math.copysign(drive.dead, wanted)
+            wanted = (
+                0.0 if abs(wanted) <= drive.dead else wanted - math.copysign(drive.dead, wanted)
+            )
         else:
             if wanted > memory[2] + drive.dead:
                 memory[2] = wanted - drive.dead
@@ -180,7 +203,8 @@ def passed(
 
 @numba.njit(cache=True, nogil=True)
 def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> float:
-    """The identified response in cascade form, midpoint rule; returns the plate's next position, m."""
+    """The identified response in cascade form, midpoint rule; returns the plate's next position,
+    m."""
     w = 1.0 - of.slower
     a3, a2, a1, a0 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3, 6.281e5 * w**4
     b2, b1, b0 = 1817.0 * w**2, 7.719e4 * w**3, 6.243e5 * w**4
@@ -200,7 +224,7 @@ def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> flo
 
 
 @numba.njit(cache=True, nogil=True)
-def settled(z: Array, at: float, of: Hydraulic) -> None:
+def settle(z: Array, at: float, of: Hydraulic) -> None:
     """At rest with its output at `at`."""
     w, scale = 1.0 - of.slower, 6.281e5 / 6.243e5
     a3, a2, a1 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3
@@ -210,7 +234,15 @@ def settled(z: Array, at: float, of: Hydraulic) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def reading(of: Sensor, value: float, acceleration: float, history: Array, memory: Array, tick: int, noise: float) -> float:
+def reading(
+    of: Sensor,
+    value: float,
+    acceleration: float,
+    history: Array,
+    memory: Array,
+    tick: int,
+    noise: float,
+) -> float:
     """A sensor's sample."""
     length = len(history)
     if tick == 0:
@@ -222,17 +254,25 @@ def reading(of: Sensor, value: float, acceleration: float, history: Array, memor
     part = back - whole
     one, other = history[(tick - whole) % length], history[(tick - whole - 1) % length]
     late = one + part * (other - one)
-    memory[0] = memory[0] + (1.0 - math.exp(-1e-3 / of.lag)) * (late - memory[0]) if of.lag > 0.0 else late
+    memory[0] = (
+        memory[0] + (1.0 - math.exp(-1e-3 / of.lag)) * (late - memory[0]) if of.lag > 0.0 else late
+    )
     x = memory[0]
-    x = of.gain * x * (1.0 - of.bend * (x / of.full) ** 2) + of.zero + of.drift * tick * 1e-3 + of.picks_up * acceleration
+    x = (
+        of.gain * x * (1.0 - of.bend * (x / of.full) ** 2)
+        + of.zero
+        + of.drift * tick * 1e-3
+        + of.picks_up * acceleration
+    )
     x += noise
     return round(x / of.bit) * of.bit if of.bit > 0.0 else x
 
 
 class Body(NamedTuple):
-    """What the rig is at a moment, changed in place. motion: see ENTRIES, shape (17,); histories: of the three commands under
-    way, shape (3, 2048); memories: of their rate limit, lag and dead zone, shape (3, 3); sensed: past values of the sensors,
-    shape (4, 64); lags: of the sensors, shape (4, 1); ground_z, structure_z: of the hydraulics, shape (4,)."""
+    """What the rig is at a moment, changed in place. motion: see ENTRIES, shape (17,); histories:
+    of the three commands under way, shape (3, 2048); memories: of their rate limit, lag and dead
+    zone, shape (3, 3); sensed: past values of the sensors, shape (4, 64); lags: of the sensors,
+    shape (4, 1); ground_z, structure_z: of the hydraulics, shape (4,)."""
 
     motion: Array
     histories: Array
@@ -244,23 +284,49 @@ class Body(NamedTuple):
 
 
 ENTRIES = (
-    *("ground", "structure", "position", "velocity", "force", "relaxed", "bristle_rail", "bristle_rod", "rail_end", "rod_end"),
-    *("ground_yield", "structure_yield", "ground_before", "structure_before", "acceleration", "cell", "steps"),
+    *(
+        "ground",
+        "structure",
+        "position",
+        "velocity",
+        "force",
+        "relaxed",
+        "bristle_rail",
+        "bristle_rod",
+        "rail_end",
+        "rod_end",
+    ),
+    *(
+        "ground_yield",
+        "structure_yield",
+        "ground_before",
+        "structure_before",
+        "acceleration",
+        "cell",
+        "steps",
+    ),
 )
-"""Of `Body.motion`: plates, carriage, motor, tyre's relaxed part, bristles, ends of the play, yielding now and a step ago,
-carriage's acceleration, load cell, steps made; m, N, s."""
+"""Of `Body.motion`: plates, carriage, motor, tyre's relaxed part, bristles, ends of the play,
+yielding now and a step ago, carriage's acceleration, load cell, steps made; m, N, s."""
 
 
 @numba.njit(cache=True, nogil=True)
 def at_rest(truth: Truth, ground_command: float, structure_command: float, preload: float) -> Body:
-    """Before the first tick: all at rest, tyre and motor carrying the preload, N; commands, m, held for long."""
+    """Before the first tick: all at rest, tyre and motor carrying the preload, N; commands, m, held
+    for long."""
     body = Body(
-        np.zeros(17), np.empty((3, 2048)), np.zeros((3, 3)), np.empty((4, 64)), np.zeros((4, 1)), np.zeros(4), np.zeros(4)
+        np.zeros(17),
+        np.empty((3, 2048)),
+        np.zeros((3, 3)),
+        np.empty((4, 64)),
+        np.zeros((4, 1)),
+        np.zeros(4),
+        np.zeros(4),
     )
     ground = ground_command * truth.ground.gain
     x = ground - preload / truth.tyre
-    settled(body.ground_z, ground, truth.ground_hydraulic)
-    settled(body.structure_z, x, truth.structure_hydraulic)
+    settle(body.ground_z, ground, truth.ground_hydraulic)
+    settle(body.structure_z, x, truth.structure_hydraulic)
     first = (preload / truth.constant, ground_command, structure_command)
     for number in range(3):
         body.histories[number, :] = first[number]
@@ -288,31 +354,63 @@ def sample(truth: Truth, body: Body, tick: int, noise: Array, out: Array) -> Non
     of = (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
     for number in range(4):
         out[number] = reading(
-            of[number], values[number], body.motion[14], body.sensed[number], body.lags[number], tick, noise[number]
+            of[number],
+            values[number],
+            body.motion[14],
+            body.sensed[number],
+            body.lags[number],
+            tick,
+            noise[number],
         )
 
 
 @numba.njit(cache=True, nogil=True)
 def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
-    """One tick under commands, shape (4,): ground m, structure m, force N (not looked at), voltage V."""
+    """One tick under commands, shape (4,): ground m, structure m, force N (not looked at), voltage
+    V."""
     motion, histories, memories = body.motion, body.histories, body.memories
     ground_z, structure_z, held = body.ground_z, body.structure_z, commands
-    ground, structure, x, v, force, relaxed = motion[0], motion[1], motion[2], motion[3], motion[4], motion[5]
+    ground, structure, x, v, force, relaxed = (
+        motion[0],
+        motion[1],
+        motion[2],
+        motion[3],
+        motion[4],
+        motion[5],
+    )
     bristle_rail, bristle_rod, rail_end, rod_end = motion[6], motion[7], motion[8], motion[9]
-    ground_yield, structure_yield, ground_before, structure_before = motion[10], motion[11], motion[12], motion[13]
+    ground_yield, structure_yield, ground_before, structure_before = (
+        motion[10],
+        motion[11],
+        motion[12],
+        motion[13],
+    )
     acceleration, cell, count = motion[14], motion[15], int(motion[16])
     for _ in range(round(1e-3 / STEP)):
-        asked = passed(truth.voltage, memories[0], histories[0], count, held[3], True, time, truth.late)
-        asked = max(-1860.0 / truth.constant, min(1860.0 / truth.constant, max(-10.0, min(10.0, asked))))
-        asked_ground = passed(truth.ground, memories[1], histories[1], count, held[0], False, time, truth.late)
-        asked_structure = passed(truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late)
+        asked = pass_command(
+            truth.voltage, memories[0], histories[0], count, held[3], True, time, truth.late
+        )
+        asked = max(
+            -1860.0 / truth.constant, min(1860.0 / truth.constant, max(-10.0, min(10.0, asked)))
+        )
+        asked_ground = pass_command(
+            truth.ground, memories[1], histories[1], count, held[0], False, time, truth.late
+        )
+        asked_structure = pass_command(
+            truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late
+        )
         count += 1
         next_ground = hydraulic_step(truth.ground_hydraulic, ground_z, ground, asked_ground)
-        next_structure = hydraulic_step(truth.structure_hydraulic, structure_z, structure, asked_structure)
+        next_structure = hydraulic_step(
+            truth.structure_hydraulic, structure_z, structure, asked_structure
+        )
 
         deflection = ground + ground_yield - x
         squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
-        contact = 0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET)) - 0.25 * ONSET**2 / 0.004
+        contact = (
+            0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET))
+            - 0.25 * ONSET**2 / 0.004
+        )
         relaxed += STEP / truth.relaxing_time * (contact - relaxed)
         tyre = truth.tyre * (contact * (1.0 + truth.tyre_hardening * contact))
         tyre += truth.relaxing * truth.tyre * (contact - relaxed)
@@ -322,7 +420,9 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
         plate = (next_structure - structure + structure_yield - structure_before) / STEP
         way = structure + structure_yield - x
         sliding = plate - v
-        ripple = truth.ripple * math.sin(2.0 * math.pi * way / truth.ripple_pitch + truth.ripple_phase)
+        ripple = truth.ripple * math.sin(
+            2.0 * math.pi * way / truth.ripple_pitch + truth.ripple_phase
+        )
         rail_up, rail_down = dry(truth.rail, v, x)
         rod_up, rod_down = dry(truth.motor, sliding, way)
         if truth.rail.lost > 0.0:
@@ -339,16 +439,26 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
         before = v
         if truth.bristle > 0.0:
             bound = rail_up if v > 0.0 else rail_down
-            bent = (bristle_rail + STEP * v) / (1.0 + STEP * abs(v) * truth.bristle / max(bound, 1e-3))
+            bent = (bristle_rail + STEP * v) / (
+                1.0 + STEP * abs(v) * truth.bristle / max(bound, 1e-3)
+            )
             rate, bristle_rail = (bent - bristle_rail) / STEP, bent
-            rail_force = truth.bristle * bristle_rail + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
+            rail_force = (
+                truth.bristle * bristle_rail
+                + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
+            )
             bound = rod_up if sliding > 0.0 else rod_down
-            bent = (bristle_rod + STEP * sliding) / (1.0 + STEP * abs(sliding) * truth.bristle / max(bound, 1e-3))
+            bent = (bristle_rod + STEP * sliding) / (
+                1.0 + STEP * abs(sliding) * truth.bristle / max(bound, 1e-3)
+            )
             rate, bristle_rod = (bent - bristle_rod) / STEP, bent
-            rod_force = truth.bristle * bristle_rod + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
+            rod_force = (
+                truth.bristle * bristle_rod
+                + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
+            )
             v += STEP / truth.mass * (push - rail_force + rod_force)
         else:
-            v = solved(
+            v = solve(
                 truth.mass * v + STEP * push,
                 truth.mass,
                 STEP * rail_up,
@@ -373,10 +483,26 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
         force += (1.0 - math.exp(-STEP / truth.electrical)) * (truth.constant * asked - force)
         cell = force + ripple - smooth_rod - rod_force
         ground_before, structure_before = ground_yield, structure_yield
-        ground_yield += STEP / truth.yielding * (-truth.ground_hydraulic.yields * tyre - ground_yield)
-        structure_yield += STEP / truth.yielding * (truth.structure_hydraulic.yields * cell - structure_yield)
+        ground_yield += (
+            STEP / truth.yielding * (-truth.ground_hydraulic.yields * tyre - ground_yield)
+        )
+        structure_yield += (
+            STEP / truth.yielding * (truth.structure_hydraulic.yields * cell - structure_yield)
+        )
         ground, structure = next_ground, next_structure
-    motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = ground, structure, x, v, force, relaxed
+    motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (
+        ground,
+        structure,
+        x,
+        v,
+        force,
+        relaxed,
+    )
     motion[6], motion[7], motion[8], motion[9] = bristle_rail, bristle_rod, rail_end, rod_end
-    motion[10], motion[11], motion[12], motion[13] = ground_yield, structure_yield, ground_before, structure_before
+    motion[10], motion[11], motion[12], motion[13] = (
+        ground_yield,
+        structure_yield,
+        ground_before,
+        structure_before,
+    )
     motion[14], motion[15], motion[16] = acceleration, cell, count

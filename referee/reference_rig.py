@@ -1,4 +1,5 @@
-"""The referee's rig with its own controller: the plant of `reference_plant` under the law that its operator set."""
+"""The referee's rig with its own controller: the plant of `reference_plant` under the law that its
+operator set."""
 
 from __future__ import annotations
 
@@ -31,11 +32,19 @@ class Law(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)
 def simulate(
-    truth: Truth, law: Law, demands: Array, voltages: Array, noise: Array, missed: Array, commands: Array, sensors: Array
+    truth: Truth,
+    law: Law,
+    demands: Array,
+    voltages: Array,
+    noise: Array,
+    missed: Array,
+    commands: Array,
+    sensors: Array,
 ) -> int:
-    """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); voltages: V, in place of the controller's, or
-    empty; noise: of the sensors, shape (ticks, 4); missed: 1 where a tick is missed, shape (ticks,); commands, sensors: what
-    is recorded, shape (ticks, 4). Returns ticks."""
+    """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); voltages: V, in place
+    of the controller's, or empty; noise: of the sensors, shape (ticks, 4); missed: 1 where a tick
+    is missed, shape (ticks,); commands, sensors: what is recorded, shape (ticks, 4). Returns
+    ticks."""
     body = at_rest(truth, demands[0, 0], law.start, law.preload)
     last = travel = speed = filtered = integral = 0.0
     plate_model, plate_speed = law.start, 0.0
@@ -79,17 +88,28 @@ def simulate(
 def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator) -> tuple[Array, Array]:
     """A whole test: the commands and sensors as recorded, shape (ticks, 4) each."""
     ticks = len(demands)
-    noise, absent = disturbed(truth, ticks, random)
+    noise, absent = draw_noise(truth, ticks, random)
     commands, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
-    done = simulate(truth, law, np.ascontiguousarray(demands), np.empty(0), noise, absent, commands, sensors)
+    done = simulate(
+        truth=truth,
+        law=law,
+        demands=np.ascontiguousarray(demands),
+        voltages=np.empty(0),
+        noise=noise,
+        missed=absent,
+        commands=commands,
+        sensors=sensors,
+    )
     return commands[:done], sensors[:done]
 
 
-def disturbed(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Array, Array]:
+def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Array, Array]:
     """The sensors' noise, shape (ticks, 4), and 1 where a tick is missed, shape (ticks,)."""
     time = np.arange(ticks) * 1e-3
     noise = np.empty((ticks, 4))
-    for number, sensor in enumerate((truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)):
+    for number, sensor in enumerate(
+        (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
+    ):
         mains = sensor.mains * np.sin(2 * np.pi * 50.0 * time + random.uniform(0.0, 2.0 * np.pi))
         noise[:, number] = sensor.white * random.standard_normal(ticks) + mains
     absent = (random.random(ticks) < truth.missed).astype(float)
@@ -97,10 +117,19 @@ def disturbed(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Ar
     return noise, absent
 
 
-def quiet(truth: Truth, law: Law, commands: Array) -> Array:
+def run_quiet(truth: Truth, law: Law, commands: Array) -> Array:
     """The sensors without noise under given commands, shape (ticks, 4) both."""
     ticks = len(commands)
     out, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
     demands, voltages = np.ascontiguousarray(commands[:, :3]), np.ascontiguousarray(commands[:, 3])
-    simulate(truth, law, demands, voltages, np.zeros((ticks, 4)), np.zeros(ticks), out, sensors)
+    simulate(
+        truth=truth,
+        law=law,
+        demands=demands,
+        voltages=voltages,
+        noise=np.zeros((ticks, 4)),
+        missed=np.zeros(ticks),
+        commands=out,
+        sensors=sensors,
+    )
     return sensors

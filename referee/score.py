@@ -22,7 +22,8 @@ VISIBLE = 1.1
 
 @dataclass(frozen=True)
 class Row:
-    """One measure. value: as printed; goal: as printed; low, high: 95 % Wilson interval of a share, else None."""
+    """One measure. value: as printed; goal: as printed; low, high: 95 % Wilson interval of a share,
+    else None."""
 
     measure: str
     value: str
@@ -45,7 +46,13 @@ def _share(measure: str, hits: Sequence[bool], goal: str) -> Row:
     if not len(hits):
         return Row(measure, "no case", goal)
     low, high = wilson(sum(hits), len(hits))
-    return Row(measure, f"{sum(hits)} of {len(hits)} ({100 * sum(hits) / len(hits):.1f} %)", goal, low, high)
+    return Row(
+        measure,
+        f"{sum(hits)} of {len(hits)} ({100 * sum(hits) / len(hits):.1f} %)",
+        goal,
+        low,
+        high,
+    )
 
 
 def names(answer: dict[str, Any]) -> list[str]:
@@ -64,7 +71,9 @@ def truths(entry: dict[str, Any]) -> list[str]:
 
 
 def _class_of(effect: dict[str, Any]) -> set[str]:
-    return {f"{each['kind']}@{each['component']}" for each in effect["class"]} | set(names({"effects": [effect]}))
+    return {f"{each['kind']}@{each['component']}" for each in effect["class"]} | set(
+        names({"effects": [effect]})
+    )
 
 
 def _error(entry: dict[str, Any], answer: dict[str, Any]) -> float:
@@ -94,11 +103,16 @@ def rows(result: Result) -> list[Row]:
         for k, a in single
     ]
     flagged = [a["verdict"] in ("unknown", "partly explained") for _, a in outside]
-    placed = [bool(a["where"]) and a["where"][0]["component"] == k["effects"][0]["component"] for k, a in outside]
+    placed = [
+        bool(a["where"]) and a["where"][0]["component"] == k["effects"][0]["component"]
+        for k, a in outside
+    ]
     both = [set(truths(k)) <= set(names(a)) for k, a in double]
     wrong = [bool(set(names(a)) - set(truths(k))) for k, a in double]
     errors = [_error(k, a) for (k, a), hit in zip(single, right, strict=True) if hit]
-    judged = [a["gap"] for _, a in pairs if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE]
+    judged = [
+        a["gap"] for _, a in pairs if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE
+    ]
     apart = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in judged]
     worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in judged)
     sure = [
@@ -120,11 +134,23 @@ def rows(result: Result) -> list[Row]:
         _share("both of two effects", both, ">= 80 %"),
         _share("a wrong name among them", wrong, "<= 5 %"),
         Row("magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"),
-        Row("predicted - achieved shrinkage, median / 90th percentile", _plain(apart), "<= 0.03 / <= 0.10"),
+        Row(
+            "predicted - achieved shrinkage, median / 90th percentile",
+            _plain(apart),
+            "<= 0.03 / <= 0.10",
+        ),
         Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(judged)}", "0"),
         _share(f"right when confidence >= {CONFIDENT}", sure, ">= 97 %"),
-        _share("immaterial single effects: no wrong name", [not set(names(a)) - set(truths(k)) for k, a in traces], "none set"),
-        Row("seconds a record in the check, median / largest", _span(seconds), "<= 15 s for 30 s alone"),
+        _share(
+            "immaterial single effects: no wrong name",
+            [not set(names(a)) - set(truths(k)) for k, a in traces],
+            "none set",
+        ),
+        Row(
+            "seconds a record in the check, median / largest",
+            _span(seconds),
+            "<= 15 s for 30 s alone",
+        ),
         *_baselines(result, single),
     ]
 
@@ -139,7 +165,11 @@ def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]
         found.append(Row(f"baseline, always {name}: top-1 right", value, "", low, high))
     if result.crude:
         tried = [(result.key[number], name) for number, name in result.crude.items()]
-        hits = [name == truths(k)[0] for k, name in tried if k["sort"] == "single" and k["effects"][0]["material"]]
+        hits = [
+            name == truths(k)[0]
+            for k, name in tried
+            if k["sort"] == "single" and k["effects"][0]["material"]
+        ]
         alarms = [name != "none" for k, name in tried if k["sort"] == "null"]
         found.append(_share("baseline, black box: top-1 right", hits, ""))
         found.append(_share("baseline, black box: false alarms on nulls", alarms, ""))
@@ -147,7 +177,11 @@ def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]
 
 
 def _percentiles(values: Sequence[float]) -> str:
-    return f"{100 * np.median(values):.1f} % / {100 * np.quantile(values, 0.9):.1f} %" if len(values) else "no case"
+    return (
+        f"{100 * np.median(values):.1f} % / {100 * np.quantile(values, 0.9):.1f} %"
+        if len(values)
+        else "no case"
+    )
 
 
 def _plain(values: Sequence[float]) -> str:
@@ -164,16 +198,22 @@ def misses(result: Result) -> list[str]:
     for number, (entry, answer) in enumerate(zip(result.key, result.answers, strict=True)):
         truth, said = truths(entry), names(answer)
         if entry["sort"] == "outside":
-            there = bool(answer["where"]) and answer["where"][0]["component"] == entry["effects"][0]["component"]
+            there = (
+                bool(answer["where"])
+                and answer["where"][0]["component"] == entry["effects"][0]["component"]
+            )
             right = answer["verdict"] in ("unknown", "partly explained") and there
         else:
             right = set(truth) == set(said) and answer["verdict"] in ("explained", "no gap")
         if not right:
-            sizes = ", ".join("any" if e["size"] is None else f"{e['size']:.2f}" for e in entry["effects"])
+            sizes = ", ".join(
+                "any" if e["size"] is None else f"{e['size']:.2f}" for e in entry["effects"]
+            )
             place = answer["where"][0]["component"] if answer["where"] else "-"
             said_so = " + ".join(said) or answer["verdict"]
             lines.append(
-                f"{number:03d} {entry['sort']}, {entry['test']}: {' + '.join(truth) or 'nothing'} (size {sizes or '-'}) -> "
+                f"{number:03d} {entry['sort']}, {entry['test']}: "
+                f"{' + '.join(truth) or 'nothing'} (size {sizes or '-'}) -> "
                 f"{said_so} [{answer['verdict']}, at {place}]"
             )
     return lines
@@ -183,7 +223,11 @@ def table(result: Result) -> str:
     """The score as text."""
     lines = [f"seed {result.seed}, {len(result.key)} cases, commitment {result.commitment}", ""]
     for row in rows(result):
-        interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]" if row.low is not None and row.high is not None else ""
+        interval = (
+            f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]"
+            if row.low is not None and row.high is not None
+            else ""
+        )
         lines.append(f"{row.measure:58s} {row.value:24s} {interval:16s} {row.goal}".rstrip())
     lines += ["", "not answered right:", *misses(result)]
     return "\n".join(lines)

@@ -1,4 +1,5 @@
-"""The tests that the referee runs its rig in: imposed multisines, roads, a drop, and tests that a limit ends early."""
+"""The tests that the referee runs its rig in: imposed multisines, roads, a drop, and tests that a
+limit ends early."""
 
 from __future__ import annotations
 
@@ -12,7 +13,9 @@ TESTS = ("imposed", "imposed", "imposed", "road10", "road1.6", "drop", "tripped"
 SECONDS = {"imposed": 20.0, "road10": 20.0, "road1.6": 20.0, "drop": 12.0, "tripped": 6.0}
 
 
-def _sines(time: Array, low: float, high: float, slope: float, rms: float, random: np.random.Generator) -> Array:
+def _sines(
+    time: Array, low: float, high: float, slope: float, rms: float, random: np.random.Generator
+) -> Array:
     frequency = np.arange(low, high, 0.1)
     size = frequency**-slope
     phase = random.uniform(0.0, 2.0 * np.pi, len(frequency))
@@ -34,7 +37,7 @@ def _road(time: Array, speed: float, low: float, high: float, random: np.random.
     return (signal - signal[0]) * _rise(time)
 
 
-def asked(test: str, random: np.random.Generator) -> tuple[Law, Array]:
+def draw_demands(test: str, random: np.random.Generator) -> tuple[Law, Array]:
     """The controller's settings and the demands, shape (ticks, 3), of a test of that name."""
     time: Array = np.arange(round(SECONDS[test] / 1e-3), dtype=np.float64) * 1e-3
     demands = np.zeros((len(time), 3))
@@ -43,7 +46,8 @@ def asked(test: str, random: np.random.Generator) -> tuple[Law, Array]:
         demands[:, 1] = -0.004 + _sines(time, 0.2, 10.0, 1.0, 0.009, random)
         demands[:, 2] = 230.0 + _sines(time, 0.3, 30.0, 0.5, 35.0, random)
         if test == "tripped":
-            # The operator's demand runs away, and the limit of the structure's position ends the test.
+            # The operator's demand runs away, and the limit of the structure's position ends the
+            # test.
             demands[:, 1] += 0.2 * np.maximum(time - random.uniform(1.8, 2.4), 0.0) ** 2
         return Law(), demands
     if test == "road10":

@@ -15,12 +15,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from controllers import Settings
-from referee.draw import Defect, friction, tolerated
+from referee.draw import Defect, draw_tolerated, friction
 from referee.referee import write
-from referee.reference_drive import driven
+from referee.reference_drive import drive
 from referee.reference_plant import Truth
 from referee.reference_rig import Law, run
-from referee.test_signals import asked
+from referee.test_signals import draw_demands
 from rigtwin.console import table
 from rigtwin.description.posterior import Posterior, load_posterior
 from rigtwin.studies.sweep import run_jobs
@@ -90,7 +90,7 @@ def draw_rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator
         The random numbers go on to the rig's recording.
     """
     random = np.random.default_rng([seed, 6, number])
-    plain = tolerated(random)
+    plain = draw_tolerated(random)
     options = [one for one in (make() for make in friction("motor", random)) if one.kind in KINDS]
     defect = options[number % len(options)]
     truth, _ = defect.change(plain, Law())
@@ -117,7 +117,7 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     from rigtwin.recording.channels import DEFAULT_MACHINE
 
     truth, _, random = draw_rig(*case)
-    law, demands = asked("imposed", random)
+    law, demands = draw_demands("imposed", random)
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "recording.mcap"
         write(path, law, *run(truth, law, demands, random))
@@ -129,7 +129,7 @@ def run_on_rig(job: RigRun) -> dict[str, float]:
     """Make a run on a rig: name → figure, as the twin's runs give it."""
     asked, configuration = job.run, job.run.configuration
     demands = asked.experiment.demands(configuration, asked.seed)
-    return figures(asked, driven(job.truth, configuration, demands, asked.seed))
+    return figures(asked, drive(job.truth, configuration, demands, asked.seed))
 
 
 def check(

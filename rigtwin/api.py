@@ -16,11 +16,11 @@ from rigtwin.description import catalogue
 from rigtwin.description.configuration import (
     Changes,
     Configuration,
-    applied,
+    apply_effects,
     parameters,
     with_changes,
 )
-from rigtwin.description.configuration import without as take_out
+from rigtwin.description.configuration import without_effect as take_out
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.diagnosis.compare import Comparison, differences
 from rigtwin.diagnosis.compare import compare as compare_with_twin
@@ -479,7 +479,7 @@ def twin_of(
             )
     for name in taken_out:
         base = take_out(base, name)
-    return applied(base, effects)
+    return apply_effects(base, effects)
 
 
 def import_data(data: str | Path, mapping: str | Path, out: str | Path) -> Recording:

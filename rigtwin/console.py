@@ -26,9 +26,9 @@ def configured(configuration: Configuration, parsed: Namespace) -> Configuration
 
 def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
     """The changes of `--set`. Raises RigtwinError for what is none."""
-    from rigtwin.description.configuration import assigned
+    from rigtwin.description.configuration import parse_assignments
 
-    return list(assigned(texts))
+    return list(parse_assignments(texts))
 
 
 def apart(out: Path, *inputs: Path) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from referee.benches import DamperTruth, damper_force, sampled, wander
+from referee.benches import DamperTruth, damper_force, sample, wander
 
 TRUTH = DamperTruth(slip=85.0, spring=5e4, lost=2.4e-3, viscous=(640.0, 640.0))
 PERIOD, FINE, SECONDS = 2e-3, 8, 10.0
@@ -17,8 +17,8 @@ def written(path: Path, seed: int) -> None:
     motion = wander(random, SECONDS, PERIOD / FINE, 0.03, 0.2, 2.5)
     force = damper_force(TRUTH, motion, np.gradient(motion, PERIOD / FINE))
     position, load = (
-        sampled(random, motion[::FINE], 4e-6, 1e-6),
-        sampled(random, force[::FINE], 1.2, 0.1),
+        sample(random, motion[::FINE], 4e-6, 1e-6),
+        sample(random, force[::FINE], 1.2, 0.1),
     )
     lines = ["Logger 4711;;", "Prüfling: Dämpfer 3;;", "Zeit;Weg;Kraft", "s;mm;N"]
     for tick, (x, f) in enumerate(zip(position, load, strict=True)):

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from referee.bench_cases import ACTUATORS, DAMPERS, Case, drawn
+from referee.bench_cases import ACTUATORS, DAMPERS, Case, draw_case
 from referee.benches import (
     ActuatorTruth,
     DamperTruth,
     actuator_position,
     damper_force,
-    sampled,
+    sample,
     wander,
 )
 from rigtwin.description.catalogue import SHIPPED, find
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.localisation import travelled
+from rigtwin.diagnosis.localisation import distance_since_reversal
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.importing.convert import convert
 from rigtwin.recording import Recording, load
@@ -86,7 +86,7 @@ def test_a_slow_logger_and_a_stepping_command():
     random, period = np.random.default_rng(4), 0.02
     command = np.repeat(random.uniform(-0.05, 0.05, 50), 60)
     truth = ActuatorTruth(lags=(0.06,), late=0.08, fastest=0.15)
-    position = sampled(random, actuator_position(truth, command, period), 1e-4, 5e-4)
+    position = sample(random, actuator_position(truth, command, period), 1e-4, 5e-4)
     time = np.arange(len(command)) * period
     columns = {"/command": {"position": command}, "/sensor": {"position": position}}
     machine = find("position-actuator")
@@ -127,7 +127,7 @@ def test_distance_since_a_reversal():
     there = np.concatenate(
         [np.linspace(0, 1, 101), np.linspace(1, 0.4, 61)[1:], np.linspace(0.4, 0.9, 51)[1:]]
     )
-    found = travelled(there)
+    found = distance_since_reversal(there)
     assert found[99] == pytest.approx(0.99)
     assert found[100] == 0.0
     assert found[110] == pytest.approx(0.1)
@@ -171,8 +171,8 @@ def test_motions_start_at_rest_and_keep_their_reach():
 
 
 def test_cases_are_drawn_the_same_again_and_hold_every_sort():
-    assert drawn(7, 1) == drawn(7, 1)
-    names = {tuple(sorted(drawn(n, 1).names)) for n in range(2 * len(ACTUATORS) * len(DAMPERS))}
+    assert draw_case(7, 1) == draw_case(7, 1)
+    names = {tuple(sorted(draw_case(n, 1).names)) for n in range(2 * len(ACTUATORS) * len(DAMPERS))}
     assert names == {tuple(sorted(set(sort.split()) - {"none"})) for sort in (*ACTUATORS, *DAMPERS)}
 
 

@@ -11,7 +11,7 @@ import pytest
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
-from rigtwin.description.configuration import Configuration, Timing, applied, from_assignments
+from rigtwin.description.configuration import Configuration, Timing, apply_effects, from_assignments
 from rigtwin.diagnosis.compare import compare, compare_recordings
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.errors import RigtwinError
@@ -224,7 +224,7 @@ def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     recording = load(path)
     nominal = ComponentReplays(recording, RIG.configuration_of(recording))
     known = ComponentReplays(
-        recording, RIG.configuration_of(recording, applied(Configuration(), [text(name)]))
+        recording, RIG.configuration_of(recording, apply_effects(Configuration(), [text(name)]))
     )
     if name not in LEFT_OVER:
         for component in COMPONENTS:

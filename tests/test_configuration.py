@@ -9,11 +9,11 @@ from controllers.quantity import Quantity, fields
 from experiments import EXPERIMENTS
 from rigtwin.description.configuration import (
     Configuration,
-    flattened,
+    flatten,
     from_assignments,
     from_toml,
     groups,
-    overridden,
+    override,
     parameters,
 )
 from rigtwin.errors import RigtwinError
@@ -96,7 +96,7 @@ def test_toml(tmp_path):
 
 def test_flattened_and_back():
     configuration = Configuration(controller=Settings(mode=Mode.IMPOSED, kp=0.7))
-    assert overridden(Configuration(), flattened(configuration)) == configuration
+    assert override(Configuration(), flatten(configuration)) == configuration
 
 
 def test_controller_keys_are_those_of_the_recording_format():

@@ -8,7 +8,7 @@ import pytest
 from controllers import Measurements
 from rigtwin.components import RigPlant
 from rigtwin.signals.noise import remove_mains, white_noise
-from rigtwin.simulation.converters import Disturbance, converted, sensors
+from rigtwin.simulation.converters import Disturbance, quantise, sensors
 
 
 def test_disturbances_have_the_sizes_of_the_table_and_do_not_depend_on_the_block():
@@ -34,7 +34,7 @@ def test_channels_are_independent():
 
 
 def test_quantisation():
-    assert converted(0.100, 0.02, 0.076) == pytest.approx(0.152)
-    assert converted(0.1234, 0.0, 0.0) == 0.1234
+    assert quantise(0.100, 0.02, 0.076) == pytest.approx(0.152)
+    assert quantise(0.1234, 0.0, 0.0) == 0.1234
     values = np.linspace(-1, 1, 999)
-    assert np.max(np.abs([converted(v, 0.0, 0.076) - v for v in values])) <= 0.038 + 1e-12
+    assert np.max(np.abs([quantise(v, 0.0, 0.076) - v for v in values])) <= 0.038 + 1e-12

@@ -13,16 +13,16 @@ from rigtwin.components import RigPlant, Scales, Swing
 from rigtwin.components import find as effect_of
 from rigtwin.components.effect import SHARES
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.configuration import from_assignments, overridden, without
-from rigtwin.description.document import examined, load
+from rigtwin.description.configuration import from_assignments, override
+from rigtwin.description.document import examine, load
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.fit import possible
+from rigtwin.diagnosis.fit import is_possible
 from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
 @pytest.mark.parametrize("name", shipped())
 def test_a_shipped_machine_has_no_mistakes(name):
-    machine, mistakes = examined(shipped()[name])
+    machine, mistakes = examine(shipped()[name])
     assert mistakes == []
     assert machine is not None
     assert machine.name == name
@@ -103,8 +103,8 @@ def test_every_effect_of_a_machine_can_be_searched_for(name):
 def test_what_acts_through_friction_needs_some():
     machine = find("damper-bench")
     play, dry = (effect_of(name, machine.plant) for name in ("backlash@damper", "coulomb@damper"))
-    assert not possible((play,), machine.plant)
-    assert possible((play, dry), machine.plant)
+    assert not is_possible((play,), machine.plant)
+    assert is_possible((play, dry), machine.plant)
 
 
 MISTAKES = [
@@ -167,7 +167,7 @@ def test_a_mistake_is_one_line(tmp_path: Path, capsys, old: str, new: str, said:
     path = tmp_path / "bench.toml"
     assert old in TOML
     path.write_text(TOML.replace(old, new, 1))
-    machine, mistakes = examined(path)
+    machine, mistakes = examine(path)
     assert machine is None
     assert any(said in mistake for mistake in mistakes), mistakes
     assert all("\n" not in mistake for mistake in mistakes)
@@ -186,7 +186,7 @@ def test_settings_are_checked():
     base = find("emps").configuration
     changed = from_assignments(base, ["guide.viscous=210", "controller.kp=150"])
     assert (changed.plant.guide.viscous, changed.controller.kp) == (210.0, 150.0)
-    assert without(base, "viscous@guide").plant.guide.viscous == 0.0
+    assert without_effect(base, "viscous@guide").plant.guide.viscous == 0.0
     for changes, said in (
         ({"gide": {}}, "unknown component"),
         ({"guide": {"viscuos": 1}}, "unknown setting guide.viscuos; guide has coulomb"),
@@ -195,7 +195,7 @@ def test_settings_are_checked():
         ({"guide": 3}, "expected a table"),
     ):
         with pytest.raises(Exception, match=said):
-            overridden(base, changes)
+            override(base, changes)
 
 
 def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:

@@ -11,15 +11,15 @@ import pytest
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.components import Motion, RigPlant
-from rigtwin.description.configuration import Configuration, without
+from rigtwin.description.configuration import Configuration, without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Blocks, gated, halves, interval, shrinkage
+from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
 from rigtwin.diagnosis.fit import Fitter
 from rigtwin.diagnosis.localisation import region
-from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.sampling import outstanding
-from rigtwin.diagnosis.unknown_input import located
+from rigtwin.diagnosis.sampling import find_outstanding
+from rigtwin.diagnosis.unknown_input import locate_disturbance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from tests.helpers.recordings import SHIPPED, beside, shipped
@@ -84,7 +84,7 @@ def test_a_known_effect_is_named_in_twenty_seconds(name):
 
 
 def test_a_friction_taken_out_of_the_twin_is_found():
-    base = without(Configuration(), "coulomb@rail")
+    base = without_effect(Configuration(), "coulomb@rail")
     assert base.plant.rail.coulomb == 0.0
     outcome = answer(recorded("imposed", seconds=4.0), base=base)
     assert names(outcome) == {"coulomb@rail"}
@@ -95,9 +95,9 @@ def test_a_friction_taken_out_of_the_twin_is_found():
 
 def test_what_is_not_there_cannot_be_taken_out():
     with pytest.raises(RigtwinError, match=r"none to take out; it has coulomb@rail, coulomb@motor"):
-        without(Configuration(), "viscous@rail")
+        without_effect(Configuration(), "viscous@rail")
     with pytest.raises(RigtwinError, match="unknown effect"):
-        without(Configuration(), "nonsense@rail")
+        without_effect(Configuration(), "nonsense@rail")
 
 
 @SLOW
@@ -155,7 +155,7 @@ def test_a_correction_that_worsens_held_out_data_is_rejected():
 def test_a_free_disturbance_finds_the_component_without_the_library(effect):
     evidence = evidence_of(recorded("imposed", (effect,)))
     name = effect.partition("=")[0].partition("@")[2]
-    assert located(evidence, evidence.plant)[0].component == name
+    assert locate_disturbance(evidence, evidence.plant)[0].component == name
 
 
 def deviation_of(recording: Recording) -> Deviation | None:
@@ -203,7 +203,7 @@ def test_a_controller_as_told_has_no_deviation():
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
     predicted = evidence.predicted(RIG.plant)
-    (found,) = outstanding(RIG, evidence.recordings, predicted, RIG.plant)
+    (found,) = find_outstanding(RIG, evidence.recordings, predicted, RIG.plant)
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)
 
@@ -243,7 +243,7 @@ def test_the_gate_keeps_what_helps_and_drops_what_harms():
         left = 5.0 - 3.0 * (good in kept) + 1.0 * (bad in kept)
         return Blocks(np.full(4, 5.0), np.full(4, left))
 
-    assert gated((good, bad), across) == ((good,), (bad,))
+    assert reject_worsening((good, bad), across) == ((good,), (bad,))
 
 
 def test_halves_share_every_tick_out():
@@ -275,9 +275,9 @@ def test_regions_are_told_apart():
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",)))
     fitter = Fitter(evidence)
-    fits = [fitter.single(rig_effect("delay@motor")), fitter.single(rig_effect("lag@motor"))]
+    fits = [fitter.fit_one(rig_effect("delay@motor")), fitter.fit_one(rig_effect("lag@motor"))]
     tests = [EXPERIMENTS["imposed-fast"], EXPERIMENTS["drop"]]
-    found = proposed(RIG, fits, tests)
+    found = propose_test(RIG, fits, tests)
     assert found is not None
     assert found.experiment == "imposed-fast"
     assert found.command.startswith("rigtwin run imposed-fast")

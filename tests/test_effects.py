@@ -24,12 +24,12 @@ from rigtwin.components import (
     Tyre,
     candidates,
 )
-from rigtwin.components.conditioning import actuator, conditioned, holding
+from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import breakaway, friction, gap_at
-from rigtwin.description.configuration import Configuration, Timing, applied, at_effect
+from rigtwin.description.configuration import Configuration, Timing, apply_effects, with_effect
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
-from rigtwin.simulation.converters import sampled, sensing
+from rigtwin.simulation.converters import build_sensing, sample_sensors
 from rigtwin.simulation.loop import run, run_compiled
 from rigtwin.simulation.mechanics import build, handles
 from rigtwin.simulation.plant import contacts, drive, touch
@@ -80,12 +80,12 @@ def test_nominal_value_is_no_effect(name, nominal):
     values = effect.nominal(SHORT.plant)
     for parameter, quantity in effect.quantities().items():
         assert quantity.low <= values[parameter] <= quantity.high
-    assert np.array_equal(all_measurements(at_effect(SHORT, effect, values)), nominal)
+    assert np.array_equal(all_measurements(with_effect(SHORT, effect, values)), nominal)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_is_felt_and_stays_finite(name, nominal):
-    changed = all_measurements(applied(SHORT, [text(name)]))
+    changed = all_measurements(apply_effects(SHORT, [text(name)]))
     count = min(len(changed), len(nominal))
     assert np.isfinite(changed).all()
     difference = np.std(changed[:count] - nominal[:count], axis=0) + np.abs(
@@ -103,7 +103,7 @@ def test_an_effect_is_felt_and_stays_finite(name, nominal):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_stepwise_and_compiled_agree_with_effects(name):
-    configuration = applied(SHORT._replace(timing=Timing(duration=0.3)), [text(name)])
+    configuration = apply_effects(SHORT._replace(timing=Timing(duration=0.3)), [text(name)])
     first = float(DEMANDS[0, 0])
     compiled = [
         b.measurements
@@ -139,7 +139,7 @@ def test_a_recording_keeps_its_effects_but_not_among_the_operators_settings(tmp_
 )
 def test_wrong_effects_are_refused_with_what_there_is(wrong, says):
     with pytest.raises(RigtwinError, match=says):
-        applied(SHORT, [wrong])
+        apply_effects(SHORT, [wrong])
 
 
 STEP = 2.5e-4
@@ -150,8 +150,8 @@ def through(
     of: Motor | Cylinder, commands: np.ndarray, computer: Computer = NEVER_LATE
 ) -> np.ndarray:
     conditioning = actuator(of, computer, STEP)
-    state = holding(conditioning, float(commands[0]))
-    return np.array([conditioned(conditioning, state, float(command)) for command in commands])
+    state = hold(conditioning, float(commands[0]))
+    return np.array([condition(conditioning, state, float(command)) for command in commands])
 
 
 def test_actuator_conditioning_in_closed_form():
@@ -184,12 +184,12 @@ def test_sensor_in_closed_form():
         load_cell=LoadCell(0.0, 0.0, 0.0, gain=1.1, offset=3.0, delay=0.0045),
         ground_lvdt=Lvdt(0, 0, 0, lag=0.02),
     )
-    sensors = sensing(plant, 1e-3)
+    sensors = build_sensing(plant, 1e-3)
     time = np.arange(1000) * 1e-3
     wave = np.sin(2 * np.pi * 2.0 * time)
     step = np.where(time < 0.1, 0.0, 1.0)
     rows = [
-        sampled(sensors, Measurements(s, 0.0, 0.0, w), np.zeros(4))
+        sample_sensors(sensors, Measurements(s, 0.0, 0.0, w), np.zeros(4))
         for s, w in zip(step.tolist(), wave.tolist(), strict=True)
     ]
     force = np.array([row.load_cell for row in rows])

@@ -11,16 +11,16 @@ from dm_env import StepType, test_utils
 
 from experiments import find
 from experiments.environment import environment
-from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, override
 from rigtwin.errors import RigtwinError
-from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.actions import Actuators, Schedule
 from rigtwin.studies.environment import Environment, Reward
 
 
 def short(name: str, seconds: float = 0.5, **changes: dict[str, object]) -> Configuration:
-    return overridden(find(name).configuration, {"timing": {"duration": seconds}, **changes})
+    return override(find(name).configuration, {"timing": {"duration": seconds}, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ class TestActuatorsConform(test_utils.EnvironmentTestMixin, unittest.TestCase):
 def test_at_rest_it_is_the_compiled_loop_to_the_bit(name):
     configuration = short(name, 1.0, computer={"missed_ticks": 0.02})
     env = Environment(configuration, find(name).demands, seed=5, interval=1)
-    ran = simulated(configuration, find(name).demands(configuration, 5), 5)
+    ran = simulate(configuration, find(name).demands(configuration, 5), 5)
     step = env.reset()
     for tick in range(len(ran.commands)):
         step = env.step(env.rest())
@@ -70,7 +70,7 @@ def test_at_rest_it_is_the_compiled_loop_to_the_bit(name):
 
 def test_an_agent_that_commands_what_the_controller_did_meets_the_same_rig():
     configuration = short("active", 1.0)
-    ran = simulated(configuration, find("active").demands(configuration, 3), 3)
+    ran = simulate(configuration, find("active").demands(configuration, 3), 3)
     env = Environment(configuration, find("active").demands, seed=3, actions=Actuators(), interval=1)
     env.reset()
     for tick, commands in enumerate(ran.commands):
@@ -111,7 +111,7 @@ def test_a_trip_ends_an_episode_for_good():
 def test_a_reward_is_what_it_says():
     only = Reward(ride=np.inf, road_holding=np.inf, travel=0.01)
     env = Environment(short("drop"), find("drop").demands, reward=only, interval=1)
-    ran = simulated(short("drop"), find("drop").demands(short("drop"), 0), 0)
+    ran = simulate(short("drop"), find("drop").demands(short("drop"), 0), 0)
     env.reset()
     # (preload − weight) / stiffness: where the spring carries the body.
     sag = (200.0 - 25.0 * 9.81) / 1000.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rigtwin.components import KINDS, RigPlant
-from rigtwin.diagnosis.attribute import attribute, detectable, library, within_tolerance
+from rigtwin.diagnosis.attribute import attribute, detection_limit, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, despike
 from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
 from rigtwin.signals.runs import find_cut_off
@@ -71,32 +71,32 @@ def test_an_effect_is_found_at_its_size(text):
     effect = rig_effect(name)
     evidence = evidence_of(recorded("imposed", (text,)))
     fitter = Fitter(evidence)
-    fit = fitter.settled(fitter.single(effect))
+    fit = fitter.refit_with_tolerances(fitter.fit_one(effect))
     nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])
-    assert fitter.nothing.misfit - fit.misfit > detectable(evidence)
+    assert fitter.nothing.misfit - fit.misfit > detection_limit(evidence)
 
 
 def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
     plant = nominal.plant
     space = Space(nominal, plant)
-    small = nominal.shifted(
+    small = nominal.shift(
         plant, [0.8 if t.parameter in ("mass", "constant") else 0.0 for t in RIG.tolerances]
     )
-    large = nominal.shifted(plant, [8.0 if t.parameter == "mass" else 0.0 for t in RIG.tolerances])
+    large = nominal.shift(plant, [8.0 if t.parameter == "mass" else 0.0 for t in RIG.tolerances])
     clean = nominal.residual(plant)
 
     def cost(other: RigPlant) -> float:
         difference = [
-            a - b for a, b in zip(nominal.predicted(other), nominal.predicted(plant), strict=True)
+            a - b for a, b in zip(nominal.predict(other), nominal.predict(plant), strict=True)
         ]
         despike(difference[0][3], 6.0)
-        return space.misfit(clean - nominal.whitened(difference)) - space.misfit(clean)
+        return space.misfit(clean - nominal.whiten(difference)) - space.misfit(clean)
 
     assert cost(small) < 40.0
     assert cost(large) > 400.0
-    assert np.max(np.abs(space.nuisances(clean - 50.0 * nominal.nuisances(plant)[:, 0]))) <= BEYOND
+    assert np.max(np.abs(space.estimate_tolerances(clean - 50.0 * nominal.tolerance_responses(plant)[:, 0]))) <= BEYOND
 
 
 def test_a_deviation_within_tolerance_is_no_finding(nominal):

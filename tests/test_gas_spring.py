@@ -10,9 +10,9 @@ from numba import njit
 
 from rigtwin.components.gas_spring import (
     GasSpring,
-    charged,
-    designed,
+    design,
     equilibrium,
+    find_charge,
     spring_force,
     stiffness,
 )
@@ -56,7 +56,7 @@ def test_no_room_left_is_infinite():
 def test_a_designed_spring_has_the_forces_asked_for(seed: int):
     draw = np.random.default_rng(seed)
     extended, ratio, stroke, exponent = draw.uniform([10.0, 1.1, 0.01, 1.0], [1e6, 20.0, 2.0, 1.4])
-    spring = designed(extended, ratio * extended, stroke, exponent)
+    spring = design(extended, ratio * extended, stroke, exponent)
     assert spring.length > stroke
     assert spring_force(spring, 0.0) == pytest.approx(extended)
     assert spring_force(spring, stroke) == pytest.approx(ratio * extended)
@@ -65,8 +65,8 @@ def test_a_designed_spring_has_the_forces_asked_for(seed: int):
 def test_the_charge_is_that_spring_again():
     """P V^γ is constant from the full gas volume to what the cylinder leaves of it."""
     area, stroke = 0.00116, 0.18
-    spring = designed(395.0, 12.0 * 395.0, stroke, 1.4)
-    charge = charged(spring, area, stroke)
+    spring = design(395.0, 12.0 * 395.0, stroke, 1.4)
+    charge = find_charge(spring, area, stroke)
     left = charge.gas - charge.cylinder
     assert charge.pressure * area == pytest.approx(395.0)
     assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(spring_force(spring, stroke))
@@ -85,12 +85,12 @@ def test_compiled_code_has_the_same_force():
 
 def test_bad_input_is_one_line():
     for make, words in (
-        (lambda: designed(0.0, 10.0, 0.1, 1.4), "the force fully extended of a gas spring is 0 N; it has to be positive"),
-        (lambda: designed(10.0, 10.0, 0.1, 1.4), "the force compressed, 10 N, has to exceed the one fully extended, 10 N"),
-        (lambda: designed(10.0, 40.0, math.nan, 1.4), "the stroke of a gas spring is nan m"),
-        (lambda: designed(10.0, 40.0, 0.1, -1.0), "the exponent of a gas spring is -1; it"),
-        (lambda: charged(SPRING, -1e-3, 0.5), "the area of a gas spring is -0.001 m²"),
-        (lambda: charged(SPRING, 1e-3, 0.7), "a stroke of 0.7 m leaves no room in a gas column of 0.673 m"),
+        (lambda: design(0.0, 10.0, 0.1, 1.4), "the force fully extended of a gas spring is 0 N; it has to be positive"),
+        (lambda: design(10.0, 10.0, 0.1, 1.4), "the force compressed, 10 N, has to exceed the one fully extended, 10 N"),
+        (lambda: design(10.0, 40.0, math.nan, 1.4), "the stroke of a gas spring is nan m"),
+        (lambda: design(10.0, 40.0, 0.1, -1.0), "the exponent of a gas spring is -1; it"),
+        (lambda: find_charge(SPRING, -1e-3, 0.5), "the area of a gas spring is -0.001 m²"),
+        (lambda: find_charge(SPRING, 1e-3, 0.7), "a stroke of 0.7 m leaves no room in a gas column of 0.673 m"),
     ):
         with pytest.raises(RigtwinError) as raised:
             make()

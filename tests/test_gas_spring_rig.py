@@ -13,8 +13,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.diagnosis.compare import compare
 from rigtwin.models.quarter_car import QuarterCarModel
 from rigtwin.recording import load
-from rigtwin.simulation.ideal import ideal
-from rigtwin.simulation.runner import record, simulated
+from rigtwin.simulation.ideal import simulate_ideal
+from rigtwin.simulation.runner import record, simulate
 from tests.helpers.twin import RIG
 
 
@@ -34,7 +34,7 @@ def test_the_ideal_against_solve_ivp():
 
     time = np.arange(5000) * 1e-3
     exact = solve_ivp(slope, (0, 5), [-0.0044, 0, -0.0044, 0], t_eval=time, rtol=1e-9, atol=1e-11).y
-    ours = ideal(configuration, np.zeros(5000))
+    ours = simulate_ideal(configuration, np.zeros(5000))
     assert np.max(np.abs(ours.structure - exact[0])) < 1e-4
     assert np.max(np.abs(ours.wheel - exact[2])) < 1e-5
 
@@ -56,11 +56,11 @@ def test_at_rest_motor_and_gas_carry_the_body():
 def test_the_quick_replay_is_the_twin():
     configuration = settings_of_the_test()
     configuration = configuration._replace(timing=configuration.timing._replace(duration=4.0))
-    ran = simulated(configuration, np.zeros((4000, 3)), 2)
+    ran = simulate(configuration, np.zeros((4000, 3)), 2)
     quick = QuarterCarModel(
         ran.commands[:, 0], ran.commands[:, 1], ran.commands[:, 3], configuration, 4
     )
-    true = quick.true(configuration.plant)
+    true = quick.predict_true(configuration.plant)
     assert np.max(np.abs(true[2] - ran.truth[:, 2])) < 2e-5
     assert np.std(true[3] - ran.truth[:, 3]) < 0.5
 

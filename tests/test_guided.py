@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide, PositionActuator
-from rigtwin.components.guide import dry_limits, friction, slid
+from rigtwin.components.guide import dry_limits, friction, slide
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.choose import model_of
-from rigtwin.models.following import followed
-from rigtwin.models.guided import Inertia, carried
+from rigtwin.models.following import follow_command
+from rigtwin.models.guided import Inertia
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
@@ -27,7 +27,7 @@ def moved(guide: Guide, position: np.ndarray, mass: float = 0.0, spring: float =
     motion = np.ascontiguousarray(np.stack([position, velocity, np.gradient(velocity, PERIOD)]))
     out = np.empty(len(position))
     inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0)
-    carried(guide, friction(guide), inertia, spring, PERIOD, motion, out)
+    inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, out)
     return out
 
 
@@ -88,9 +88,9 @@ def test_a_spring_and_a_play_in_series_with_friction():
 
 
 def test_a_slider_slides_no_further_than_it_must():
-    force, by = slid(0.005, 0.001, 1e4, 20.0, 30.0)
+    force, by = slide(0.005, 0.001, 1e4, 20.0, 30.0)
     assert (force, by) == (20.0, pytest.approx(0.002))
-    assert slid(-0.0035, 0.001, 1e4, 20.0, 30.0) == (-25.0, 0.0)
+    assert slide(-0.0035, 0.001, 1e4, 20.0, 30.0) == (-25.0, 0.0)
 
 
 def test_viscous_friction_through_a_spring_lags():
@@ -107,8 +107,7 @@ def test_viscous_friction_through_a_spring_lags():
 
 def test_an_ideal_actuator_follows_half_a_tick_late():
     command = np.cumsum(np.ones(100)) * 1e-3
-    np.testing.assert_allclose(
-        followed(PositionActuator(), command, 0.0, PERIOD, 4)[5:], command[5:] - 0.5e-3, atol=1e-12
+    np.testing.assert_allclose(follow_command(PositionActuator(), command, 0.0, PERIOD, 4)[5:], command[5:] - 0.5e-3, atol=1e-12
     )
 
 
@@ -129,7 +128,7 @@ def test_an_actuator_has_its_frequency_response(values, transfer):
     time = np.arange(20_000) * PERIOD
     for frequency in (0.5, 3.0, 8.0):
         w = 2 * np.pi * frequency
-        position = followed(PositionActuator(**values), np.sin(w * time), 0.0, PERIOD, 4)
+        position = follow_command(PositionActuator(**values), np.sin(w * time), 0.0, PERIOD, 4)
         last = slice(10_000, 20_000)
         found = 2.0j * np.mean(position[last] * np.exp(-1j * w * time[last]))
         # A held command is half a tick late.
@@ -138,12 +137,12 @@ def test_an_actuator_has_its_frequency_response(values, transfer):
 
 def test_a_play_is_its_width():
     command = 0.01 * np.sin(2 * np.pi * TIME)
-    position = followed(PositionActuator(deadband=0.002), command, 0.0, PERIOD, 1)
+    position = follow_command(PositionActuator(deadband=0.002), command, 0.0, PERIOD, 1)
     assert np.max(position[1000:]) == pytest.approx(0.008, abs=1e-5)
 
 
 def test_a_rate_limit_holds():
-    position = followed(
+    position = follow_command(
         PositionActuator(rate_limit=0.05), 0.02 * np.sign(np.sin(TIME)), 0.0, PERIOD, 4
     )
     assert np.max(np.abs(np.diff(position))) <= 0.05 * PERIOD * 1.0001
@@ -172,7 +171,7 @@ def test_a_pushed_joint_moves_as_mujoco_moves_it(tmp_path: Path, sort: str):
     model = model_of(machine, recording_of(machine, command, position), machine.configuration, 20)
     assert np.ptp(position) > 0.01
     np.testing.assert_allclose(
-        model.sensed(machine.plant)[0], position, atol=0.004 * np.ptp(position)
+        model.predict(machine.plant)[0], position, atol=0.004 * np.ptp(position)
     )
 
 
@@ -181,7 +180,7 @@ def test_a_block_slows_down_by_its_friction_and_stays(tmp_path: Path):
     plant = machine.plant._replace(guide=Guide(coulomb=4.0))
     recording = recording_of(machine, np.where(TIME < 0.5, 10.0, 0.0), np.zeros(len(TIME)))
     model = model_of(machine, recording, machine.configuration._replace(plant=plant), 4)
-    position = model.sensed(plant)[0]
+    position = model.predict(plant)[0]
     # 2 kg: 3 m/s² for half a second, then −2 m/s² until it rests.
     assert position[-1] == pytest.approx(0.375 + 1.5**2 / 4.0, rel=0.003)
     assert position[-1] == pytest.approx(position[-500], abs=1e-9)
@@ -200,7 +199,7 @@ def test_a_loop_is_closed_by_the_controllers_formula():
     }
     recording = Recording(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
     model = model_of(machine, recording, machine.configuration, 8)
-    force = model.sensed(machine.plant)[0]
+    force = model.predict(machine.plant)[0]
     speed = np.gradient(reference, PERIOD)
     needed = 95.1 * np.gradient(speed, PERIOD) + 203.5 * speed
     np.testing.assert_allclose(force[500:-5], needed[500:-5], atol=0.02 * np.max(np.abs(needed)))

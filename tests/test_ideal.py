@@ -14,7 +14,7 @@ from controllers.beam import all_modes, assembled
 from controllers.skyhook import semi_active_damping
 from experiments.single_mass import CHAPTER_3
 from rigtwin.description.configuration import Configuration, Timing
-from rigtwin.simulation.ideal import ideal
+from rigtwin.simulation.ideal import simulate_ideal
 
 TIME = np.arange(10_000) * 1e-3
 
@@ -32,7 +32,7 @@ def test_quarter_car(sky):
         return [s[1], force / 25 - 9.81, s[3], (50_000 * (ground_at(t) - s[2]) - force) / 34]
 
     exact = solve_ivp(slope, (0, 10), [-0.004, 0, -0.004, 0], t_eval=TIME, rtol=1e-9, atol=1e-11).y
-    ours = ideal(Configuration(controller=settings), ground_at(TIME))
+    ours = simulate_ideal(Configuration(controller=settings), ground_at(TIME))
     assert np.max(np.abs(ours.structure - exact[0])) < 2e-4
     assert np.max(np.abs(ours.wheel - exact[2])) < 2e-4
     assert np.max(np.abs(ours.velocity - exact[1])) < 2e-3
@@ -44,10 +44,10 @@ def test_single_mass():
         return [s[1], (220 - 350 * (s[0] - ground_at(t)) - 30 * (s[1] - rate)) / 25 - 9.81]
 
     exact = solve_ivp(slope, (0, 10), [-0.0044, 0], t_eval=TIME, rtol=1e-9, atol=1e-11).y
-    ours = ideal(Configuration(controller=CHAPTER_3), ground_at(TIME))
+    ours = simulate_ideal(Configuration(controller=CHAPTER_3), ground_at(TIME))
     assert np.max(np.abs(ours.structure - exact[0])) < 1e-4
     # Static drop, thesis §3.6: 0.072 m.
-    at_rest = ideal(Configuration(controller=CHAPTER_3), np.zeros(60_000))
+    at_rest = simulate_ideal(Configuration(controller=CHAPTER_3), np.zeros(60_000))
     assert at_rest.structure[-1] == pytest.approx(-0.0721, abs=2e-4)
     assert at_rest.force[-1] == pytest.approx(25 * 9.81, rel=1e-3)
 
@@ -62,10 +62,10 @@ def test_semi_active_quarter_car():
         return [s[1], force / 25 - 9.81, s[3], (50_000 * (ground_at(t) - s[2]) - force) / 34]
 
     exact = solve_ivp(slope, (0, 10), [-0.004, 0, -0.004, 0], t_eval=TIME, max_step=2e-4, rtol=1e-6, atol=1e-9).y
-    ours = ideal(Configuration(controller=settings), ground_at(TIME))
+    ours = simulate_ideal(Configuration(controller=settings), ground_at(TIME))
     assert np.max(np.abs(ours.structure - exact[0])) < 2e-4
     # It is not the passive suspension.
-    assert np.max(np.abs(ideal(Configuration(), ground_at(TIME)).structure - exact[0])) > 5e-3
+    assert np.max(np.abs(simulate_ideal(Configuration(), ground_at(TIME)).structure - exact[0])) > 5e-3
 
 
 def test_beams_on_a_quarter_car_against_all_78_freedoms():
@@ -86,7 +86,7 @@ def test_beams_on_a_quarter_car_against_all_78_freedoms():
     start[:78] = shapes.T @ mass @ upward * -0.004
     start[156] = -0.004
     exact = solve_ivp(slope, (0, 3), start, t_eval=TIME[:3000], method="LSODA", rtol=1e-7, atol=1e-10).y
-    ours = ideal(Configuration(controller=settings, timing=Timing(duration=3.0)), ground_at(TIME[:3000]))
+    ours = simulate_ideal(Configuration(controller=settings, timing=Timing(duration=3.0)), ground_at(TIME[:3000]))
     assert np.max(np.abs(ours.structure - centre @ exact[:78])) < 5e-4
     tip = shapes[6 * 3 + 2] @ exact[:78]
     assert ours.wing is not None
@@ -106,7 +106,7 @@ def test_stationary_rms_on_a_white_noise_road_by_the_lyapunov_equation():
     ticks, period = 400_000, 1e-3
     random = np.random.default_rng(3)
     ground = np.cumsum(random.standard_normal(ticks)) * math.sqrt(density * period)
-    run = ideal(Configuration(controller=settings), ground)
+    run = simulate_ideal(Configuration(controller=settings), ground)
     late = slice(20_000, None)
     for signal, variance in (
         (run.velocity, covariance[1, 1]),
@@ -125,7 +125,7 @@ def test_passive_invariant_point(stiffness, damping):
     ground = 1e-3 * np.sin(frequency * time)
     settings = Settings(suspension_stiffness=stiffness, suspension_damping=damping, preload=25 * 9.81, start=-25 * 9.81 / 5e4)
     late = slice(20_000, None)
-    moved = ideal(Configuration(controller=settings), ground).structure[late]
+    moved = simulate_ideal(Configuration(controller=settings), ground).structure[late]
     waves = np.column_stack([np.sin(frequency * time[late]), np.cos(frequency * time[late]), np.ones(20_000)])
     along, across, _ = np.linalg.lstsq(waves, moved, rcond=None)[0]
     assert along == pytest.approx(-34 / 25 * 1e-3, rel=0.01)

@@ -12,7 +12,7 @@ from scipy.signal import StateSpace, dlsim
 
 from experiments import EXPERIMENTS
 from rigtwin.components import Carriage, Motor, Rail, RigPlant, Tyre
-from rigtwin.components.cylinder import continuous
+from rigtwin.components.cylinder import state_space
 from rigtwin.description.configuration import Configuration
 from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
@@ -192,7 +192,7 @@ def imposed_inputs(seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Ground motion and suspension force of an imposed test: command through H(s) by scipy, and the force demanded."""
     experiment = EXPERIMENTS["imposed"]
     demands = experiment.demands(experiment.configuration, seed)
-    a, b, c = continuous(NOMINAL.ground_cylinder)
+    a, b, c = state_space(NOMINAL.ground_cylinder)
     discrete = StateSpace(a, b[:, None], c[None, :], np.zeros((1, 1))).to_discrete(1e-3)
     ground = dlsim(discrete, demands[:, 0])[1]
     return ground[:, 0], demands[:, 2]

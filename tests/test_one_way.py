@@ -10,7 +10,7 @@ import pytest
 
 import rigtwin
 from rigtwin.description.catalogue import SHIPPED
-from rigtwin.description.document import examined
+from rigtwin.description.document import examine
 from rigtwin.models.choose import model_of
 from tests.helpers.described import TOML, described
 
@@ -25,7 +25,7 @@ def rig_named(folder: Path, name: str, **replaced: str) -> rigtwin.Machine:
         text = text.replace(old, new)
     path = folder / f"{name}.toml"
     path.write_text(text)
-    machine, mistakes = examined(path)
+    machine, mistakes = examine(path)
     assert mistakes == []
     assert machine is not None
     return machine

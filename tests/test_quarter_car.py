@@ -12,7 +12,7 @@ from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.models.quarter_car import Disturbances, QuarterCarModel, motor_friction, sliding
+from rigtwin.models.quarter_car import Disturbances, QuarterCarModel, motor_friction, solve_velocity
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin
@@ -39,7 +39,7 @@ def both(configuration: Configuration, name: str = "imposed") -> tuple[np.ndarra
     measured = np.concatenate([block.measurements for block in blocks]).T
     ground, structure, _, voltage = commands.T
     model = QuarterCarModel(ground, structure, voltage, free, 8)
-    return measured, model.sensed(free.plant)
+    return measured, model.predict(free.plant)
 
 
 def apart(configuration: Configuration, name: str = "imposed") -> tuple[float, float]:
@@ -97,7 +97,7 @@ def test_every_effect_does_the_same_to_both(effect, swing):
 @pytest.mark.parametrize("plate", [-0.7, 0.0, 0.7])
 def test_the_inclusion_is_solved_exactly(rhs, plate):
     rail, motor, inertia = (0.3, 0.2), (0.1, 0.4), 1.5
-    velocity = sliding(rhs, inertia, rail, motor, plate)
+    velocity = solve_velocity(rhs, inertia, rail, motor, plate)
     dry = motor_friction(rhs, inertia, rail, motor, plate, velocity)
     assert -motor[1] <= dry <= motor[0]
     # What is left is the rail's, which must lie within its bounds, and at one of them while it
@@ -116,11 +116,11 @@ def test_a_disturbance_acts_where_it_enters():
     reduced = reduced_of(recording)
     nothing = np.zeros(recording.ticks)
     shift = np.full(recording.ticks, 1e-3)
-    before = reduced.true(plant)
+    before = reduced.predict_true(plant)
     assert np.array_equal(
-        reduced.true(plant, Disturbances(nothing, nothing, nothing, nothing)), before
+        reduced.predict_true(plant, Disturbances(nothing, nothing, nothing, nothing)), before
     )
-    moved = reduced.true(plant, Disturbances(nothing, shift, nothing, nothing))
+    moved = reduced.predict_true(plant, Disturbances(nothing, shift, nothing, nothing))
     assert np.allclose(moved[1] - before[1], 1e-3)
     assert np.array_equal(moved[0], before[0])
 
@@ -128,6 +128,6 @@ def test_a_disturbance_acts_where_it_enters():
 def test_a_finer_step_changes_little():
     recording = recorded("imposed", seconds=SECONDS)
     reduced = reduced_of(recording)
-    change = np.abs(reduced.sensed(RigPlant()) - reduced.finer().sensed(RigPlant()))
+    change = np.abs(reduced.predict(RigPlant()) - reduced.double_steps().predict(RigPlant()))
     assert np.max(change[:3]) < 6e-5
     assert float(np.median(change[3])) < 0.3

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from referee.check import Result
-from referee.draw import MATERIAL, SENSORS, effect_size, library, outside, tolerated
-from referee.referee import case, operator, sorts, write
+from referee.draw import MATERIAL, SENSORS, draw_tolerated, draw_unnamed, effect_size, library
+from referee.referee import draw_case, operator, sorts, write
 from referee.reference_plant import Truth
-from referee.reference_rig import Law, quiet, run
+from referee.reference_rig import Law, run, run_quiet
 from referee.score import misses, rows, table, wilson
-from referee.test_signals import TESTS, asked
+from referee.test_signals import TESTS, draw_demands
 from rigtwin.components import RigPlant, candidates
 from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.recording import load
@@ -38,7 +38,7 @@ def test_the_referee_imports_nothing_of_the_twin():
 
 def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
     for test in ("imposed", "road1.6"):
-        law, demands = asked(test, np.random.default_rng(4))
+        law, demands = draw_demands(test, np.random.default_rng(4))
         path = tmp_path / f"{test}.mcap"
         write(path, law, *run(Truth(), law, demands[:8000], np.random.default_rng(4)))
         recording = load(path)
@@ -48,7 +48,7 @@ def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
 
 
 def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
-    law, demands = asked("road10", np.random.default_rng(4))
+    law, demands = draw_demands("road10", np.random.default_rng(4))
     path = tmp_path / "road.mcap"
     write(path, law, *run(Truth(), law, demands[:3000], np.random.default_rng(4)))
     recording = load(path)
@@ -58,9 +58,9 @@ def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
 
 
 def test_its_two_frictions_agree_where_they_should():
-    law, demands = asked("imposed", np.random.default_rng(2))
+    law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:5000], np.random.default_rng(2))
-    hard, bristle = quiet(Truth(), law, commands), quiet(Truth(bristle=1e9), law, commands)
+    hard, bristle = run_quiet(Truth(), law, commands), run_quiet(Truth(bristle=1e9), law, commands)
     difference = np.sqrt(np.mean((hard - bristle) ** 2, axis=0))
     assert np.all(difference[:3] < 2e-5)
     assert difference[3] < 2.0
@@ -68,7 +68,7 @@ def test_its_two_frictions_agree_where_they_should():
 
 def test_every_defect_inside_the_library_has_a_name_there_and_changes_the_rig():
     random = np.random.default_rng(3)
-    law, demands = asked("imposed", random)
+    law, demands = draw_demands("imposed", random)
     commands, _ = run(Truth(), law, demands[:4000], random)
     for group in library(commands, random):
         for make in group:
@@ -80,7 +80,7 @@ def test_every_defect_inside_the_library_has_a_name_there_and_changes_the_rig():
 def test_defects_outside_the_library_have_no_name_there():
     kinds = set()
     for seed in range(5):
-        for make in outside(np.random.default_rng(seed)):
+        for make in draw_unnamed(np.random.default_rng(seed)):
             defect = make()
             assert f"{defect.kind}@{defect.component}" not in KNOWN
             kinds.add(defect.kind)
@@ -89,7 +89,7 @@ def test_defects_outside_the_library_have_no_name_there():
 
 def test_tolerances_stay_within_what_is_declared():
     for seed in range(20):
-        rig = tolerated(np.random.default_rng(seed))
+        rig = draw_tolerated(np.random.default_rng(seed))
         assert abs(rig.mass / 34.0 - 1.0) <= 0.005
         assert abs(rig.tyre / 50_000.0 - 1.0) <= 0.01
         assert abs(rig.rail.coulomb / 50.0 - 1.0) <= 0.03
@@ -100,14 +100,14 @@ def test_sorts_have_their_shares_and_cases_their_effects():
     order = sorts(100, np.random.default_rng(1))
     assert [order.count(name) for name in ("single", "null", "pair", "outside")] == [45, 30, 10, 15]
     for sort, count in (("null", 0), ("single", 1), ("outside", 1)):
-        entry, recordings = case(sort, np.random.default_rng(8))
+        entry, recordings = draw_case(sort, np.random.default_rng(8))
         assert len(entry["effects"]) == count
         assert len(recordings) == 2
         assert entry["test"] in TESTS
 
 
 def test_a_size_is_the_change_in_units_of_noise():
-    law, demands = asked("imposed", np.random.default_rng(2))
+    law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:4000], np.random.default_rng(2))
     groups = library(commands, np.random.default_rng(2))
     defect = next(

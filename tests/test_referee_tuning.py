@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS, find
-from referee.reference_drive import driven
+from referee.reference_drive import drive
 from referee.reference_plant import Truth
 from referee.reference_rig import run
-from referee.test_signals import asked
+from referee.test_signals import draw_demands
 from referee.tuning import Case, check, draw_rig, text
 from rigtwin.cli import main
-from rigtwin.description.configuration import Configuration, overridden
-from rigtwin.simulation.runner import simulated
+from rigtwin.description.configuration import Configuration, override
+from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here
@@ -29,11 +29,11 @@ from rigtwin.studies.tuning.study_file import parse_study
 def test_the_rigs_controller_does_what_the_referees_own_does(test):
     """Both laws have one description; on one plant with the same noise they command the same."""
     truth = Truth(missed=0.02)
-    law, demands = asked(test, np.random.default_rng(3))
+    law, demands = draw_demands(test, np.random.default_rng(3))
     demands = demands[:4000]
     commands, sensors = run(truth, law, demands, np.random.default_rng([9, 5]))
     mode = "imposed" if law.imposed else "mil"
-    ran = driven(truth, overridden(Configuration(), {"controller": {"mode": mode}}), demands, 9)
+    ran = drive(truth, override(Configuration(), {"controller": {"mode": mode}}), demands, 9)
     assert np.allclose(ran.commands, commands, rtol=0.0, atol=[1e-9, 1e-6, 1e-3, 1e-5])
     assert np.allclose(ran.measurements, sensors, rtol=0.0, atol=[1e-9, 1e-5, 1e-5, 0.2])
 
@@ -41,21 +41,21 @@ def test_the_rigs_controller_does_what_the_referees_own_does(test):
 def test_without_a_defect_it_is_the_twin_to_a_few_percent():
     """Two plants, two codes: the force error of chapter 4's test."""
     experiment = find("friction-road")
-    configuration = overridden(experiment.configuration, {"timing": {"duration": 8.0}})
+    configuration = override(experiment.configuration, {"timing": {"duration": 8.0}})
     demands = experiment.demands(configuration, 2)
 
     def error(ran) -> float:
         found = Trial(configuration, ran.commands, ran.truth).tracking
         return found.force_e1 + found.force_e2
 
-    assert error(driven(Truth(), configuration, demands, 2)) == pytest.approx(
-        error(simulated(configuration, demands, 2)), rel=0.05
+    assert error(drive(Truth(), configuration, demands, 2)) == pytest.approx(
+        error(simulate(configuration, demands, 2)), rel=0.05
     )
 
 
 def test_a_limit_ends_a_test_on_it():
-    configuration = overridden(Configuration(), {"safety": {"force": 150.0}})
-    ran = driven(Truth(), configuration, np.zeros((100, 3)), 0)
+    configuration = override(Configuration(), {"safety": {"force": 150.0}})
+    ran = drive(Truth(), configuration, np.zeros((100, 3)), 0)
     assert ran.trip == Trip.FORCE
     assert len(ran.commands) == 1
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rigtwin.description.configuration import Configuration, from_toml, overridden
+from rigtwin.description.configuration import Configuration, from_toml, override
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.report import bars, html, plots
@@ -80,7 +80,7 @@ def test_a_corrected_twin_says_how_sure_it_is(explained, tmp_path):
     for other in posterior.otherwise:
         assert other.effect != "coulomb@rail"
         assert 0.01 <= other.probability <= 1.0 - posterior.probability + 0.05
-        assert overridden(Configuration(), other.changes).plant != Configuration().plant
+        assert override(Configuration(), other.changes).plant != Configuration().plant
 
 
 def test_what_has_no_name_is_not_named_but_placed(outcomes):

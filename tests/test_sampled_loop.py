@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 
 from experiments import EXPERIMENTS
 from experiments import find as experiment
-from rigtwin.description.configuration import Configuration, overridden
-from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.description.configuration import Configuration, override
+from rigtwin.simulation.runner import simulate, without_limits
 from rigtwin.studies.stability.sampled_loop import closed_loop, decay, mechanics
 
 SENSORS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
@@ -36,12 +36,12 @@ CASES = {
 
 
 def free(changes: dict[str, dict[str, object]]) -> Configuration:
-    return overridden(overridden(Configuration(), FREE), changes)
+    return override(override(Configuration(), FREE), changes)
 
 
 def measured(configuration: Configuration) -> float:
     """Decay of the body's acceleration between the second and the last quarter of a run, 1/s."""
-    ran = simulated(unlimited(configuration), np.zeros((configuration.ticks, 3)), 0)
+    ran = simulate(without_limits(configuration), np.zeros((configuration.ticks, 3)), 0)
     period = configuration.timing.period
     acceleration = np.gradient(np.gradient(ran.commands[:, 1], period), period)
     quarter = len(acceleration) // 4
@@ -67,7 +67,7 @@ def test_what_is_not_in_the_loop_does_not_count():
     """In an imposed test nothing comes back from the wheel, which swings for ever on its tyre."""
     imposed = experiment("imposed").configuration
     assert decay(imposed) > 1.0
-    assert decay(overridden(imposed, {"tyre": {"stiffness": 10_000.0}})) == pytest.approx(decay(imposed), rel=1e-9)
+    assert decay(override(imposed, {"tyre": {"stiffness": 10_000.0}})) == pytest.approx(decay(imposed), rel=1e-9)
 
 
 def test_where_it_says_that_the_loop_begins_to_swing_the_twin_does():

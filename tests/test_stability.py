@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy.linalg import expm
 
 from experiments.vehicles import VEHICLES
-from rigtwin.cli.stability import arguments, stability
+from rigtwin.cli.stability import add_arguments, execute
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.stability.critical import critical_delay, critical_lag
 from rigtwin.studies.stability.delayed import rightmost_delay_root
@@ -319,8 +319,8 @@ class TestInput:
 class TestCommand:
     def run(self, *words):
         parser = argparse.ArgumentParser()
-        arguments(parser)
-        return stability(parser.parse_args(words))
+        add_arguments(parser)
+        return execute(parser.parse_args(words))
 
     def test_prints_every_model(self, capsys, tmp_path):
         out = tmp_path / "s.json"

@@ -18,8 +18,8 @@ from experiments import EXPERIMENTS
 from experiments import find as experiment
 from experiments.tuning import STUDIES, find_study
 from rigtwin.cli import main
-from rigtwin.description.configuration import Configuration, from_toml, overridden
-from rigtwin.description.posterior import Otherwise, Posterior, load_posterior, written
+from rigtwin.description.configuration import Configuration, from_toml, override
+from rigtwin.description.posterior import Otherwise, Posterior, format_toml, load_posterior
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.studies.sweep import Store
@@ -133,7 +133,7 @@ KINDS_OF_TEST = ("drop", "active", "semi-active", "friction-road", "single-mass"
 @pytest.mark.parametrize("name", KINDS_OF_TEST)
 def test_every_measure_is_a_number_for_every_kind_of_test(name):
     short = {"timing": {"duration": 2.0, "timestep": 1e-3}}
-    configuration = overridden(experiment(name).configuration, short)
+    configuration = override(experiment(name).configuration, short)
     found = run(Run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
     assert set(found) == {*MEASURES, LIMITS, TRIP}
     assert all(map(math.isfinite, found.values()))
@@ -142,7 +142,7 @@ def test_every_measure_is_a_number_for_every_kind_of_test(name):
 
 def test_a_run_that_trips_has_no_measures():
     tight = {"timing": {"duration": 1.0}, "safety": {"force": 150.0}}
-    configuration = overridden(Configuration(), tight)
+    configuration = override(Configuration(), tight)
     found = run(Run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
     assert found[TRIP] != 0.0
     assert math.isnan(found["ride"])
@@ -150,17 +150,17 @@ def test_a_run_that_trips_has_no_measures():
 
 
 def test_errors_are_those_of_the_thesis_tables():
-    from rigtwin.simulation.metrics import tracking
+    from rigtwin.simulation.metrics import tracking_of
     from rigtwin.simulation.runner import record
 
-    configuration = overridden(Configuration(), {"timing": {"duration": 3.0}})
+    configuration = override(Configuration(), {"timing": {"duration": 3.0}})
     found = run(Run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "r.mcap"
         record(path, "drop", configuration, experiment("drop").demands(configuration, 4), 4)
-        expected = tracking(load(path), configuration)
+        expected = tracking_of(load(path), configuration)
     assert found["tracking"] == pytest.approx(expected.force_e2, rel=1e-12)
     force = expected.force_e1 + expected.force_e2
     position = expected.position_e1 + expected.position_e2
@@ -194,7 +194,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
             there = getattr(study.baseline_settings, parameter.name)
             assert parameter.low <= there <= parameter.high, parameter.key
         bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), Here())
-        short = overridden(study.search_configuration, {"timing": {"duration": 1.0}})
+        short = override(study.search_configuration, {"timing": {"duration": 1.0}})
         scenario = Scenario(0, short.plant)
         assert run(replace(bench.plan(short, study.baseline_settings, scenario), first=0.0))
 
@@ -279,7 +279,7 @@ POSTERIOR = Posterior(
 
 
 def write_twin(path: Path) -> Path:
-    path.write_text("\n".join(["[motor]", "coulomb = 24.0", "", *written(POSTERIOR)]) + "\n")
+    path.write_text("\n".join(["[motor]", "coulomb = 24.0", "", *format_toml(POSTERIOR)]) + "\n")
     return path
 
 

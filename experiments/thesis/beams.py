@@ -19,8 +19,8 @@ from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sh
 from experiments.thesis.trial import over_seeds, seeded, trial
 from rigtwin.description.configuration import Configuration
 from rigtwin.render.plot import COLOURS, SENSED
-from rigtwin.simulation.ideal import ideal
-from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.ideal import simulate_ideal
+from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 
 WITHIN = 1.5
@@ -44,8 +44,8 @@ def _run(name: str, seed: int) -> Result:
         return ride.kept(trial(f"beam-{name}", seed), seed)
     experiment = find("beam-passive")
     demands = experiment.demands(experiment.configuration, seed)
-    ran = simulated(experiment.configuration, demands, seed)
-    should = ideal(experiment.configuration, demands[:, 0])
+    ran = simulate(experiment.configuration, demands, seed)
+    should = simulate_ideal(experiment.configuration, demands[:, 0])
     return {
         "tripped": float(ran.trip != Trip.NONE),
         "lasted": len(ran.commands) * experiment.configuration.timing.period,

@@ -31,7 +31,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
-from rigtwin.simulation.runner import record, simulated
+from rigtwin.simulation.runner import record, simulate
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.friction_spikes import (
     BOUNDS,
@@ -133,7 +133,7 @@ def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Confi
 def detected(frequency: float, amplitude: float, seconds: float, seed: int, **settings: float) -> Result:
     """How many reversals of a sine motion the detector sees, no step being made (Fig. 4.8, 4.9)."""
     configuration, demands = sine_test(frequency, amplitude, seconds)
-    ran = simulated(configuration, demands, seed)
+    ran = simulate(configuration, demands, seed)
     period = configuration.timing.period
     tuned = configuration.controller._replace(compensator=Compensator.ONE_STEP, **settings)
     steps = detections(tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period)
@@ -160,7 +160,7 @@ def timed(offset: float | None, seed: int = 0) -> Result:
     None for no step (Fig. 4.6)."""
     configuration, demands = sine_test(1.0, 0.02, 4.0)
     period = configuration.timing.period
-    free = simulated(configuration, demands, seed)
+    free = simulate(configuration, demands, seed)
     velocity = np.gradient(gaussian_filter1d(free.truth[:, 2], 2), period)
     levels = np.sign(velocity)
     if offset is not None:

@@ -17,7 +17,7 @@ from rigtwin.description.configuration import Configuration, Safety, Timing
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.signals.excitation import schroeder
-from rigtwin.simulation.runner import simulated
+from rigtwin.simulation.runner import simulate
 from rigtwin.studies.friction_spikes import filter_lag
 
 Response = NDArray[np.complex128]
@@ -53,7 +53,7 @@ def hydraulic(frequencies: Array) -> Response:
 def _tested(demanded: Callable[[Array, Settings], Array], seed: int) -> tuple[Array, Array]:
     """Commands and measurements of an imposed test on the nominal twin, the mean of the last ten seconds."""
     configuration = Configuration(controller=Settings(mode=Mode.IMPOSED), timing=Timing(duration=float(SECONDS)))
-    ran = simulated(configuration, demanded(time_of(configuration), configuration.controller), seed)
+    ran = simulate(configuration, demanded(time_of(configuration), configuration.controller), seed)
     second = round(1.0 / configuration.timing.period)
     commands, measured = (part[-10 * second :].reshape(10, second, 4).mean(axis=0) for part in (ran.commands, ran.measurements))
     return commands, measured
@@ -119,7 +119,7 @@ def _pressed(seed: int) -> Result:
     time = time_of(configuration)
     force = 200.0 + 1200.0 * (0.5 - 0.5 * np.cos(2 * math.pi * time / 40.0))
     demands = np.column_stack([np.zeros_like(time), np.full_like(time, settings.start), force])
-    ran = simulated(configuration, demands, seed)
+    ran = simulate(configuration, demands, seed)
     wheel = ran.truth[:, 1] - ran.truth[:, 2]
     shown = slice(None, None, 40)
     return {"force": ran.truth[shown, 3], "deflection": -wheel[shown]}
@@ -132,7 +132,7 @@ def _ramped(direction: float, seed: int) -> Result:
     time = time_of(configuration)
     force = 200.0 + direction * np.maximum(10.0 * (time - 1.0), 0.0)
     demands = np.column_stack([np.zeros_like(time), np.full_like(time, settings.start), force])
-    ran = simulated(configuration, demands, seed)
+    ran = simulate(configuration, demands, seed)
     wheel = ran.truth[:, 1] - ran.truth[:, 2]
     moved = np.abs(wheel - wheel[0]) > 5e-6
     shown = slice(None, None, 10)

@@ -18,7 +18,7 @@ from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, 
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, COLOURS, SENSED
-from rigtwin.simulation.ideal import ideal
+from rigtwin.simulation.ideal import simulate_ideal
 
 IDEAL = COLOURS["other"]
 WITHIN = 1.5
@@ -223,7 +223,7 @@ def _damped_wheel() -> tuple[bool, str]:
     left = []
     for damping in (0.0, 1000.0):
         plant = configuration.plant._replace(tyre=configuration.plant.tyre._replace(damping=damping))
-        wheel = ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
+        wheel = simulate_ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
         left.append(float(np.std(hop(wheel, 1e-3)[600:1600])))
     return left[1] < 0.1 * left[0], f"{1e6 * left[1]:.1f} um rms left after 0.6 s, without {1e6 * left[0]:.0f} um"
 

@@ -16,9 +16,9 @@ from experiments.vehicles import VEHICLES, configuration
 from rigtwin.components import Cylinder, Motor
 from rigtwin.components.gas_spring import (
     GasSpring,
-    charged,
-    designed,
+    design,
     equilibrium,
+    find_charge,
     spring_force,
     stiffness,
 )
@@ -97,7 +97,7 @@ def _springs() -> dict[str, tuple[GasSpring, float]]:
 def _equation_3() -> list[Entry]:
     where, load = "Equation 3.3", BOEING.sprung_mass * BOEING.gravity
     _, stroke = RECONSTRUCTED
-    lengths = [designed(load / 4.0, f * load, x, BOEING.exponent).length for f, x in ((4.0, PRINTED[1]), (3.0, stroke))]
+    lengths = [design(load / 4.0, f * load, x, BOEING.exponent).length for f, x in ((4.0, PRINTED[1]), (3.0, stroke))]
     wrong = "0.589 m and four times are not what this was computed with"
     entries = [
         digits(where, "force fully extended, a quarter of the static load", "167285", load / 4.0, "N"),
@@ -216,7 +216,7 @@ def _table_3() -> list[Entry]:
 def _cylinder() -> list[Entry]:
     where, rig = "§3.5", at_scale(BOEING, similar(*RECONSTRUCTED))
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
-    charge, plain = (charged(rig.spring, each, RIG_STROKE) for each in (area, number("0.0012")))
+    charge, plain = (find_charge(rig.spring, each, RIG_STROKE) for each in (area, number("0.0012")))
     bar = 1e-5
     whose = "annulus of a 50 mm bore with a 32 mm rod; an area of 0.00116 m² gives all three printed figures"
     litres = "a thousand times too large: litres, not m³"
@@ -294,7 +294,7 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
 
 def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
-    pressures = [1e-5 * charged(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure for each in (real, slow)]
+    pressures = [1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure for each in (real, slow)]
     kept = scaling(UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time})
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))

@@ -15,9 +15,9 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import rms
-from rigtwin.simulation.ideal import Ideal, ideal
-from rigtwin.simulation.metrics import tracked
-from rigtwin.simulation.runner import Ran, simulated
+from rigtwin.simulation.ideal import Ideal, simulate_ideal
+from rigtwin.simulation.metrics import compute_tracking
+from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip, explain_trip
 
 BODY = 3.0
@@ -32,7 +32,7 @@ class Trial:
     """A test, what the twin did, and what the ideal system would have done. truth columns: ground, structure, travel, force."""
 
     configuration: Configuration
-    ran: Ran
+    ran: SimulationResult
     should: Ideal
 
     @property
@@ -61,17 +61,17 @@ def trial(name: str, seed: int, change: Callable[[Configuration], Configuration]
     experiment = find(name)
     configuration = change(experiment.configuration)
     demands = experiment.demands(configuration, seed)
-    ran = simulated(configuration, demands, seed)
+    ran = simulate(configuration, demands, seed)
     if ran.trip != Trip.NONE:
         raise RigtwinError(
             f"{name} with seed {seed}: {explain_trip(ran.trip, configuration.safety)} after {len(ran.commands)} ticks"
         )
-    return Trial(configuration, ran, ideal(configuration, ran.commands[:, 0]))
+    return Trial(configuration, ran, simulate_ideal(configuration, ran.commands[:, 0]))
 
 
 def errors(test: Trial) -> dict[str, float]:
     """rms e1, e2 and e1 + e2 of position (m) and force (N), and of what they are a share: the ideal's motion about its mean."""
-    found = tracked(test.should, test.ran.commands, test.plate, test.force)
+    found = compute_tracking(test.should, test.ran.commands, test.plate, test.force)
     swing = {"ideal_position": float(np.std(test.should.structure)), "ideal_force": float(np.std(test.should.force))}
     return {**vars(found), **swing}
 

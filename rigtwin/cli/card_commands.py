@@ -15,7 +15,7 @@ import numpy as np
 
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
-from rigtwin.description.configuration import Configuration, applied
+from rigtwin.description.configuration import Configuration, apply_effects
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,
@@ -60,7 +60,7 @@ def serve(parsed: Namespace) -> int:
         raise RigtwinError(f"--seed: expected 0 or more; --port: 0 to {PORTS}")
     table = load_table(parsed.card)
     configuration = configured(Configuration(), parsed)
-    terminals = Terminals(applied(configuration, parsed.effect), table, parsed.seed)
+    terminals = Terminals(apply_effects(configuration, parsed.effect), table, parsed.seed)
     card = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, port = listen(card, parsed.port)
     print(

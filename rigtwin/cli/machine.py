@@ -19,10 +19,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(parsed: argparse.Namespace) -> int:
     from rigtwin.description.catalogue import shipped
-    from rigtwin.description.document import examined
+    from rigtwin.description.document import examine
 
     path: Path = shipped().get(str(parsed.description)) or parsed.description
-    found, mistakes = examined(path)
+    found, mistakes = examine(path)
     for mistake in mistakes:
         print(f"{path}: {mistake}")
     if found is None:

@@ -93,8 +93,8 @@ def _fresh(stem: str) -> Path:
 
 
 def _run_supervised(parsed: argparse.Namespace, path: Path) -> int:
+    from rigtwin.cli.session_commands import plan_test
     from rigtwin.cli.session_commands import run as work
-    from rigtwin.cli.session_commands import test_of
 
     if parsed.machine != DEFAULT_MACHINE:
         raise RigtwinError(f"--card, --real-time and --target daq are of {DEFAULT_MACHINE} alone")
@@ -109,4 +109,4 @@ def _run_supervised(parsed: argparse.Namespace, path: Path) -> int:
         )
     given = [path for path in (parsed.card, parsed.config) if path is not None]
     writable(apart(path, *given))
-    return work(parsed, test_of(parsed, parsed.name), path)
+    return work(parsed, plan_test(parsed, parsed.name), path)

@@ -31,6 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    from rigtwin.hardware.session.plan import session
+    from rigtwin.cli.session_commands import session
 
     return session(parsed)

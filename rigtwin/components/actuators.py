@@ -1,5 +1,5 @@
-"""Actuators of a described machine: parameters alone. Units are those of a joint that slides; of one that turns, read rad
-for m and Nm for N. What becomes of a command is in `signal_path`."""
+"""Actuators of a described machine: parameters alone. Units are those of a joint that slides; of
+one that turns, read rad for m and Nm for N. What becomes of a command is in `signal_path`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 
 
 class ForceActuator(NamedTuple):
-    """Command to force: delay, deadband, gain, saturation, rate limit, lag, then `constant`, in that order."""
+    """Command to force: delay, deadband, gain, saturation, rate limit, lag, then `constant`, in
+    that order."""
 
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
@@ -24,8 +25,8 @@ class ForceActuator(NamedTuple):
 
 
 class PositionActuator(NamedTuple):
-    """Command to position; without any effect it follows at once: delay, deadband (a play), gain and offset, saturation, rate
-    limit, then lag and second lag, or a resonance."""
+    """Command to position; without any effect it follows at once: delay, deadband (a play), gain
+    and offset, saturation, rate limit, then lag and second lag, or a resonance."""
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: follows its command at rest")] = 1.0
     offset: Annotated[float, Quantity("m", -100.0, 100.0, NONE)] = 0.0

@@ -1,4 +1,5 @@
-"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit, lag, in that order.
+"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit,
+lag, in that order.
 
 All of them are neutral in the nominal machine, whose commands pass as they are.
 """
@@ -32,8 +33,9 @@ from rigtwin.numerics.delay import delay_sample, ring
 
 
 class Actuator(NamedTuple):
-    """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or about the last position (a
-    valve's overlap). rate: greatest change a timestep. share: of the way to its input that the lag goes in a timestep."""
+    """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or
+    about the last position (a valve's overlap). rate: greatest change a timestep. share: of the way
+    to its input that the lag goes in a timestep."""
 
     neutral: bool
     delay: float
@@ -46,14 +48,16 @@ class Actuator(NamedTuple):
 
 
 class ActuatorState(NamedTuple):
-    """history: past commands, a ring; memory: where the ring stands, the deadband's output, the rate limit's, the lag's."""
+    """history: past commands, a ring; memory: where the ring stands, the deadband's output, the
+    rate limit's, the lag's."""
 
     history: Array
     memory: Array
 
 
 def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep: float) -> Actuator:
-    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's command."""
+    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's
+    command."""
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
     neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (
@@ -66,29 +70,29 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
     )
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
     return Actuator(
-        neutral,
-        delay / timestep,
-        of.deadband,
-        not isinstance(of, Cylinder),
-        of.gain,
-        of.saturation,
-        rate * timestep if rate < UNLIMITED else UNLIMITED,
-        share,
+        neutral=neutral,
+        delay=delay / timestep,
+        deadband=of.deadband,
+        zero_centred=not isinstance(of, Cylinder),
+        gain=of.gain,
+        saturation=of.saturation,
+        rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
+        share=share,
     )
 
 
-def holding(conditioning: Actuator, command: float) -> ActuatorState:
+def hold(conditioning: Actuator, command: float) -> ActuatorState:
     """The state in which `command` has been held for long."""
     state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
     if conditioning.zero_centred:
         state.memory[1] = 0.0
-    output = limited(conditioning, state, command)
+    output = limit(conditioning, state, command)
     state.memory[2] = state.memory[3] = output
     return state
 
 
 @compilable
-def limited(conditioning: Actuator, state: ActuatorState, command: float) -> float:
+def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float:
     """Deadband, gain and saturation."""
     band = conditioning.deadband
     if conditioning.zero_centred:
@@ -101,12 +105,12 @@ def limited(conditioning: Actuator, state: ActuatorState, command: float) -> flo
 
 
 @compilable
-def conditioned(conditioning: Actuator, state: ActuatorState, command: float) -> float:
+def condition(conditioning: Actuator, state: ActuatorState, command: float) -> float:
     """What acts over the coming timestep. Advances the state by one timestep."""
     if conditioning.neutral:
         state.memory[3] = command
         return command
-    wanted = limited(
+    wanted = limit(
         conditioning, state, delay_sample(state.history, state.memory, conditioning.delay, command)
     )
     before = state.memory[2]

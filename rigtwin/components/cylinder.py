@@ -1,5 +1,6 @@
-"""Hydraulic cylinders under position control: H(s) scaled to unit static gain, sampled exactly for a held command, then a
-limit of the speed. MJCF has no actuator of fourth order, so this runs beside MuJoCo and prescribes the plates' motion."""
+"""Hydraulic cylinders under position control: H(s) scaled to unit static gain, sampled exactly for
+a held command, then a limit of the speed. MJCF has no actuator of fourth order, so this runs beside
+MuJoCo and prescribes the plates' motion."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ H_OF_S = "identified closed loop H(s), thesis Eq. 6.2"
 
 
 class Cylinder(NamedTuple):
-    """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s + a0), scaled to unit
-    static gain, then a limit of the speed."""
+    """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s +
+    a0), scaled to unit static gain, then a limit of the speed."""
 
     b2: Annotated[float, Quantity("1/s^2", -1e6, 1e6, H_OF_S)] = 1817.0
     b1: Annotated[float, Quantity("1/s^3", -1e8, 1e8, H_OF_S)] = 7.719e4
@@ -41,8 +42,8 @@ class Cylinder(NamedTuple):
 
 
 class CylinderModel(NamedTuple):
-    """Sampled cylinder: z⁺ = transition·z + entry·command; y⁺ = ahead·z + direct·command; the plate follows y⁺ by at most
-    `step` metres. Shapes (4, 4), (4,), (4,), scalar, scalar."""
+    """Sampled cylinder: z⁺ = transition·z + entry·command; y⁺ = ahead·z + direct·command; the plate
+    follows y⁺ by at most `step` metres. Shapes (4, 4), (4,), (4,), scalar, scalar."""
 
     transition: Array
     entry: Array
@@ -52,13 +53,14 @@ class CylinderModel(NamedTuple):
 
 
 class CylinderState(NamedTuple):
-    """filter: states z of H(s), shape (4,); position: of the plate in m, shape (1,). Changed in place."""
+    """filter: states z of H(s), shape (4,); position: of the plate in m, shape (1,). Changed in
+    place."""
 
     filter: Array
     position: Array
 
 
-def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
+def state_space(cylinder: Cylinder) -> tuple[Array, Array, Array]:
     """Controllable form (A, B, C) of H(s)/H(0); shapes (4, 4), (4,), (4,)."""
     a = np.diag(np.ones(3), 1)
     a[3] = [-cylinder.a0, -cylinder.a1, -cylinder.a2, -cylinder.a3]
@@ -68,12 +70,13 @@ def continuous(cylinder: Cylinder) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
+def discretise(cylinder: Cylinder, timestep: float) -> CylinderModel:
     """The cylinder sampled at `timestep` (s) with its command held; not to be changed.
 
-    Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down rigs that run beside.
+    Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down
+    rigs that run beside.
     """
-    a, b, c = continuous(cylinder)
+    a, b, c = state_space(cylinder)
     both = np.zeros((5, 5))
     both[:4, :4], both[:4, 4] = a, b
     step = expm(both * timestep)
@@ -83,7 +86,7 @@ def sampled(cylinder: Cylinder, timestep: float) -> CylinderModel:
     )
 
 
-def settled(cylinder: Cylinder, position: float) -> CylinderState:
+def rest_state(cylinder: Cylinder, position: float) -> CylinderState:
     """At rest at `position` (m) under a command of that value."""
     return CylinderState(np.array([position / cylinder.a0, 0.0, 0.0, 0.0]), np.array([position]))
 

@@ -1,6 +1,7 @@
 """What an effect is: another value of a component's parameters, and where a search for it starts.
 
-A kind of effect is declared once, beside the law that has its parameters. `library` collects the kinds.
+A kind of effect is declared once, beside the law that has its parameters. `library` collects the
+kinds.
 """
 
 from __future__ import annotations

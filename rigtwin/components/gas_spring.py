@@ -1,4 +1,5 @@
-"""Gas spring of a landing gear or of a cylinder with an accumulator (thesis Eq. 3.3): polytropic compression, stiffening."""
+"""Gas spring of a landing gear or of a cylinder with an accumulator (thesis Eq. 3.3): polytropic
+compression, stiffening."""
 
 from __future__ import annotations
 
@@ -12,8 +13,8 @@ from rigtwin.errors import RigtwinError
 
 
 class GasSpring(NamedTuple):
-    """A real gas spring beside the motor, between carriage and plate; the load cell is on the motor's rod and does not feel it.
-    Travel 0 is its full extension."""
+    """A real gas spring beside the motor, between carriage and plate; the load cell is on the
+    motor's rod and does not feel it. Travel 0 is its full extension."""
 
     force: Annotated[
         float,
@@ -36,8 +37,8 @@ class GasSpring(NamedTuple):
 
 
 class Charge(NamedTuple):
-    """What fills a cylinder and its accumulator. pressure: fully extended, above that on the rod's side, Pa; cylinder: volume
-    swept over the stroke, m³; gas: volume fully extended, m³."""
+    """What fills a cylinder and its accumulator. pressure: fully extended, above that on the rod's
+    side, Pa; cylinder: volume swept over the stroke, m³; gas: volume fully extended, m³."""
 
     pressure: float
     cylinder: float
@@ -46,7 +47,8 @@ class Charge(NamedTuple):
 
 @compilable
 def spring_force(spring: GasSpring, stroke: float) -> float:
-    """F = P_i A_g (L/(L − x))^γ, N, at a compression x, m (Eq. 3.3); infinite where no room is left for the gas."""
+    """F = P_i A_g (L/(L − x))^γ, N, at a compression x, m (Eq. 3.3); infinite where no room is left
+    for the gas."""
     return gas_force(spring.force, spring.length, spring.exponent, stroke)
 
 
@@ -60,27 +62,30 @@ def stiffness(spring: GasSpring, stroke: float) -> float:
 
 @compilable
 def equilibrium(spring: GasSpring, load: float) -> float:
-    """Compression under a load of N, m; 0 where the load does not exceed the force of the fully extended spring."""
+    """Compression under a load of N, m; 0 where the load does not exceed the force of the fully
+    extended spring."""
     if load <= spring.force:
         return 0.0
     return spring.length * (1.0 - (spring.force / load) ** (1.0 / spring.exponent))
 
 
-def designed(extended: float, compressed: float, stroke: float, exponent: float) -> GasSpring:
+def design(extended: float, compressed: float, stroke: float, exponent: float) -> GasSpring:
     """The spring of those forces, N, fully extended and compressed by the stroke, m."""
     _positive(
         ("force fully extended", extended, "N"), ("stroke", stroke, "m"), ("exponent", exponent, "")
     )
     if not (math.isfinite(compressed) and compressed > extended):
         raise RigtwinError(
-            f"the force compressed, {compressed:g} N, has to exceed the one fully extended, {extended:g} N"
+            f"the force compressed, {compressed:g} N, has to exceed "
+            f"the one fully extended, {extended:g} N"
         )
     ratio = (compressed / extended) ** (1.0 / exponent)
     return GasSpring(extended, stroke * ratio / (ratio - 1.0), exponent)
 
 
-def charged(spring: GasSpring, area: float, stroke: float) -> Charge:
-    """The charge that makes a cylinder of that area, m², and stroke, m, this spring: pressure F/A, gas volume A L."""
+def find_charge(spring: GasSpring, area: float, stroke: float) -> Charge:
+    """The charge that makes a cylinder of that area, m², and stroke, m, this spring: pressure F/A,
+    gas volume A L."""
     _positive(("area", area, "m²"), ("stroke", stroke, "m"))
     if stroke >= spring.length:
         raise RigtwinError(
@@ -93,5 +98,6 @@ def _positive(*given: tuple[str, float, str]) -> None:
     for name, value, unit in given:
         if not (math.isfinite(value) and value > 0.0):
             raise RigtwinError(
-                f"the {name} of a gas spring is {f'{value:g} {unit}'.strip()}; it has to be positive and finite"
+                f"the {name} of a gas spring is {f'{value:g} {unit}'.strip()}; "
+                "it has to be positive and finite"
             )

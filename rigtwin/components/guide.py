@@ -1,4 +1,5 @@
-"""Whatever slides along a guide: its friction, springs and waves; their law, and the effects of them.
+"""Whatever slides along a guide: its friction, springs and waves; their law, and the effects of
+them.
 
 Dry friction is set-valued: while nothing moves it bears any force up to the limits that
 `dry_limits` gives. `docs/theory.md` has the equations.
@@ -39,7 +40,8 @@ WAVES = 1.5
 
 
 class Rail(NamedTuple):
-    """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor too."""
+    """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor
+    too."""
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1000.0, "breakaway, thesis §6.1.3")] = 50.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e4, NONE)] = 0.0
@@ -55,7 +57,8 @@ class Guide(NamedTuple):
     """Whatever acts between the moving part and the frame: a guide's friction, a damper, a spring.
 
     force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v|
-    + stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
+    +
+    stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
     is coulomb + load_coefficient·|force transmitted| + stribeck·exp(−(v/stribeck_velocity)²), in
     positive direction ½·asymmetry more and in negative less, and acts through a play of `backlash`
     and a spring of `compliance` in series with it.
@@ -162,17 +165,17 @@ def breakaway(
 
 
 @compilable
-def stretched(apart: float, half: float) -> float:
+def stretch(apart: float, half: float) -> float:
     """How far the spring behind a play of 2·half is stretched."""
     return apart - half if apart > half else (apart + half if apart < -half else 0.0)
 
 
 @compilable
-def slid(
+def slide(
     apart: float, half: float, spring: float, forward: float, backward: float
 ) -> tuple[float, float]:
     """(dry friction, how far the slider slid) for a distance between the joint and its slider."""
-    force = spring * stretched(apart, half)
+    force = spring * stretch(apart, half)
     if force > forward:
         return forward, apart - half - forward / spring
     if force < -backward:
@@ -188,7 +191,7 @@ def damping(guide: Guide, velocity: float) -> float:
 
 
 @compilable
-def resting(guide: Guide, position: float, rest: float) -> float:
+def position_force(guide: Guide, position: float, rest: float) -> float:
     """The forces that depend on the position alone."""
     force = guide.stiffness * (position - rest) + guide.offset
     if guide.cogging != 0.0:

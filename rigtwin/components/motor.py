@@ -1,4 +1,5 @@
-"""The linear motor and its amplifier: parameters alone. What its friction does is in `guide`, its command in `signal_path`."""
+"""The linear motor and its amplifier: parameters alone. What its friction does is in `guide`, its
+command in `signal_path`."""
 
 from __future__ import annotations
 

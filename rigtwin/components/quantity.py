@@ -1,4 +1,5 @@
-"""What every component's parameters share: their meaning, and the words for a value that is not there."""
+"""What every component's parameters share: their meaning, and the words for a value that is not
+there."""
 
 from __future__ import annotations
 

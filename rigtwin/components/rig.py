@@ -1,4 +1,5 @@
-"""The plant of the hybrid suspension rig: a quarter car between two hydraulic cylinders; by default the nominal one."""
+"""The plant of the hybrid suspension rig: a quarter car between two hydraulic cylinders; by default
+the nominal one."""
 
 from __future__ import annotations
 

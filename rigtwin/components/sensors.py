@@ -1,4 +1,5 @@
-"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and quantisation apart."""
+"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and
+quantisation apart."""
 
 from __future__ import annotations
 
@@ -104,7 +105,8 @@ def measures(component: object) -> str:
 
 
 class Transducer(NamedTuple):
-    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the lag goes in a tick."""
+    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the
+    lag goes in a tick."""
 
     neutral: bool
     gain: float
@@ -114,7 +116,8 @@ class Transducer(NamedTuple):
 
 
 class TransducerState(NamedTuple):
-    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the lag's output."""
+    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the
+    lag's output."""
 
     history: Array
     memory: Array
@@ -126,13 +129,13 @@ def transducer(sensor: Sensor, period: float) -> Transducer:
     return Transducer(neutral, sensor.gain, sensor.offset, sensor.delay / period, share)
 
 
-def fresh(sensor: Transducer) -> TransducerState:
+def start_transducer(sensor: Transducer) -> TransducerState:
     """Before the first sample."""
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0]))
 
 
 @compilable
-def transduced(sensor: Transducer, state: TransducerState, value: float) -> float:
+def transduce(sensor: Transducer, state: TransducerState, value: float) -> float:
     """The sensor's output at this tick. Before the first tick the quantity was what it is then."""
     if sensor.neutral:
         return value
@@ -145,22 +148,23 @@ def transduced(sensor: Transducer, state: TransducerState, value: float) -> floa
 
 
 @kernel
-def _seen(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
+def _transduce_all(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
     for tick in range(len(true)):
-        out[tick] = transduced(sensor, state, true[tick])
+        out[tick] = transduce(sensor, state, true[tick])
 
 
-def seen(sensor: Sensor, true: Array, period: float) -> Array:
+def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
     """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
     model, out = transducer(sensor, period), np.empty(len(true))
     if model.neutral:
         return true.copy()
-    _seen(model, fresh(model), np.ascontiguousarray(true), out)
+    _transduce_all(model, start_transducer(model), np.ascontiguousarray(true), out)
     return out
 
 
-def unseen(sensor: Sensor, signal: Array, period: float) -> Array:
-    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay undone, not its offset.
+def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
+    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay
+    undone, not its offset.
 
     The lag's inverse is limited to 80 Hz, or it would make much of the noise.
     """

@@ -16,7 +16,8 @@ SCALE = 0.01
 
 
 class Tyre(NamedTuple):
-    """Tyre: a compliant contact that only pushes, stiffness·δ·(1 + hardening·δ·(δ/10 mm)^(power − 1)) + damping·dδ/dt."""
+    """Tyre: a compliant contact that only pushes, stiffness·δ·(1 + hardening·δ·(δ/10 mm)^(power −
+    1)) + damping·dδ/dt."""
 
     stiffness: Annotated[
         float, Quantity("N/m", 1e3, 1e7, "best match of the tests, thesis §6.3")

@@ -19,17 +19,19 @@ def shipped() -> dict[str, Path]:
 
 
 @cache
-def _loaded(path: Path) -> Machine:
+def _load_once(path: Path) -> Machine:
     return load(path)
 
 
 def find(name: str) -> Machine:
-    """A machine by its name, or by the path of its description. Raises RigtwinError with what there is."""
+    """A machine by its name, or by the path of its description. Raises RigtwinError with what there
+    is."""
     if name in shipped():
-        return _loaded(shipped()[name])
+        return _load_once(shipped()[name])
     path = Path(name)
     if path.suffix == ".toml" or path.exists():
         return load(path)
     raise RigtwinError(
-        f"unknown machine {name!r}; there are {', '.join(shipped())}, or give the path of a description, F.toml"
+        f"unknown machine {name!r}; there are {', '.join(shipped())}, "
+        "or give the path of a description, F.toml"
     )

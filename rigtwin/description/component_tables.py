@@ -53,8 +53,9 @@ QUARTER_CAR = {
 
 
 class Components:
-    """Components as they are read. found, types, values: name → component, type, NamedTuple of its values; sources, told: of
-    `component.parameter`, a text, and the controller's setting that says it in recordings."""
+    """Components as they are read. found, types, values: name → component, type, NamedTuple of its
+    values; sources, told: of `component.parameter`, a text, and the controller's setting that says
+    it in recordings."""
 
     def __init__(self, mechanism: Mechanism, mistakes: Mistakes) -> None:
         self._mechanism, self.mistakes = mechanism, mistakes
@@ -89,7 +90,8 @@ class Components:
         if len(elements) != 1:
             self.mistakes.note(
                 where,
-                f"expected one of {', '.join(ELEMENTS)} to say what of the MJCF it is, found {len(elements)}",
+                f"expected one of {', '.join(ELEMENTS)} to say what "
+                f"of the MJCF it is, found {len(elements)}",
             )
             return
         element, mjcf = elements[0], str(table[elements[0]])
@@ -103,7 +105,9 @@ class Components:
             return
         joint = mechanism.joint_of(element, mjcf)
         self.types[name] = kind
-        self.values[name] = self._filled(name, where, kind, table, element, mjcf, joint)
+        self.values[name] = self._fill(
+            name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
+        )
         turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
@@ -116,7 +120,8 @@ class Components:
             if table.get("unit", unit) != unit:
                 self.mistakes.note(
                     where,
-                    f"unit {table['unit']!r}: recordings are in SI, here {unit!r}; rigtwin import converts",
+                    f"unit {table['unit']!r}: recordings are in SI, "
+                    f"here {unit!r}; rigtwin import converts",
                 )
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
@@ -126,10 +131,17 @@ class Components:
             if key in table and not fits:
                 self.mistakes.note(
                     where,
-                    f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; this is a {kind}",
+                    f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; "
+                    f"this is a {kind}",
                 )
         self.found[name] = Component(
-            name, element, mjcf, joint, channel, unit, self._kinds(where, kind, table)
+            name=name,
+            element=element,
+            mjcf=mjcf,
+            joint=joint,
+            channel=channel,
+            unit=unit,
+            kinds=self._kinds(where, kind, table),
         )
 
     def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:
@@ -169,7 +181,7 @@ class Components:
                 )
         return frozenset(wanted)
 
-    def _filled(
+    def _fill(
         self,
         name: str,
         where: str,
@@ -242,7 +254,8 @@ class Components:
             else:
                 self.mistakes.note(
                     here,
-                    f'tolerance {width!r}: expected a number in {meaning.unit} or a percentage such as "1 %"',
+                    f"tolerance {width!r}: expected a number in "
+                    f'{meaning.unit} or a percentage such as "1 %"',
                 )
         return component
 

@@ -1,8 +1,10 @@
-"""The settings of a test, by name: the plant's components, the controller, safety limits, road, simulation.
+"""The settings of a test, by name: the plant's components, the controller, safety limits, road,
+simulation.
 
 One type for every machine. What a machine does not have (a road, say) is a group without settings.
 
-`overridden` is the one way in from outside: TOML files, `--set`, recordings. Every key and value is checked.
+`override` is the one way in from outside: TOML files, `--set`, recordings. Every key and value is
+checked.
 """
 
 from __future__ import annotations
@@ -25,13 +27,15 @@ Applied = TypeVar("Applied")
 P = TypeVar("P", bound=Plant)
 C = TypeVar("C", bound=tuple)
 POSTERIOR = "posterior"
-"""The table of a calibrated twin's file beside its values; rigtwin.description.posterior reads it."""
+"""The table of a calibrated twin's file beside its values; rigtwin.description.posterior reads
+it."""
 MOST_TICKS = 100_000_000
 """More than a day at 1 kHz."""
 
 
 class Safety(NamedTuple):
-    """Limits that end a test, on raw measurements and on commands; how a session starts and stops."""
+    """Limits that end a test, on raw measurements and on commands; how a session starts and
+    stops."""
 
     structure: Annotated[float, Quantity("m", 1e-3, 10.0, "trip of the lab: |structure_lvdt|")] = (
         0.15
@@ -134,7 +138,8 @@ class Configuration(NamedTuple, Generic[P, C]):
 
     @property
     def substeps(self) -> int:
-        """Integration steps a tick. Raises RigtwinError unless the period is a whole multiple of the timestep."""
+        """Integration steps a tick. Raises RigtwinError unless the period is a whole multiple of
+        the timestep."""
         ratio = self.timing.period / self.timing.timestep
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6:
             raise RigtwinError(
@@ -155,7 +160,8 @@ class Configuration(NamedTuple, Generic[P, C]):
 
 
 def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
-    """Numbers by name as a group of settings: a NamedTuple whose fields say that any number is allowed."""
+    """Numbers by name as a group of settings: a NamedTuple whose fields say that any number is
+    allowed."""
     made = namedtuple("Settings", list(values), defaults=list(values.values()))  # type: ignore[misc]
     made.__annotations__ = {
         name: Annotated[float, Quantity("1", -1e300, 1e300, source)] for name in values
@@ -164,7 +170,8 @@ def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
 
 
 def groups(configuration: Configuration) -> dict[str, Any]:
-    """Group name → its NamedTuple: the plant's components side by side with the rest; none that is empty."""
+    """Group name → its NamedTuple: the plant's components side by side with the rest; none that is
+    empty."""
     rest = {
         name: value
         for name, value in configuration._asdict().items()
@@ -173,7 +180,7 @@ def groups(configuration: Configuration) -> dict[str, Any]:
     return {**configuration.plant._asdict(), **rest}
 
 
-def flattened(configuration: Configuration) -> dict[str, dict[str, float | str]]:
+def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
     """Group → name → number or label, as TOML and recordings hold it."""
     return {
         name: {
@@ -191,7 +198,7 @@ def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantit
             yield f"{name}.{key}", getattr(group, key), meaning
 
 
-def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
+def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
     """The value, if it is allowed. Raises RigtwinError naming the key and what is allowed."""
     if not isinstance(meaning, Quantity):
         try:
@@ -209,15 +216,17 @@ def checked(key: str, value: object, meaning: Quantity | type[Choice]) -> float 
     if not (meaning.low <= number <= meaning.high):
         unit = "" if meaning.unit == "1" else f" {meaning.unit}"
         raise RigtwinError(
-            f"{key} = {str(value)[:40]}: expected a number from {meaning.low:g} to {meaning.high:g}{unit}"
+            f"{key} = {str(value)[:40]}: expected a number from "
+            f"{meaning.low:g} to {meaning.high:g}{unit}"
         )
     return number
 
 
-def overridden(
+def override(
     configuration: Configuration, changes: Mapping[str, Mapping[str, object]]
 ) -> Configuration:
-    """The configuration with `changes` (group → name → value) applied. Raises RigtwinError for any key or value not allowed."""
+    """The configuration with `changes` (group → name → value) applied. Raises RigtwinError for any
+    key or value not allowed."""
     plant, rest = configuration.plant, configuration
     known = groups(configuration)
     for group_name, values in changes.items():
@@ -236,7 +245,9 @@ def overridden(
                 raise RigtwinError(
                     f"unknown setting {group_name}.{key}; {group_name} has {', '.join(meanings)}"
                 )
-            group = group._replace(**{key: checked(f"{group_name}.{key}", value, meanings[key])})
+            group = group._replace(
+                **{key: check_value(f"{group_name}.{key}", value, meanings[key])}
+            )
         if group_name in plant._fields:
             plant = plant._replace(**{group_name: group})
         else:
@@ -256,8 +267,9 @@ def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Appl
         raise RigtwinError(f"{path}: {error}") from None
 
 
-def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
-    """group → name → value of each `group.name=value` text, as `--set` takes them. Raises RigtwinError for any other."""
+def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
+    """group → name → value of each `group.name=value` text, as `--set` takes them. Raises
+    RigtwinError for any other."""
     for text in assignments:
         key, equals, value = text.partition("=")
         group, dot, name = key.strip().partition(".")
@@ -267,19 +279,21 @@ def assigned(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
 
 
 def from_toml(configuration: Configuration, path: Path) -> Configuration:
-    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and fault."""
-    return read_toml(path, lambda tables: overridden(configuration, values_of(tables)))
+    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and
+    fault."""
+    return read_toml(path, lambda tables: override(configuration, values_of(tables)))
 
 
 def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """A configuration file's tables without that of a calibrated twin which says how sure its values are."""
+    """A configuration file's tables without that of a calibrated twin which says how sure its
+    values are."""
     return {name: table for name, table in tables.items() if name != POSTERIOR}
 
 
 def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
     """The configuration with `group.name=value` texts applied."""
-    for changes in assigned(assignments):
-        configuration = overridden(configuration, changes)
+    for changes in parse_assignments(assignments):
+        configuration = override(configuration, changes)
     return configuration
 
 
@@ -290,50 +304,53 @@ Changes = Mapping[str, Mapping[str, object]] | str | Path
 def with_changes(
     configuration: Configuration, changes: Changes | Sequence[Changes]
 ) -> Configuration:
-    """The configuration with changes, or with several, one over the other. Raises RigtwinError for any that is not allowed."""
+    """The configuration with changes, or with several, one over the other. Raises RigtwinError for
+    any that is not allowed."""
     if isinstance(changes, str | Path):
         return from_toml(configuration, Path(changes))
     if isinstance(changes, Mapping):
-        return overridden(configuration, changes)
+        return override(configuration, changes)
     for each in changes:
         configuration = with_changes(configuration, each)
     return configuration
 
 
-def at_effect(
+def with_effect(
     configuration: Configuration, effect: Effect, values: Mapping[str, float]
 ) -> Configuration:
     """The configuration with an effect. Raises RigtwinError for a value out of bounds."""
-    return overridden(configuration, {effect.group: values})
+    return override(configuration, {effect.group: values})
 
 
-def without(configuration: Configuration, name: str) -> Configuration:
-    """The configuration with an effect of the nominal machine taken out, such as `coulomb@rail`: its magnitude set to 0.
+def without_effect(configuration: Configuration, name: str) -> Configuration:
+    """The configuration with an effect of the nominal machine taken out, such as `coulomb@rail`:
+    its magnitude set to 0.
 
     Raises RigtwinError if the machine has none of it to take out.
     """
     effect = find(name, configuration.plant)
-    if not _removable(effect, configuration.plant):
+    if not _is_removable(effect, configuration.plant):
         there = [
             each.name
             for each in candidates(configuration.plant)
-            if _removable(each, configuration.plant)
+            if _is_removable(each, configuration.plant)
         ]
         raise RigtwinError(
             f"--without {name}: the twin has none to take out; it has {', '.join(there) or 'none'}"
         )
-    return at_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
+    return with_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
 
 
-def _removable(effect: Effect, plant: Plant) -> bool:
+def _is_removable(effect: Effect, plant: Plant) -> bool:
     parameter, quantity = next(iter(effect.quantities().items()))
     there = effect.nominal(plant)[parameter]
     return effect.searched and there not in (0.0, quantity.high) and quantity.low <= 0.0
 
 
-def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration:
-    """The configuration with effects as `--effect` takes them: `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or
-    `setting@controller=kp:0.5` for a setting that is not what the recording will say.
+def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configuration:
+    """The configuration with effects as `--effect` takes them: `coulomb@rail=80`,
+    `stribeck@rail=20,stribeck_velocity=0.02`, or `setting@controller=kp:0.5` for a setting that is
+    not what the recording will say.
 
     Raises RigtwinError naming the effect and what is allowed.
     """
@@ -345,7 +362,7 @@ def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration
             )
         if name == "setting@controller":
             key, _, value = values.partition(":")
-            configuration = overridden(configuration, {"controller": {key: value}})
+            configuration = override(configuration, {"controller": {key: value}})
             continue
         effect = find(name, configuration.plant)
         first, *more = values.split(",")
@@ -354,15 +371,17 @@ def applied(configuration: Configuration, texts: Sequence[str]) -> Configuration
             key, _, value = item.partition("=")
             if key not in effect.kind.parameters:
                 raise RigtwinError(
-                    f"--effect {text}: {effect.name} has {', '.join(effect.kind.parameters)}, not {key!r}"
+                    f"--effect {text}: {effect.name} has "
+                    f"{', '.join(effect.kind.parameters)}, not {key!r}"
                 )
             changes[key] = value
-        configuration = overridden(configuration, {effect.group: changes})
+        configuration = override(configuration, {effect.group: changes})
     return configuration
 
 
-def rebased(configuration: Configuration, base: Configuration) -> Configuration:
-    """What a configuration changes of the nominal suspension rig, on top of another base of the same settings."""
+def rebase(configuration: Configuration, base: Configuration) -> Configuration:
+    """What a configuration changes of the nominal suspension rig, on top of another base of the
+    same settings."""
     changes: dict[str, dict[str, object]] = {}
     for (key, value, _), (_, nominal, _) in zip(
         parameters(configuration), parameters(Configuration()), strict=True
@@ -372,4 +391,4 @@ def rebased(configuration: Configuration, base: Configuration) -> Configuration:
             changes.setdefault(group, {})[name] = (
                 value.label if isinstance(value, Choice) else value
             )
-    return overridden(base, changes)
+    return override(base, changes)

@@ -1,4 +1,5 @@
-"""The controller of a machine: a formula of its description, or the Python controller of the suspension rig.
+"""The controller of a machine: a formula of its description, or the Python controller of the
+suspension rig.
 
 A diagnosis replays it: recorded inputs in, commands out, to be compared with those recorded.
 """
@@ -55,7 +56,8 @@ class Control(Protocol):
 
     @property
     def exact(self) -> float | None:
-        """rms in the command's unit within which its replay counts as exact; None for the recording's rounding."""
+        """rms in the command's unit within which its replay counts as exact; None for the
+        recording's rounding."""
         ...
 
     def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
@@ -120,7 +122,8 @@ def _replay(
 
 @dataclass(frozen=True)
 class RigControl:
-    """The controller of the suspension rig, `controllers.update`. What was demanded of it stands among its commands."""
+    """The controller of the suspension rig, `controllers.update`. What was demanded of it stands
+    among its commands."""
 
     exact: float | None = None
 

@@ -1,4 +1,5 @@
-"""Reads a machine's description, one TOML beside an MJCF, and explains every mistake in it in one line."""
+"""Reads a machine's description, one TOML beside an MJCF, and explains every mistake in it in one
+line."""
 
 from __future__ import annotations
 
@@ -27,7 +28,7 @@ NOMINAL = ("known", "rough")
 
 def load(path: Path) -> Machine:
     """The machine of a description. Raises RigtwinError with the first mistake in it."""
-    machine, mistakes = examined(path)
+    machine, mistakes = examine(path)
     if mistakes or machine is None:
         more = (
             f" (and {len(mistakes) - 1} more; rigtwin machine check {path})"
@@ -38,8 +39,9 @@ def load(path: Path) -> Machine:
     return machine
 
 
-def examined(path: Path) -> tuple[Machine | None, list[str]]:
-    """The machine of a description, and all mistakes in it, one line each; no machine if there are any."""
+def examine(path: Path) -> tuple[Machine | None, list[str]]:
+    """The machine of a description, and all mistakes in it, one line each; no machine if there are
+    any."""
     mistakes = Mistakes()
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
@@ -92,7 +94,7 @@ class _Reader:
             components.add(each, table)
         control = self._control(components)
         reader = Replays(mechanism, components, control, self._mistakes)
-        replays = reader.all(self._document.get("replays", []))
+        replays = reader.read(self._document.get("replays", []))
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
         experiments = self._experiments()

@@ -1,4 +1,5 @@
-"""A machine as its description gives it: components with nominal values and tolerances, and how recordings replay them."""
+"""A machine as its description gives it: components with nominal values and tolerances, and how
+recordings replay them."""
 
 from __future__ import annotations
 
@@ -11,14 +12,15 @@ from typing import Any
 
 from rigtwin.components import Effect, candidates
 from rigtwin.components.quantity import Quantity
-from rigtwin.description.configuration import Configuration, Nothing, overridden
+from rigtwin.description.configuration import Configuration, Nothing, override
 from rigtwin.description.control import Control
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
-"""Kind of signal → share of it that no model is held to, where a description does not say: of forces less is known."""
+"""Kind of signal → share of it that no model is held to, where a description does not say: of
+forces less is known."""
 OWN = "own"
 """Of a recording's controller settings: that it was none that the machine describes."""
 TURNING = {
@@ -43,8 +45,9 @@ class Structure(Enum):
 
 @dataclass(frozen=True)
 class Component:
-    """One component. element: what of the MJCF it is, with that name; joint: the joint that it belongs to; channel: where
-    recordings hold its signal, topic and field; unit: of that signal; kinds: of effects that it may have, None for all."""
+    """One component. element: what of the MJCF it is, with that name; joint: the joint that it
+    belongs to; channel: where recordings hold its signal, topic and field; unit: of that signal;
+    kinds: of effects that it may have, None for all."""
 
     name: str
     element: str
@@ -57,7 +60,8 @@ class Component:
 
 @dataclass(frozen=True)
 class Row:
-    """One observed signal. kind: position, velocity, force or command; name: its component's, or the command's."""
+    """One observed signal. kind: position, velocity, force or command; name: its component's, or
+    the command's."""
 
     name: str
     kind: str
@@ -67,8 +71,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Joint:
-    """What the MJCF says of a replay's joint. inertia: kg, or kg m² if it turns; gravity: load N or Nm at each of `positions`;
-    rest: where its spring is slack; low, high: its range."""
+    """What the MJCF says of a replay's joint. inertia: kg, or kg m² if it turns; gravity: load N or
+    Nm at each of `positions`; rest: where its spring is slack; low, high: its range."""
 
     name: str
     turns: bool
@@ -80,9 +84,9 @@ class Joint:
 
 @dataclass(frozen=True)
 class ReplayOf:
-    """How a joint is replayed. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
-    position actuator its motion through that actuator, a force actuator pushes it. closed: whether the controller commands
-    that actuator, or the recording does."""
+    """How a joint is replayed. moved_by: the components whose signals move it: a position sensor
+    prescribes its motion, a position actuator its motion through that actuator, a force actuator
+    pushes it. closed: whether the controller commands that actuator, or the recording does."""
 
     name: str
     joint: Joint
@@ -97,9 +101,10 @@ class ReplayOf:
 class Machine:
     """The whole description.
 
-    plant: a NamedTuple of components with their nominal values; structure: what they make up; rough: whether nominal values are
-    only a start; form: share of a signal that no model is held to, None for the usual one; told: `component.parameter` → setting
-    of the recording's controller that says its value; experiments: Python module that has them, or tables of the description; next_tests: those that a diagnosis may propose.
+    plant: a NamedTuple of components with their nominal values; structure: what they make up;
+    rough: whether nominal values are only a start; form: share of a signal that no model is held
+    to, None for the usual one; told: `component.parameter` → setting of the recording's controller
+    that says its value; experiments: Python module that has them, or tables of the description; next_tests: those that a diagnosis may propose.
     """
 
     name: str
@@ -131,7 +136,8 @@ class Machine:
     def configuration_of(
         self, recording: Recording, base: Configuration | None = None
     ) -> Configuration:
-        """The settings of the twin of a recording: what the operator wrote down over `base`, by default the description's.
+        """The settings of the twin of a recording: what the operator wrote down over `base`, by
+        default the description's.
 
         Raises RigtwinError for settings that the machine does not have.
         """
@@ -151,7 +157,7 @@ class Machine:
             if setting in given and getattr(start.plant, group) == getattr(self.plant, group):
                 changes.setdefault(group, {})[name] = given[setting]
         try:
-            return overridden(start, changes)
+            return override(start, changes)
         except RigtwinError as error:
             raise RigtwinError(f"{recording.path}: {error}") from None
 
@@ -172,8 +178,8 @@ class Machine:
         return self.form if self.form is not None else FORM[row.kind]
 
     def effects(self) -> Iterator[Effect]:
-        """All effects that this machine can have. A computer's delay is only told from an actuator's where there are
-        several."""
+        """All effects that this machine can have. A computer's delay is only told from an
+        actuator's where there are several."""
         movers = {mover for replay in self.replays for mover in replay.moved_by}
         for effect in candidates(self.plant):
             if effect.group == "computer" and len(movers) < 2:

@@ -131,7 +131,8 @@ class Mechanism:
         }
 
     def joint(self, name: str) -> Joint:
-        """What moves with a joint, all others at rest. Raises RigtwinError if it neither slides nor turns about one axis."""
+        """What moves with a joint, all others at rest. Raises RigtwinError if it neither slides nor
+        turns about one axis."""
         model, number = self.model, self.number("joint", name)
         kind = int(model.jnt_type[number])
         if kind not in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE):

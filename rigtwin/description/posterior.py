@@ -1,6 +1,8 @@
-"""What is known of a rig after a diagnosis: the corrected twin, how sure each of its values is, and what else it could be.
+"""What is known of a rig after a diagnosis: the corrected twin, how sure each of its values is, and
+what else it could be.
 
-A calibrated twin's TOML has this as its table `posterior`, beside the values that `run` and `compare` take.
+A calibrated twin's TOML has this as its table `posterior`, beside the values that `run` and
+`compare` take.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from rigtwin.description.configuration import (
     POSTERIOR,
     Configuration,
     groups,
-    overridden,
+    override,
     read_toml,
     values_of,
 )
@@ -33,7 +35,8 @@ Changes = Mapping[str, Mapping[str, object]]
 
 @dataclass(frozen=True)
 class Otherwise:
-    """Another explanation of the same recording: its name, its probability, and its twin's values."""
+    """Another explanation of the same recording: its name, its probability, and its twin's
+    values."""
 
     effect: str
     probability: float
@@ -42,8 +45,9 @@ class Otherwise:
 
 @dataclass(frozen=True)
 class Posterior:
-    """changes: the corrected twin's values; intervals: `component.parameter` → 95 % interval of those that were found;
-    probability: of this explanation; otherwise: the others, the likeliest first."""
+    """changes: the corrected twin's values; intervals: `component.parameter` → 95 % interval of
+    those that were found; probability: of this explanation; otherwise: the others, the likeliest
+    first."""
 
     changes: Changes
     intervals: Mapping[str, tuple[float, float]]
@@ -52,15 +56,15 @@ class Posterior:
 
     def at_best(self, configuration: Configuration) -> Configuration:
         """The corrected twin."""
-        return overridden(configuration, self.changes)
+        return override(configuration, self.changes)
 
-    def drawn(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
-        """A twin as it may be: each value found normal about what was found, either side as wide as its interval, cut off at
-        its bounds."""
+    def draw(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
+        """A twin as it may be: each value found normal about what was found, either side as wide as
+        its interval, cut off at its bounds."""
         configuration = self.at_best(configuration)
         for key, (low, high) in self.intervals.items():
             there, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
-            configuration = shifted_within(
+            configuration = shift_within(
                 configuration, key, amount * (high - there if amount > 0.0 else there - low)
             )
         return configuration
@@ -72,17 +76,19 @@ def value_of(configuration: Configuration, key: str) -> float:
     return float(getattr(groups(configuration)[group], name))
 
 
-def shifted_within(configuration: Configuration, key: str, amount: float) -> Configuration:
-    """The configuration with a number `group.name` higher by an amount, or at the bound next to that."""
+def shift_within(configuration: Configuration, key: str, amount: float) -> Configuration:
+    """The configuration with a number `group.name` higher by an amount, or at the bound next to
+    that."""
     group, _, name = key.partition(".")
     meaning = fields(type(groups(configuration)[group]))[name]
     assert isinstance(meaning, Quantity)
     value = value_of(configuration, key) + amount
-    return overridden(configuration, {group: {name: min(max(value, meaning.low), meaning.high)}})
+    return override(configuration, {group: {name: min(max(value, meaning.low), meaning.high)}})
 
 
-def written(posterior: Posterior) -> list[str]:
-    """The table's lines in TOML. Full precision, so that a twin read again is the same to the bit."""
+def format_toml(posterior: Posterior) -> list[str]:
+    """The table's lines in TOML. Full precision, so that a twin read again is the same to the
+    bit."""
     lines = [
         f"[{POSTERIOR}]",
         f"probability = {posterior.probability!r}",
@@ -106,14 +112,15 @@ def written(posterior: Posterior) -> list[str]:
 
 
 def load_posterior(path: Path) -> Posterior:
-    """A calibrated twin of the suspension rig. Without a table `posterior` its values are taken as certain.
+    """A calibrated twin of the suspension rig. Without a table `posterior` its values are taken as
+    certain.
 
     Raises RigtwinError naming file and fault.
     """
-    return read_toml(path, _parsed)
+    return read_toml(path, _parse)
 
 
-def _parsed(tables: Mapping[str, Any]) -> Posterior:
+def _parse(tables: Mapping[str, Any]) -> Posterior:
     changes = values_of(tables)
     configuration = _of_rig("it", changes)
     table = tables.get(POSTERIOR, {})
@@ -129,7 +136,8 @@ def _parsed(tables: Mapping[str, Any]) -> Posterior:
     intervals, others = table.get("intervals", {}), table.get("otherwise", [])
     if not isinstance(intervals, Mapping):
         raise RigtwinError(
-            f"{POSTERIOR}.intervals = {intervals!r}: expected a table of component.parameter = [low, high]"
+            f"{POSTERIOR}.intervals = {intervals!r}: expected a "
+            "table of component.parameter = [low, high]"
         )
     if not isinstance(others, list) or not all(isinstance(other, Mapping) for other in others):
         raise RigtwinError(f"{POSTERIOR}.otherwise: expected tables, [[{POSTERIOR}.otherwise]]")
@@ -143,11 +151,12 @@ def _parsed(tables: Mapping[str, Any]) -> Posterior:
 
 def _of_rig(where: str, changes: Changes) -> Configuration:
     """The nominal rig with changes, which must be of its components alone."""
-    configuration = overridden(Configuration(), changes)
+    configuration = override(Configuration(), changes)
     for group in changes:
         if group not in configuration.plant._fields:
             raise RigtwinError(
-                f"{where} changes {group}; a rig is described by {', '.join(configuration.plant._fields)} alone"
+                f"{where} changes {group}; a rig is described by "
+                f"{', '.join(configuration.plant._fields)} alone"
             )
     return configuration
 
@@ -167,7 +176,8 @@ def _interval(configuration: Configuration, key: str, ends: object) -> tuple[flo
     )
     if not isinstance(known.get(name), Quantity):
         raise RigtwinError(
-            f"{POSTERIOR}.intervals: unknown parameter {key!r}; expected component.parameter of the rig"
+            f"{POSTERIOR}.intervals: unknown parameter {key!r}; "
+            "expected component.parameter of the rig"
         )
     try:
         low, high = (float(end) for end in ends if not isinstance(end, bool | str))  # type: ignore[union-attr]
@@ -178,7 +188,8 @@ def _interval(configuration: Configuration, key: str, ends: object) -> tuple[flo
     ):
         there = value_of(configuration, key)
         raise RigtwinError(
-            f"{POSTERIOR}.intervals: {key} = {ends!r}; expected [low, high] about its value, {there:g}"
+            f"{POSTERIOR}.intervals: {key} = {ends!r}; expected "
+            f"[low, high] about its value, {there:g}"
         )
     return low, high
 
@@ -187,7 +198,8 @@ def _otherwise(table: Mapping[str, Any]) -> Otherwise:
     changes = table.get("changes", {})
     if not isinstance(table.get("effect"), str) or not isinstance(changes, Mapping):
         raise RigtwinError(
-            f"{POSTERIOR}.otherwise: expected effect, probability and changes, found {', '.join(table) or 'nothing'}"
+            f"{POSTERIOR}.otherwise: expected effect, probability and "
+            f"changes, found {', '.join(table) or 'nothing'}"
         )
     effect = str(table["effect"])
     if not effect.isprintable():

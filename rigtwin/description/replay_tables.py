@@ -34,7 +34,7 @@ class Replays:
             mistakes,
         )
 
-    def all(self, given: object) -> tuple[ReplayOf, ...]:
+    def read(self, given: object) -> tuple[ReplayOf, ...]:
         if (
             not isinstance(given, list)
             or not given
@@ -42,7 +42,8 @@ class Replays:
         ):
             self._mistakes.note(
                 "",
-                "it has no [[replays]]; expected one that says what moves the joint and what is observed",
+                "it has no [[replays]]; expected one that says what "
+                "moves the joint and what is observed",
             )
             return ()
         found = []
@@ -77,11 +78,12 @@ class Replays:
             if mover not in known:
                 self._mistakes.note(
                     where,
-                    f"moved_by {mover!r} is no actuator or sensor of the motion; {near(mover, known)}",
+                    f"moved_by {mover!r} is no actuator or sensor "
+                    f"of the motion; {near(mover, known)}",
                 )
         rows = [
             row
-            for name in self._observed(where, table)
+            for name in self._read_observed(where, table)
             if (row := self._row(where, name, movers)) is not None
         ]
         if len(self._mistakes) > before:
@@ -91,7 +93,8 @@ class Replays:
         if len(movers) > 1 and not quarter_car:
             self._mistakes.note(
                 where,
-                f"moved by {len(movers)} components; expected one, and another replay for each other joint",
+                f"moved by {len(movers)} components; expected one, "
+                "and another replay for each other joint",
             )
             return None
         if not joint_name and not quarter_car:
@@ -128,27 +131,30 @@ class Replays:
                 if other is not None and other.joint != joint_name:
                     self._mistakes.note(
                         where,
-                        f"{row.name} is of joint {other.joint or 'none'}, {movers[0]} moves {joint_name}",
+                        f"{row.name} is of joint {other.joint or 'none'}, "
+                        f"{movers[0]} moves {joint_name}",
                     )
         closed = self._closes(movers[0])
         if self._components.types[movers[0]] == "force actuator" and not at["mass"]:
             self._mistakes.note(
                 where,
-                f"{movers[0]} pushes joint {joint_name}, whose mass is no component; add one of type mass",
+                f"{movers[0]} pushes joint {joint_name}, whose mass "
+                "is no component; add one of type mass",
             )
         if self._components.types[movers[0]] == "force actuator" and not at["guide"]:
             self._mistakes.note(
                 where,
-                f"{movers[0]} pushes joint {joint_name}, which is no component; add one of type guide",
+                f"{movers[0]} pushes joint {joint_name}, which "
+                "is no component; add one of type guide",
             )
         return ReplayOf(
-            str(table.get("name", f"replay {number}")),
-            joint,
-            tuple(movers),
-            tuple(rows),
-            at["guide"][0] if at["guide"] else None,
-            at["mass"][0] if at["mass"] else None,
-            closed,
+            name=str(table.get("name", f"replay {number}")),
+            joint=joint,
+            moved_by=tuple(movers),
+            rows=tuple(rows),
+            guide=at["guide"][0] if at["guide"] else None,
+            mass=at["mass"][0] if at["mass"] else None,
+            closed=closed,
         )
 
     def _closes(self, mover: str) -> bool:
@@ -156,7 +162,7 @@ class Replays:
         control, channel = self._control, self._components.found[mover].channel
         return isinstance(control, FormulaControl) and channel == ("/command", control.output)
 
-    def _observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
+    def _read_observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
         observed = table.get("observe", [])
         if (
             not isinstance(observed, list)
@@ -197,8 +203,8 @@ class Replays:
         return None
 
     def tolerate_timing(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since the period is the
-        recording's."""
+        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since
+        the period is the recording's."""
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
             names = [

@@ -1,4 +1,5 @@
-"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a diagnosis, never a finding."""
+"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a
+diagnosis, never a finding."""
 
 from __future__ import annotations
 
@@ -11,8 +12,8 @@ MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's unit, or as a share of its
-    value if relative, or in ticks."""
+    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's
+    unit, or as a share of its value if relative, or in ticks."""
 
     group: str
     parameter: str
@@ -30,7 +31,7 @@ class Tolerance:
             else 1.0
         )
 
-    def shifted(self, plant: Any, amount: float) -> Any:
+    def shift(self, plant: Any, amount: float) -> Any:
         """The plant with this parameter higher by that much, in its unit."""
         group = getattr(plant, self.group)
         value = float(getattr(group, self.parameter)) + amount

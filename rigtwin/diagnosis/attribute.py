@@ -1,37 +1,30 @@
-"""Which effects explain the evidence: every candidate fitted, pairs where one is not enough, and how sure that is.
-
-The thresholds were set on cases of the withheld-effect check with seeds other than those reported (docs/diagnosis.md).
-"""
+"""Which effects explain the evidence: every candidate fitted, pairs where one is not enough, and
+how sure that is."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Hope, with_values, without_each
-from rigtwin.diagnosis.stepwise import NEAR, SECOND, Growth, grown, plain, priced, within_tolerance
+from rigtwin.diagnosis.fit import Fit, Fitter, Proposal, with_values, without_each
+from rigtwin.diagnosis.stepwise import (
+    Growth,
+    drop_needless,
+    fit_stepwise,
+    penalised_cost,
+    within_tolerance,
+)
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 THREADS = 2
 """That fit at a time: the compiled plants leave the interpreter free."""
-DETECTED = 60.0
-"""χ² that an effect must explain to be a finding,"""
-NOTICEABLE = 0.015
-"""and share of what noise alone leaves: less is a trace that no closed loop shows."""
-UNEXPLAINED = 0.10
-"""χ² per degree of freedom above 1 from which what is left counts as a gap."""
-MUCH = 0.03
-"""Share of what noise leaves from which what one effect leaves is worth a search among many pairs."""
-TEMPER = 4.0
-"""χ² by which explanations must differ for the better one to be e^½ times as likely."""
-FORM_TEMPER = 0.05
-"""How much of what is left widens that."""
 REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them."""
 BEAM = 3
@@ -42,28 +35,6 @@ LOOKED_AGAIN = 2
 """Times that the best pair's effects are replaced by what resembles them."""
 SETTLED_PAIRS = 4
 """Pairs that are fitted again with the tolerances taken at them."""
-FAR_BEHIND = 0.7
-"""Share of what the best effect explains that a first of two may lack."""
-MEMBER = 0.05
-"""Probability from which an effect belongs to the class that is reported."""
-
-
-@dataclass(frozen=True)
-class Rules:
-    """When effects are named. most: at once; more: share of what is left that each further one must explain; enough: share
-    of the gap that they must explain to be named at all if something is left; too_much: χ² per degree of freedom above 1 from
-    which what is left forbids to name anything."""
-
-    most: int
-    more: float
-    enough: float
-    too_much: float
-
-
-KNOWN = Rules(2, 0.5, 0.97, 0.4)
-"""For a machine whose nominal values are well known: what is left means that something else is there."""
-ROUGH = Rules(6, 0.08, 0.75, math.inf)
-"""For one whose nominal values are only a start: something is always left; half the gap, in amplitude, must be explained."""
 
 
 @dataclass(frozen=True)
@@ -81,10 +52,11 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Attribution:
-    """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be named, None for none;
-    ranking: all tried, the likeliest first; explained: share of the gap; left: χ² per degree of freedom above 1 after it;
-    unknown: whether what is left is a gap; shares: of the gap, of each effect named; silent: effects that no size tried makes
-    noticeable on this evidence; chain: the fits as effects were found one after another, the first alone first."""
+    """nothing: misfit of the nominal twin; expected: χ² of noise alone; best: the explanation to be
+    named, None for none; ranking: all tried, the likeliest first; explained: share of the gap;
+    left: χ² per degree of freedom above 1 after it; unknown: whether what is left is a gap; shares:
+    of the gap, of each effect named; silent: effects that no size tried makes noticeable on this
+    evidence; chain: the fits as effects were found one after another, the first alone first."""
 
     nothing: Fit
     expected: float
@@ -104,15 +76,34 @@ def library(evidence: Evidence) -> list[Effect]:
 
 
 def attribute(
-    evidence: Evidence, progress: Callable[[int], object] = lambda _: None
+    evidence: Evidence,
+    progress: Callable[[int], object] = lambda _: None,
+    thresholds: Thresholds = STANDARD,
 ) -> Attribution:
-    """Searches the whole library. progress is called with the number of fits done since its last call."""
-    least, rules = detectable(evidence), ROUGH if evidence.machine.rough else KNOWN
-    search, fitter = Fitter(evidence.coarser()), Fitter(evidence)
+    """Searches the whole library for what explains the evidence.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+    progress
+        Called with the number of fits done since its last call.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    Attribution
+        Everything tried, and the explanation to be named.
+    """
+    least = detection_limit(evidence, thresholds)
+    rules = thresholds.rough if evidence.machine.rough else thresholds.known
+    cost = partial(penalised_cost, price=thresholds.price)
+    search, fitter = Fitter(evidence.halve_steps()), Fitter(evidence)
     effects = library(evidence)
     with ThreadPoolExecutor(THREADS) as pool:
 
-        def mapped(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
+        def map_fits(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
             results = []
             try:
                 for fit in pool.map(function, items):
@@ -124,108 +115,121 @@ def attribute(
                 raise
             return results
 
-        singles = mapped(search.single, effects)
-        singles.sort(key=priced)
+        singles = map_fits(search.fit_one, effects)
+        singles.sort(key=cost)
         # Those far behind stay there, however the tolerances are taken.
         near = (
             singles[0].misfit
-            + NEAR * max(search.nothing.misfit - singles[0].misfit, 0.0)
+            + thresholds.near * max(search.nothing.misfit - singles[0].misfit, 0.0)
             + 2.0 * least
         )
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        tried = mapped(fitter.settled, close) + singles[len(close) :]
-        tried.sort(key=priced)
+        tried = map_fits(fitter.refit_with_tolerances, close) + singles[len(close) :]
+        tried.sort(key=cost)
         first = tried[0]
-        nothing = fitter.settled(fitter.nothing)
-        if nothing.misfit - priced(first) > least:
-            much = _left(first.misfit, evidence) > MUCH * evidence.expected
-            hopes: list[Hope] = []
+        nothing = fitter.refit_with_tolerances(fitter.nothing)
+        if nothing.misfit - cost(first) > least:
+            much = _excess(first.misfit, evidence) > thresholds.much * evidence.expected
+            hopes: list[Proposal] = []
             for leader in tried[: BEAM if much else 1]:
                 # What stands far behind as the first of two is no leader.
-                if leader.misfit - first.misfit <= FAR_BEHIND * max(
+                if leader.misfit - first.misfit <= thresholds.far_behind * max(
                     nothing.misfit - first.misfit, 0.0
                 ):
-                    hopes += search.seconds(leader, effects, least)
+                    hopes += search.propose_additions(leader, effects, least)
             hopes.sort(key=lambda hope: hope.promised)
-            hopeful = _once(hopes)[: MANY if much else FEW]
-            pairs = mapped(
-                lambda hope: search.refined(hope.effects, hope.values, hope.space), hopeful
+            hopeful = _distinct(hopes)[: MANY if much else FEW]
+            pairs = map_fits(
+                lambda hope: search.refine(hope.effects, hope.values, hope.space), hopeful
             )
-            pairs.sort(key=priced)
+            pairs.sort(key=cost)
             for _ in range(LOOKED_AGAIN if pairs else 0):
                 known = {frozenset(pair.effects) for pair in pairs}
                 fresh = [
                     pair
-                    for pair in search.alike(pairs[0], effects)
+                    for pair in search.propose_replacements(pairs[0], effects)
                     if frozenset(pair[0]) not in known
                 ]
-                pairs += mapped(lambda pair: search.refined(*pair), fresh)
-                pairs.sort(key=priced)
-            pairs = mapped(fitter.settled, pairs[:SETTLED_PAIRS]) + pairs[SETTLED_PAIRS:]
-            least_more = max(SECOND * least, rules.more * _left(first.misfit, evidence))
+                pairs += map_fits(lambda pair: search.refine(*pair), fresh)
+                pairs.sort(key=cost)
+            pairs = (
+                map_fits(fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
+                + pairs[SETTLED_PAIRS:]
+            )
+            least_more = max(
+                thresholds.second * least, rules.more * _excess(first.misfit, evidence)
+            )
             tried += [
                 p
                 for p in pairs
-                if first.misfit - p.misfit > least_more and not within_tolerance(p, evidence)
+                if first.misfit - p.misfit > least_more
+                and not within_tolerance(p, evidence, thresholds)
             ]
-        chain = [fit for fit in plain(tried, least) if fit.effects][:1]
-        if rules.most > KNOWN.most:
-            more, chain = grown(
-                tried, first, Growth(search, fitter, effects, least, rules.more, rules.most), mapped
+        chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
+        if rules.most > thresholds.known.most:
+            more, chain = fit_stepwise(
+                tried, first, Growth(search, fitter, effects, least, rules, thresholds), map_fits
             )
             tried += more
-    tried = plain(tried, least)
-    silent = tuple(effect for effect in effects if search.largest(effect) < DETECTED)
-    return _judged(nothing, tried, evidence, silent, rules, chain)
+    tried = drop_needless(tried, least, thresholds)
+    silent = tuple(
+        effect for effect in effects if search.largest_response(effect) < thresholds.detected
+    )
+    return _conclude(nothing, tried, evidence, silent, thresholds, chain)
 
 
-def _once(hopes: Sequence[Hope]) -> list[Hope]:
+def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
     """Each pair of effects once, however it was come by."""
-    found: dict[frozenset[str], Hope] = {}
+    found: dict[frozenset[str], Proposal] = {}
     for hope in hopes:
         found.setdefault(frozenset(effect.name for effect in hope.effects), hope)
     return list(found.values())
 
 
-def _left(misfit: float, evidence: Evidence) -> float:
+def _excess(misfit: float, evidence: Evidence) -> float:
     return max(misfit - evidence.expected, 0.0)
 
 
-def detectable(evidence: Evidence) -> float:
+def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
     """χ² that an effect must explain to be a finding on this evidence."""
-    return max(DETECTED, NOTICEABLE * evidence.expected)
+    return max(thresholds.detected, thresholds.noticeable * evidence.expected)
 
 
-def _judged(
+def _conclude(
     nothing: Fit,
     tried: list[Fit],
     evidence: Evidence,
     silent: tuple[Effect, ...],
-    rules: Rules,
+    thresholds: Thresholds,
     chain: Sequence[Fit],
 ) -> Attribution:
+    rules = thresholds.rough if evidence.machine.rough else thresholds.known
+    cost = partial(penalised_cost, price=thresholds.price)
     gap = max(nothing.misfit - evidence.expected, 0.0)
-    pool = sorted([*tried, nothing], key=priced)
+    pool = sorted([*tried, nothing], key=cost)
     best = pool[0]
-    expected = evidence.expected_at(best.plant)
-    temper = TEMPER + FORM_TEMPER * max(best.misfit - expected, 0.0)
-    apart = np.array([(priced(fit) - priced(best)) / (2.0 * temper) for fit in pool])
+    expected = evidence.expected_misfit(best.plant)
+    temper = thresholds.temper + thresholds.form_temper * max(best.misfit - expected, 0.0)
+    apart = np.array([(cost(fit) - cost(best)) / (2.0 * temper) for fit in pool])
     if evidence.machine.rough:
-        # What is left is no noise but the model's error: as many pieces of it as are independent speak for one against another.
-        relative = np.array([(priced(fit) + expected) / (priced(best) + expected) for fit in pool])
-        apart = 0.5 * _independent(evidence, best.plant) * np.log(relative)
+        # What is left is no noise but the model's error: as many pieces of it as are independent
+        # speak for one against another.
+        relative = np.array([(cost(fit) + expected) / (cost(best) + expected) for fit in pool])
+        apart = 0.5 * _count_independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
     ranking = tuple(
-        Explanation(fit, priced(fit), float(weight))
+        Explanation(fit, cost(fit), float(weight))
         for fit, weight in zip(pool, weights, strict=True)
     )
-    found = nothing.misfit - priced(best) > detectable(evidence) and bool(best.effects)
-    if found and len(best.effects) == 1 and within_tolerance(best, evidence):
+    found = nothing.misfit - cost(best) > detection_limit(evidence, thresholds) and bool(
+        best.effects
+    )
+    if found and len(best.effects) == 1 and within_tolerance(best, evidence, thresholds):
         found = False
     left = max(best.misfit - expected, 0.0) / expected
     explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
-    more = left > UNEXPLAINED
+    more = left > thresholds.unexplained
     named = (
         ranking[0]
         if found and not (more and (explained < rules.enough or left > rules.too_much))
@@ -233,22 +237,22 @@ def _judged(
     )
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
     return Attribution(
-        nothing,
-        expected,
-        named,
-        ranking,
-        explained if found else 0.0,
-        left,
-        more,
-        shares,
-        silent,
-        tuple(chain),
+        nothing=nothing,
+        expected=expected,
+        best=named,
+        ranking=ranking,
+        explained=explained if found else 0.0,
+        left=left,
+        unknown=more,
+        shares=shares,
+        silent=silent,
+        chain=tuple(chain),
     )
 
 
-def _independent(evidence: Evidence, plant: Plant) -> float:
-    """How many independent pieces what a plant leaves consists of: the lines that share its power, twice, for real and
-    imaginary parts."""
+def _count_independent(evidence: Evidence, plant: Plant) -> float:
+    """How many independent pieces what a plant leaves consists of: the lines that share its power,
+    twice, for real and imaginary parts."""
     total = square = 0.0
     for transform in evidence.transforms(evidence.differences(plant)):
         power = np.abs(transform) ** 2
@@ -258,7 +262,8 @@ def _independent(evidence: Evidence, plant: Plant) -> float:
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:
-    """The share of the gap of each effect: what would come back without it, of what would for all."""
+    """The share of the gap of each effect: what would come back without it, of what would for
+    all."""
     if len(fit.effects) == 1:
         return {fit.name: explained}
     whole = float(np.sum(evidence.residual(fit.plant) ** 2))

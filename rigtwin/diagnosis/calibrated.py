@@ -1,4 +1,5 @@
-"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from the nominal machine."""
+"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from
+the nominal machine."""
 
 from __future__ import annotations
 
@@ -6,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.components.effect import GROUPS
-from rigtwin.description.configuration import Configuration, Nothing, flattened
-from rigtwin.description.posterior import Otherwise, Posterior, written
+from rigtwin.description.configuration import Configuration, Nothing, flatten
+from rigtwin.description.posterior import Otherwise, Posterior, format_toml
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.errors import RigtwinError
@@ -21,9 +22,11 @@ def toml(diagnosis: Diagnosis) -> str:
     answer = diagnosis.answer
     lines = [f"# {answer.verdict}: {answer.sentence}"]
     lines += [f"# from {recording}" for recording in answer.recordings]
-    lines += [f"# the controller's {each}" for each in map(_told, answer.effects) if each]
-    nominal = flattened(Configuration(plant=diagnosis.described.plant, controller=Nothing()))
-    corrected = flattened(Configuration(plant=diagnosis.machine.plant, controller=Nothing()))
+    lines += [
+        f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
+    ]
+    nominal = flatten(Configuration(plant=diagnosis.described.plant, controller=Nothing()))
+    corrected = flatten(Configuration(plant=diagnosis.machine.plant, controller=Nothing()))
     for group in diagnosis.described.plant._fields:
         changed = {
             key: value for key, value in corrected[group].items() if value != nominal[group][key]
@@ -31,7 +34,7 @@ def toml(diagnosis: Diagnosis) -> str:
         if changed:
             lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in changed.items())]
     if answer.effects:
-        lines += ["", *written(_posterior(diagnosis))]
+        lines += ["", *format_toml(_posterior(diagnosis))]
     return "\n".join(lines) + "\n"
 
 
@@ -61,7 +64,7 @@ def _otherwise(fit: Fit, probability: float) -> Otherwise:
     return Otherwise(fit.name, probability, changes)
 
 
-def _told(effect: Finding) -> str:
+def _describe_setting(effect: Finding) -> str:
     """A setting that is not what the recording says, which is the operator's to change."""
     if effect.name.kind != "setting":
         return ""

@@ -1,4 +1,5 @@
-"""The first look at a gap: a recording against the twin, replay by replay, or against another recording of the same test."""
+"""The first look at a gap: a recording against the twin, replay by replay, or against another
+recording of the same test."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undet
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.residual import Residual, single
+from rigtwin.diagnosis.residual import Residual, compute_residual
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, white_noise
@@ -22,8 +23,9 @@ from rigtwin.signals.noise import remove_mains, white_noise
 
 @dataclass(frozen=True)
 class Comparison:
-    """What each replay of a recording leaves, by its name, and what could not be replayed and why. gap: rms of all signals less
-    what the twin predicts of them, in units of their white noise; 1 is noise alone."""
+    """What each replay of a recording leaves, by its name, and what could not be replayed and why.
+    gap: rms of all signals less what the twin predicts of them, in units of their white noise; 1 is
+    noise alone."""
 
     replays: dict[str, Residual]
     left_out: dict[str, str]
@@ -83,9 +85,9 @@ def compare(
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
     """What each signal of the first recording has left, by its name."""
     lines, period = evidence.lines[0], evidence.recordings[0].period
-    difference = lines.measured - evidence.predicted(evidence.plant)[0]
+    difference = lines.measured - evidence.predict(evidence.plant)[0]
     return {
-        row.name: single(
+        row.name: compute_residual(
             difference[n][lines.fade[n] > 0.5], float(lines.noise[n]), row.unit, period
         )
         for n, row in enumerate(evidence.machine.rows)
@@ -112,7 +114,8 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":
         notes.append(
-            "with a model in the loop a limit cycle drifts in phase, so two runs of one rig differ too"
+            "with a model in the loop a limit cycle drifts in "
+            "phase, so two runs of one rig differ too"
         )
     return tuple(notes)
 
@@ -120,13 +123,15 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
 def compare_recordings(
     machine: Machine, first: Recording, second: Recording
 ) -> dict[str, Residual]:
-    """Two recordings of one test, sensor by sensor over their common length. The floor is both sensors' noise together.
+    """Two recordings of one test, sensor by sensor over their common length. The floor is both
+    sensors' noise together.
 
     Raises RigtwinError if their periods differ or they share no sensor.
     """
     if first.period != second.period:
         raise RigtwinError(
-            f"periods differ: {first.path} has {first.period:g} s, {second.path} has {second.period:g} s"
+            f"periods differ: {first.path} has {first.period:g} "
+            f"s, {second.path} has {second.period:g} s"
         )
     ticks = min(first.ticks, second.ticks)
     if ticks < SHORTEST:
@@ -146,7 +151,7 @@ def compare_recordings(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
             difference = remove_mains(one - other, first.period, machine.plant.mains.frequency)
-            results[sensor.name] = single(
+            results[sensor.name] = compute_residual(
                 difference,
                 math.hypot(white_noise(one), white_noise(other)),
                 sensor.unit,

@@ -1,6 +1,8 @@
-"""Component replays: recorded signals drive one component alone, and its output is put beside what was measured.
+"""Component replays: recorded signals drive one component alone, and its output is put beside what
+was measured.
 
-All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces than a test does.
+All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces
+than a test does.
 """
 
 from __future__ import annotations
@@ -12,13 +14,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rigtwin.components import Carriage, Cylinder, GasSpring, Motor, Rail, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
-    sampled,
-    settled,
+    discretise,
+    rest_state,
 )
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
@@ -29,8 +31,8 @@ from rigtwin.simulation.plant import (
     brace,
     contacts,
     drive,
+    initial_deflection,
     motor_force,
-    start_deflection,
     touch,
     true_measurements,
 )
@@ -43,7 +45,8 @@ AWAY = 1.0
 
 @dataclass(frozen=True)
 class Output:
-    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m; shape (ticks,)."""
+    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m;
+    shape (ticks,)."""
 
     load_cell: Array
     wheel: Array
@@ -62,7 +65,7 @@ def _cylinder(
     for tick in range(len(commands)):
         out[tick] = state.position[0]
         for _ in range(substeps):
-            advance_cylinder(model, state, conditioned(conditioning, command, commands[tick]))
+            advance_cylinder(model, state, condition(conditioning, command, commands[tick]))
 
 
 def replay_cylinder(
@@ -72,21 +75,21 @@ def replay_cylinder(
     start: float,
     position: float | None = None,
 ) -> Array:
-    """Command → plate position at every tick, m, unloaded, from rest at `position` under the command `start`; by default
-    where that command holds it."""
+    """Command → plate position at every tick, m, unloaded, from rest at `position` under the
+    command `start`; by default where that command holds it."""
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
-    command = holding(conditioning, start)
-    state = settled(cylinder, float(command.memory[3]) if position is None else position)
-    model = sampled(cylinder, timestep)
+    command = hold(conditioning, start)
+    state = rest_state(cylinder, float(command.memory[3]) if position is None else position)
+    model = discretise(cylinder, timestep)
     _cylinder(
-        model,
-        state,
-        conditioning,
-        command,
-        np.ascontiguousarray(commands),
-        configuration.substeps,
-        out,
+        model=model,
+        state=state,
+        conditioning=conditioning,
+        command=command,
+        commands=np.ascontiguousarray(commands),
+        substeps=configuration.substeps,
+        out=out,
     )
     return out
 
@@ -106,14 +109,15 @@ def _mechanics(
     load_cell_out: Array,
     wheel_out: Array,
 ) -> None:
-    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage free."""
+    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage
+    free."""
     driven = len(carriage) > 0
     ticks = len(voltage)
     for tick in range(ticks):
         following = force[min(tick + 1, ticks - 1)]
         for substep in range(substeps):
             now = tick * substeps + substep
-            mechanics.control[0] = conditioned(motor_drive, motor_command, voltage[tick])
+            mechanics.control[0] = condition(motor_drive, motor_command, voltage[tick])
             drive(mechanics, mechanics.ground, ground[now], ground[now + 1])
             drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
             if driven:
@@ -137,9 +141,9 @@ def _mechanics(
             integrate(mechanics.model, mechanics.data)
 
 
-def _between(motion: Array, substeps: int) -> Array:
-    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity must not jump, or a motor
-    that sticks would have to pass on the blow."""
+def _interpolate(motion: Array, substeps: int) -> Array:
+    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity
+    must not jump, or a motor that sticks would have to pass on the blow."""
     ticks = len(motion)
     spline = CubicSpline(np.arange(ticks), motion)
     fine = spline(np.arange(substeps * (ticks - 1) + 1) / substeps)
@@ -167,18 +171,18 @@ def _run(
     conditioning = actuator(plant.motor, plant.computer, configuration.timing.timestep)
     out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
     _mechanics(
-        view,
-        contacts(plant, wheel, float(structure[0]) - wheel),
-        conditioning,
-        holding(conditioning, preload / plant.motor.constant),
-        substeps,
-        _between(ground, substeps),
-        _between(structure, substeps),
-        np.empty(0) if carriage is None else _between(carriage, substeps),
-        np.ascontiguousarray(voltage),
-        np.ascontiguousarray(force),
-        out.load_cell,
-        out.wheel,
+        mechanics=view,
+        contacts=contacts(plant, wheel, float(structure[0]) - wheel),
+        motor_drive=conditioning,
+        motor_command=hold(conditioning, preload / plant.motor.constant),
+        substeps=substeps,
+        ground=_interpolate(ground, substeps),
+        structure=_interpolate(structure, substeps),
+        carriage=np.empty(0) if carriage is None else _interpolate(carriage, substeps),
+        voltage=np.ascontiguousarray(voltage),
+        force=np.ascontiguousarray(force),
+        load_cell_out=out.load_cell,
+        wheel_out=out.wheel,
     )
     return out
 
@@ -186,41 +190,62 @@ def _run(
 def replay_carriage(
     configuration: Configuration, ground: Array, force: Array, preload: float
 ) -> Array:
-    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both are out of it."""
+    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both
+    are out of it."""
     plant = configuration.plant
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
     nothing = np.zeros_like(force)
-    wheel = float(ground[0]) - start_deflection(plant, preload)
-    return _run(alone, configuration, ground, nothing, None, nothing, force, 0.0, wheel).wheel
+    wheel = float(ground[0]) - initial_deflection(plant, preload)
+    return _run(
+        plant=alone,
+        configuration=configuration,
+        ground=ground,
+        structure=nothing,
+        carriage=None,
+        voltage=nothing,
+        force=force,
+        preload=0.0,
+        wheel=wheel,
+    ).wheel
 
 
 def replay_mechanics(
     configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float
 ) -> Output:
-    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and carriage together."""
+    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and
+    carriage together."""
     plant = configuration.plant
-    wheel = float(ground[0]) - start_deflection(plant, preload)
+    wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
-        plant,
-        configuration,
-        ground,
-        structure,
-        None,
-        voltage,
-        np.zeros_like(voltage),
-        preload,
-        wheel,
+        plant=plant,
+        configuration=configuration,
+        ground=ground,
+        structure=structure,
+        carriage=None,
+        voltage=voltage,
+        force=np.zeros_like(voltage),
+        preload=preload,
+        wheel=wheel,
     )
 
 
 def replay_motor(
     configuration: Configuration, travel: Array, voltage: Array, preload: float
 ) -> Array:
-    """Travel and voltage → load cell force, N. Friction at standstill is not determined by these."""
+    """Travel and voltage → load cell force, N. Friction at standstill is not determined by
+    these."""
     alone = configuration.plant._replace(
         carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring()
     )
     nothing = np.zeros_like(travel)
     return _run(
-        alone, configuration, nothing - AWAY, travel, nothing, voltage, nothing, preload, 0.0
+        plant=alone,
+        configuration=configuration,
+        ground=nothing - AWAY,
+        structure=travel,
+        carriage=nothing,
+        voltage=voltage,
+        force=nothing,
+        preload=preload,
+        wheel=0.0,
     ).load_cell

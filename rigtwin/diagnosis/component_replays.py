@@ -1,4 +1,5 @@
-"""The replays of one recording: every component alone, driven by measured signals; the mechanics together; the closed loop."""
+"""The replays of one recording: every component alone, driven by measured signals; the mechanics
+together; the closed loop."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import seen, unseen
+from rigtwin.components.sensors import apply_sensor, undo_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.diagnosis.component import (
     Output,
@@ -19,7 +20,7 @@ from rigtwin.diagnosis.component import (
     replay_mechanics,
     replay_motor,
 )
-from rigtwin.diagnosis.residual import Residual, rounding, single, together
+from rigtwin.diagnosis.residual import Residual, combine_residuals, compute_residual, rounding
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import (
@@ -31,12 +32,13 @@ from rigtwin.signals.noise import (
     white_noise,
 )
 from rigtwin.simulation.loop import run
-from rigtwin.simulation.plant import start_deflection
+from rigtwin.simulation.plant import initial_deflection
 from rigtwin.simulation.replay import Replay
-from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
-"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from standstill."""
+"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from
+standstill."""
 CERTAIN = 3.0
 """Standard deviations of a velocity beyond which its sign is certain."""
 CLOSED_LOOP_SEED = 2**31 - 1
@@ -48,7 +50,8 @@ class Undetermined(Exception):
 
 
 class ComponentReplays:
-    """The replays of one recording by the twin of one configuration. Motions are estimated once and shared.
+    """The replays of one recording by the twin of one configuration. Motions are estimated once and
+    shared.
 
     The data have to be fit for a comparison, see `data_checks`.
     """
@@ -69,22 +72,24 @@ class ComponentReplays:
     def _clean(self, signal: Array) -> Array:
         return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
-    def _seen(self, name: str, true: Array) -> Array:
+    def _apply_sensor(self, name: str, true: Array) -> Array:
         """What the twin's sensor of that name makes of a true signal."""
-        return seen(getattr(self.configuration.plant, name), true, self.period)
+        return apply_sensor(getattr(self.configuration.plant, name), true, self.period)
 
-    def _wheel_seen(self, wheel: Array) -> Array:
+    def _apply_lvdts(self, wheel: Array) -> Array:
         """The difference of both LVDTs for a true wheel position and the plate's motion."""
         plate = self.structure_motion.position
-        return self._seen("structure_lvdt", plate) - self._seen("suspension_lvdt", plate - wheel)
+        return self._apply_sensor("structure_lvdt", plate) - self._apply_sensor(
+            "suspension_lvdt", plate - wheel
+        )
 
     def _motion(self, name: str, expected: Array) -> EstimatedMotion:
         """The true motion that a sensor measured, given what a replay expects of it."""
         sensor = getattr(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(self._sensor(name), self._seen(name, expected), self.period, mains)
+        found = estimate_motion(self._sensor(name), self._apply_sensor(name, expected), self.period, mains)
         return EstimatedMotion(
-            expected + unseen(sensor, found.correction, self.period),
+            expected + undo_sensor(sensor, found.correction, self.period),
             found.correction,
             found.velocity_error / sensor.gain,
         )
@@ -108,8 +113,11 @@ class ComponentReplays:
     def structure_cylinder_output(self) -> Array:
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
-        # A test starts with its spring uncompressed: the plate stands where the preload holds the wheel.
-        uncompressed = self._ground_start - start_deflection(self.configuration.plant, self.preload)
+        # A test starts with its spring uncompressed: the plate stands where the preload holds the
+        # wheel.
+        uncompressed = self._ground_start - initial_deflection(
+            self.configuration.plant, self.preload
+        )
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
@@ -126,7 +134,9 @@ class ComponentReplays:
     @cached_property
     def carriage_output(self) -> Array:
         sensor = self.configuration.plant.load_cell
-        force = unseen(sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period)
+        force = undo_sensor(
+            sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period
+        )
         return replay_carriage(
             self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload
         )
@@ -137,18 +147,19 @@ class ComponentReplays:
         if spring.force == 0.0:
             return np.zeros(self.recording.ticks)
         sensor = self.configuration.plant.suspension_lvdt
-        travel = unseen(
+        travel = undo_sensor(
             sensor, self._clean(self._sensor("suspension_lvdt")) - sensor.offset, self.period
         )
         return np.array([spring_force(spring, -stroke) for stroke in travel.tolist()])
 
     @cached_property
     def travel_motion(self) -> EstimatedMotion:
-        """Of plate against wheel, by the difference that the carriage's replay leaves between the LVDTs."""
+        """Of plate against wheel, by the difference that the carriage's replay leaves between the
+        LVDTs."""
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(self.wheel, self._wheel_seen(self.carriage_output), self.period, mains)
+        found = estimate_motion(self.wheel, self._apply_lvdts(self.carriage_output), self.period, mains)
         sensor = self.configuration.plant.suspension_lvdt
-        wheel = self.carriage_output + unseen(sensor, found.correction, self.period)
+        wheel = self.carriage_output + undo_sensor(sensor, found.correction, self.period)
         error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)
         return EstimatedMotion(self.structure_motion.position - wheel, found.correction, error)
 
@@ -164,10 +175,11 @@ class ComponentReplays:
 
     def _residual(self, measured: Array, output: Array, unit: str) -> tuple[Residual, Array]:
         difference = self._clean(measured - output)
-        return single(difference, white_noise(measured), unit, self.period), difference
+        return compute_residual(difference, white_noise(measured), unit, self.period), difference
 
     def motor(self) -> Residual:
-        """Only where the motor is known to slide: voltage and travel do not determine its friction at standstill."""
+        """Only where the motor is known to slide: voltage and travel do not determine its friction
+        at standstill."""
         measured, travel = self._sensor("load_cell"), self.travel_motion
         output = replay_motor(
             self.configuration, travel.position, self._command("voltage"), self.preload
@@ -179,7 +191,7 @@ class ComponentReplays:
         slides = np.abs(np.gradient(travel.position, self.period)) > resolved
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
-        difference = self._clean(measured - self._seen("load_cell", output))
+        difference = self._clean(measured - self._apply_sensor("load_cell", output))
         left = rms(difference[slides])
         floor = white_noise(measured)
         return Residual(
@@ -191,24 +203,26 @@ class ComponentReplays:
         )
 
     def carriage(self) -> Residual:
-        return self._residual(self.wheel, self._wheel_seen(self.carriage_output), "m")[0]
+        return self._residual(self.wheel, self._apply_lvdts(self.carriage_output), "m")[0]
 
     def mechanics(self) -> Residual:
-        force = self._seen("load_cell", self.mechanics_output.load_cell)
+        force = self._apply_sensor("load_cell", self.mechanics_output.load_cell)
         pairs = {
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
-            "wheel": self._residual(self.wheel, self._wheel_seen(self.mechanics_output.wheel), "m"),
+            "wheel": self._residual(
+                self.wheel, self._apply_lvdts(self.mechanics_output.wheel), "m"
+            ),
         }
-        return together(
+        return combine_residuals(
             {n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period
         )
 
     def structure_cylinder(self) -> Residual:
-        output = self._seen("structure_lvdt", self.structure_cylinder_output)
+        output = self._apply_sensor("structure_lvdt", self.structure_cylinder_output)
         return self._residual(self._sensor("structure_lvdt"), output, "m")[0]
 
     def ground_cylinder(self) -> Residual:
-        output = self._seen("ground_lvdt", self.ground_cylinder_output)
+        output = self._apply_sensor("ground_lvdt", self.ground_cylinder_output)
         return self._residual(self._sensor("ground_lvdt"), output, "m")[0]
 
     def _demands(self) -> Array:
@@ -216,7 +230,7 @@ class ComponentReplays:
 
     def controller(self) -> Residual:
         replay = Replay(self.recording)
-        for _ in run(replay, unlimited(self.configuration), self._demands()):
+        for _ in run(replay, without_limits(self.configuration), self._demands()):
             pass
         outputs: dict[str, Residual] = {}
         differences: dict[str, Array] = {}
@@ -227,18 +241,25 @@ class ComponentReplays:
             differences[name] = (
                 np.array([commands[number] for commands in replay.written]) - recorded
             )
-            outputs[name] = single(differences[name], rounding(recorded), unit, self.period)
-        return together(outputs, differences, self.period)
+            outputs[name] = compute_residual(
+                differences[name], rounding(recorded), unit, self.period
+            )
+        return combine_residuals(outputs, differences, self.period)
 
     def closed_loop(self) -> Residual:
-        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the loop limit-cycles."""
-        truth = simulated(unlimited(self.configuration), self._demands(), CLOSED_LOOP_SEED).truth
+        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the
+        loop limit-cycles."""
+        truth = simulate(
+            without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED
+        ).truth
         units = ("m", "m", "m", "N")
         pairs = {
-            name: self._residual(self._sensor(name), self._seen(name, truth[:, number]), unit)
+            name: self._residual(
+                self._sensor(name), self._apply_sensor(name, truth[:, number]), unit
+            )
             for number, (name, unit) in enumerate(zip(Measurements._fields, units, strict=True))
         }
-        return together(
+        return combine_residuals(
             {n: p[0] for n, p in pairs.items()}, {n: p[1] for n, p in pairs.items()}, self.period
         )
 

@@ -1,4 +1,5 @@
-"""Does a controller do what it was told? Its commands are worked out again from what was recorded."""
+"""Does a controller do what it was told? Its commands are worked out again from what was
+recorded."""
 
 from __future__ import annotations
 
@@ -18,9 +19,11 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
 
 EXACT = 20.0
-"""Times a command's rounding within which its replay counts as exact: a controller's own arithmetic rounds too."""
+"""Times a command's rounding within which its replay counts as exact: a controller's own arithmetic
+rounds too."""
 CLOSER = 0.3
-"""Share of what is left that another value must leave at most to be the explanation, of a controller described inexactly."""
+"""Share of what is left that another value must leave at most to be the explanation, of a
+controller described inexactly."""
 LATE = 4
 """Ticks by which the commands may lag behind, at most, to be recognised."""
 REPEATED = 0.2
@@ -33,8 +36,9 @@ AWAY = np.array([-2.0, -1.0, -0.75, -0.5, -0.25, -0.05, 0.05, 0.25, 0.5, 1.0, 2.
 
 @dataclass(frozen=True)
 class Deviation:
-    """What a controller did other than told. kind: `setting`, `missed_ticks` or `delay`, or `unknown` if nothing reproduces its
-    commands; name: of the setting, or of the parameter; told: the operator's value; used: the one that reproduces them."""
+    """What a controller did other than told. kind: `setting`, `missed_ticks` or `delay`, or
+    `unknown` if nothing reproduces its commands; name: of the setting, or of the parameter; told:
+    the operator's value; used: the one that reproduces them."""
 
     kind: str
     name: str
@@ -60,8 +64,8 @@ class ControllerReplay:
     def commands(
         self, settings: Any, skipped: NDArray[np.bool_] | None = None, late: int = 0
     ) -> Array:
-        """Commands at every tick, shape (outputs, ticks). skipped: ticks at which the controller does not run and its outputs
-        stay; late: ticks that its samples are old."""
+        """Commands at every tick, shape (outputs, ticks). skipped: ticks at which the controller
+        does not run and its outputs stay; late: ticks that its samples are old."""
         inputs = self._inputs
         if late:
             # What was demanded is no sample.
@@ -80,7 +84,8 @@ class ControllerReplay:
         return np.where(last >= 0, own[:, np.maximum(last, 0)], 0.0)
 
     def misfit(self, commands: Array, counted: NDArray[np.bool_] | None = None) -> float:
-        """rms of what commands differ by, in units of what counts as exact; of the worst command."""
+        """rms of what commands differ by, in units of what counts as exact; of the worst
+        command."""
         difference = (commands - self.recorded)[:, SETTLED:]
         if counted is not None:
             difference = difference[:, counted[SETTLED:]]
@@ -94,13 +99,13 @@ class ControllerReplay:
         if left <= 1.0:
             return None
         return (
-            self._missed()
-            or self._late()
-            or self._setting(left)
+            self._find_missed_ticks()
+            or self._find_delay()
+            or self._find_setting(left)
             or Deviation("unknown", "", 0.0, 0.0, "1")
         )
 
-    def _missed(self) -> Deviation | None:
+    def _find_missed_ticks(self) -> Deviation | None:
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=1) == 0.0, axis=0)])
         if not 0 < repeated.sum() < REPEATED * len(repeated):
             return None
@@ -110,13 +115,13 @@ class ControllerReplay:
             return None
         return Deviation("missed_ticks", "missed_ticks", 0.0, float(repeated.mean()), "1")
 
-    def _late(self) -> Deviation | None:
+    def _find_delay(self) -> Deviation | None:
         for late in range(1, LATE + 1):
             if self.misfit(self.commands(self._settings, late=late)) <= 1.0:
                 return Deviation("delay", "delay", 0.0, late * self._period, "s")
         return None
 
-    def _setting(self, left: float) -> Deviation | None:
+    def _find_setting(self, left: float) -> Deviation | None:
         """The one setting that, at another value, reproduces the commands."""
         found: list[tuple[float, Deviation]] = []
         for name, meaning in fields(type(self._settings)).items():
@@ -128,7 +133,7 @@ class ControllerReplay:
                 return self.misfit(self.commands(self._settings._replace(**{name: value})))
 
             if isinstance(meaning, Quantity):
-                best, value = _least(misfit, told, meaning)
+                best, value = _minimise(misfit, told, meaning)
                 found.append((best, Deviation("setting", name, told, value, meaning.unit)))
             else:
                 best, value = min((misfit(choice), float(choice)) for choice in meaning)
@@ -141,8 +146,11 @@ class ControllerReplay:
         )[1]
 
 
-def _least(misfit: Callable[[float], float], told: float, meaning: Quantity) -> tuple[float, float]:
-    """Smallest misfit over one setting, and where: a coarse look around the told value, then a bounded search."""
+def _minimise(
+    misfit: Callable[[float], float], told: float, meaning: Quantity
+) -> tuple[float, float]:
+    """Smallest misfit over one setting, and where: a coarse look around the told value, then a
+    bounded search."""
     size = max(abs(told), 0.01 * min(meaning.high, 1.0))
     # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.
     grid = np.unique(np.clip(told + size * AWAY, meaning.low, meaning.high))

@@ -13,6 +13,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
@@ -21,10 +22,6 @@ BLOCK = 0.5
 DRAWS = 1000
 SEED = 20
 """Of the bootstrap's draws."""
-WORSE = 1.05
-"""Times the gap without it from which a correction is rejected."""
-BETTER = 0.995
-"""The same for a rough model."""
 TAPER = 0.1
 """s, over which a part of a recording begins and ends to count."""
 
@@ -34,29 +31,31 @@ Effects = tuple[Effect, ...]
 
 @dataclass(frozen=True)
 class Blocks:
-    """Power of what is left, in units of the sensors' white noise power, by blocks of time: with the nominal plant and with the
-    corrected one. Shape (blocks,) each."""
+    """Power of what is left, in units of the sensors' white noise power, by blocks of time: with
+    the nominal plant and with the corrected one. Shape (blocks,) each."""
 
     before: Array
     after: Array
 
-    def joined(self, other: Blocks) -> Blocks:
+    def join(self, other: Blocks) -> Blocks:
         return Blocks(
             np.concatenate([self.before, other.before]), np.concatenate([self.after, other.after])
         )
 
 
 def power(evidence: Evidence, plant: Plant) -> list[Array]:
-    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,) for each recording."""
+    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,)
+    for each recording."""
     found = []
-    for each, predicted in zip(evidence.lines, evidence.predicted(plant), strict=True):
+    for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
         relative = (each.measured - predicted) / each.noise[:, None]
         found.append(np.mean(relative**2, axis=0))
     return found
 
 
 def gap_level(evidence: Evidence, plant: Plant) -> float:
-    """rms of all signals less what a plant predicts, in units of their white noise, where a test counts."""
+    """rms of all signals less what a plant predicts, in units of their white noise, where a test
+    counts."""
     powers = [
         each[lines.fade.max(axis=0) > 0.5]
         for each, lines in zip(power(evidence, plant), evidence.lines, strict=True)
@@ -86,7 +85,8 @@ def blocks(evidence: Evidence, before: Plant, after: Plant, counted: Sequence[Ar
 
 
 def shrinkage(before: float, after: float) -> float:
-    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's; negative if worse."""
+    """Share of the rms gap above the floor that is closed, for mean powers in units of the noise's;
+    negative if worse."""
     gap, left = math.sqrt(max(before - 1.0, 0.0)), math.sqrt(max(after - 1.0, 0.0))
     return 1.0 - left / gap if gap > 0.0 else 0.0
 
@@ -106,9 +106,10 @@ def interval(of: Blocks) -> Interval:
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A correction's effect on data held out of its fit. kept: effects that do not worsen them; rejected: those that do;
-    halves: the fits to each half of the recordings, where they were made."""
+class Validation:
+    """What a correction does on data held out of its fit. kept: effects that do not worsen them;
+    rejected: those that do; halves: the fits to each half of the recordings, where they were
+    made."""
 
     predicted: float
     held_out: Interval
@@ -131,27 +132,47 @@ def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
     return first, second
 
 
-def _refitted(evidence: Evidence, fit: Fit) -> Fit:
-    return Fitter(evidence).refined(
+def _refit(evidence: Evidence, fit: Fit) -> Fit:
+    return Fitter(evidence).refine(
         fit.effects, fit.values, Space(evidence, fit.plant, None, fit.effects)
     )
 
 
-def _halved(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
+def _fit_halves(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
     """The halves of the recordings, and the fit made again to each."""
     parts = halves(evidence.recordings)
     return parts, [
-        _refitted(
-            Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit
-        )
+        _refit(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit)
         for part in parts
     ]
 
 
-def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judged:
-    """Judges a fit on evidence held out of it; without any, on each half of the recordings after a fit to the other."""
+def validate(
+    evidence: Evidence,
+    fit: Fit,
+    other: Evidence | None = None,
+    thresholds: Thresholds = STANDARD,
+) -> Validation:
+    """Validates a fit on data held out of it.
+
+    Parameters
+    ----------
+    evidence
+        What it was fitted to.
+    fit
+        The correction.
+    other
+        Evidence held out of it; without any, each half of the recordings after a fit to the other.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    Validation
+        How far the gap shrinks there, and which effects stay.
+    """
     # Where much is left, an effect must help to stay.
-    worse = BETTER if evidence.machine.rough else WORSE
+    worse = thresholds.better if evidence.machine.rough else thresholds.worse
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
@@ -163,23 +184,29 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
         whole = [np.ones(recording.ticks) for recording in other.recordings]
         data = f"{len(whole)} held-out recording{'s' if len(whole) > 1 else ''}"
 
-        def outside(plant: Plant) -> Blocks:
+        def blocks_of(plant: Plant) -> Blocks:
             return blocks(other, evidence.plant, plant, whole)
 
-        def kept_outside(kept: tuple[Effect, ...]) -> Blocks:
-            return outside(with_effects(evidence.plant, fit, kept))
+        def blocks_with(kept: tuple[Effect, ...]) -> Blocks:
+            return blocks_of(with_effects(evidence.plant, fit, kept))
 
-        kept, rejected = gated(fit.effects, kept_outside, worse)
+        kept, rejected = reject_worsening(fit.effects, blocks_with, worse)
         if rejected and evidence.machine.rough:
             values = [
                 own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept
             ]
-            fit = Fitter(evidence).settled(Fitter(evidence).refined(kept, values))
-        apart = _halved(evidence, fit)[1] if evidence.machine.rough else []
-        return Judged(
-            predicted, interval(kept_outside(kept)), kept, rejected, data, tuple(apart), fit
+            fit = Fitter(evidence).refit_with_tolerances(Fitter(evidence).refine(kept, values))
+        apart = _fit_halves(evidence, fit)[1] if evidence.machine.rough else []
+        return Validation(
+            predicted=predicted,
+            held_out=interval(blocks_with(kept)),
+            kept=kept,
+            rejected=rejected,
+            data=data,
+            halves=tuple(apart),
+            fit=fit,
         )
-    parts, fits = _halved(evidence, fit)
+    parts, fits = _fit_halves(evidence, fit)
     predictions, outcomes = [], []
     for own, foreign, refitted in zip(parts, parts[::-1], fits, strict=True):
         inside = blocks(evidence, evidence.plant, refitted.plant, own)
@@ -190,17 +217,22 @@ def judged(evidence: Evidence, fit: Fit, other: Evidence | None = None) -> Judge
         )
         outcomes.append((refitted, foreign))
 
-    def across(kept: tuple[Effect, ...]) -> Blocks:
+    def blocks_across(kept: tuple[Effect, ...]) -> Blocks:
         found = [
             blocks(evidence, evidence.plant, with_effects(evidence.plant, refitted, kept), part)
             for refitted, part in outcomes
         ]
-        return found[0].joined(found[1])
+        return found[0].join(found[1])
 
-    kept, rejected = gated(fit.effects, across, worse)
+    kept, rejected = reject_worsening(fit.effects, blocks_across, worse)
     data = "each half, fitted to the other"
-    return Judged(
-        float(np.mean(predictions)), interval(across(kept)), kept, rejected, data, tuple(fits)
+    return Validation(
+        float(np.mean(predictions)),
+        interval(blocks_across(kept)),
+        kept,
+        rejected,
+        data,
+        tuple(fits),
     )
 
 
@@ -214,11 +246,11 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
-def gated(
-    effects: Effects, across: Callable[[Effects], Blocks], worse: float = WORSE
+def reject_worsening(
+    effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worse
 ) -> tuple[Effects, Effects]:
-    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times. across: what is left with some
-    of the effects."""
+    """(kept, rejected) effects: none stays that makes held-out data worse, beyond `worse` times.
+    across: what is left with some of the effects."""
     kept = effects
     while kept:
         left = across(kept)

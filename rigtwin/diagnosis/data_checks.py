@@ -48,9 +48,10 @@ UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
 
 
 @dataclass(frozen=True)
-class Alike:
-    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign is wrong; unit: above which
-    a scale is judged; far: scale, either way, that is no gain whatever it is; close: how near a scale must be to a unit's."""
+class SimilarityLimits:
+    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign
+    is wrong; unit: above which a scale is judged; far: scale, either way, that is no gain whatever
+    it is; close: how near a scale must be to a unit's."""
 
     sign: float
     unit: float
@@ -58,15 +59,15 @@ class Alike:
     close: float
 
 
-KNOWN = Alike(sign=0.7, unit=0.7, far=5.0, close=0.5)
-ROUGH = Alike(sign=0.8, unit=0.8, far=np.inf, close=0.15)
+KNOWN = SimilarityLimits(sign=0.7, unit=0.7, far=5.0, close=0.5)
+ROUGH = SimilarityLimits(sign=0.8, unit=0.8, far=np.inf, close=0.15)
 """Of a machine whose nominal values are only a start."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with the data. kind: short name; where: the channel, or the recording; message: one line; fatal: no
-    comparison makes sense."""
+    """One thing wrong with the data. kind: short name; where: the channel, or the recording;
+    message: one line; fatal: no comparison makes sense."""
 
     kind: str
     where: str
@@ -92,12 +93,12 @@ def find_faults(
     -------
     Faults, the gravest first. Later checks are left out where earlier ones make them meaningless.
     """
-    found = [*_presence(machine, recording)]
+    found = [*_check_presence(machine, recording)]
     if not found:
-        found += _values(machine, recording)
+        found += _check_values(machine, recording)
     if not found:
-        predicted = model_of(machine, recording, configuration, STEPS).sensed(configuration.plant)
-        for stage in (_alive, _order, _scale):
+        predicted = model_of(machine, recording, configuration, STEPS).predict(configuration.plant)
+        for stage in (_check_alive, _check_order, _check_scale):
             found += stage(machine, recording, predicted)
             if any(fault.fatal for fault in found):
                 break
@@ -107,7 +108,8 @@ def find_faults(
 def require_fit(
     machine: Machine, recording: Recording, configuration: Configuration
 ) -> tuple[Fault, ...]:
-    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that does."""
+    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that
+    does."""
     faults = find_faults(machine, recording, configuration)
     if fatal := [fault.message for fault in faults if fault.fatal]:
         raise RigtwinError(f"{recording.path}: {'; '.join(fatal)}")
@@ -127,7 +129,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     return list(dict.fromkeys(found))
 
 
-def _presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
     if recording.machine != machine.name:
         yield Fault(
             "wrong machine",
@@ -148,16 +150,22 @@ def _presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
             f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}",
         )
     elif lasts < SHORTEST_TIME:
-        message = f"it lasts {lasts:.3g} s; a comparison needs at least {SHORTEST_TIME:g} s (is the time's unit right?)"
+        message = (
+            f"it lasts {lasts:.3g} s; a comparison needs at least "
+            f"{SHORTEST_TIME:g} s (is the time's unit right?)"
+        )
         yield Fault("too short", "recording", message)
 
 
-def _values(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
     steps = np.diff(recording.time)
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
         first = gaps[0]
-        message = f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} s at {recording.time[first]:.3f} s"
+        message = (
+            f"{len(gaps)} gaps in time, the first of {steps[first]:.4g} "
+            f"s at {recording.time[first]:.3f} s"
+        )
         yield Fault("gap", "recording", message)
     for topic, name in channels(machine):
         signal, where = recording.column(topic, name), f"{topic}.{name}"
@@ -179,11 +187,11 @@ def _values(machine: Machine, recording: Recording) -> Iterator[Fault]:
             )
 
 
-def _alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     still = {
         row.name
         for row, model in zip(machine.rows, predicted, strict=True)
-        if _rests(machine, row, model)
+        if _is_at_rest(machine, row, model)
     }
     for name, component in machine.components.items():
         if component.channel is None or not recording.has(*component.channel):
@@ -209,7 +217,7 @@ def _alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator
                 "dead", where, f"{where} does not change {since}: a dead or disconnected sensor"
             )
             continue
-        yield from _cut(where, signal)
+        yield from _check_clipping(where, signal)
 
 
 def _movers(machine: Machine) -> set[str]:
@@ -217,13 +225,13 @@ def _movers(machine: Machine) -> set[str]:
     return {name for replay in machine.replays if not replay.closed for name in replay.moved_by}
 
 
-def _rests(machine: Machine, row: Row, predicted: Array) -> bool:
+def _is_at_rest(machine: Machine, row: Row, predicted: Array) -> bool:
     """Whether a signal should not change: commands that stay put move nothing."""
     bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
     return float(np.ptp(predicted)) <= bit
 
 
-def _cut(where: str, signal: Array) -> Iterator[Fault]:
+def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:
     at_end = find_cut_off(signal)
     for end, extreme in (("above", signal.max()), ("below", signal.min())):
         share = 100 * float(np.mean(at_end & (signal == extreme)))
@@ -232,7 +240,7 @@ def _cut(where: str, signal: Array) -> Iterator[Fault]:
             yield Fault("clipped", where, message, fatal=False)
 
 
-def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Swapped channels: another order of the sensors of one unit fits far better."""
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
         rows = [
@@ -259,7 +267,8 @@ def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
         if least < total(tuple(names)) / 3:
-            # Orders that fit about as well differ in what these data cannot tell; the fewest swaps are the likeliest.
+            # Orders that fit about as well differ in what these data cannot tell; the fewest swaps
+            # are the likeliest.
             likely = [order for order in orders if total(order) < 1.5 * least]
             best = min(
                 likely, key=lambda order: sum(n != m for n, m in zip(names, order, strict=True))
@@ -272,13 +281,14 @@ def _order(machine: Machine, recording: Recording, predicted: Array) -> Iterator
             yield Fault("swapped", "/sensor", f"channels of /sensor are swapped: {swapped}")
 
 
-def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Signs and units, by how a signal goes with what the nominal machine would show."""
     rule = ROUGH if machine.rough else KNOWN
     odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
         signal, where = recording.column(*row.channel), ".".join(row.channel)
-        # Motions have a zero that may be displaced; a known force has its preload, which says its scale even at rest.
+        # Motions have a zero that may be displaced; a known force has its preload, which says its
+        # scale even at rest.
         whole = row.kind == "force" and not machine.rough
         a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
@@ -294,7 +304,7 @@ def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator
             )
             if not 1 / rule.far < slope < rule.far or (machine.rough and near):
                 odd[row] = slope
-    for row, slope in _beyond_gain(machine, recording, odd).items():
+    for row, slope in _unexplained_scales(machine, recording, odd).items():
         known = UNITS.get(row.unit, ((1.0, ""),))
         factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
         as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < KNOWN.close and guess else ""
@@ -306,14 +316,15 @@ def _scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator
         )
 
 
-def _beyond_gain(
+def _unexplained_scales(
     machine: Machine, recording: Recording, odd: Mapping[Row, float]
 ) -> dict[Row, float]:
     """Odd scales less those that physics explains."""
     found = dict(odd)
     for row in odd:
-        if row.kind == "force" and _wound_up(machine, recording):
-            # A loop at its limit says that the force is not to be had; whose fault it is, is for the diagnosis.
+        if row.kind == "force" and _is_wound_up(machine, recording):
+            # A loop at its limit says that the force is not to be had; whose fault it is, is for
+            # the diagnosis.
             del found[row]
     for unit in {row.unit for row in odd}:
         alike = [row for row in odd if row.unit == unit]
@@ -325,7 +336,7 @@ def _beyond_gain(
     return found
 
 
-def _wound_up(machine: Machine, recording: Recording) -> bool:
+def _is_wound_up(machine: Machine, recording: Recording) -> bool:
     """Whether a force actuator's command stands at its limit for long."""
     for name in _movers(machine):
         component = machine.components[name]

@@ -1,7 +1,7 @@
 """The diagnosis: recordings in, one answer out.
 
-checks → evidence → attribution (replays of the whole plant) and what needs no model (controller, sensors' sampling) →
-where → judged on held-out data → the next test.
+checks → evidence → attribution (replays of the whole plant) and what needs no model (controller,
+sensors' sampling) → where → judged on held-out data → the next test.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from rigtwin.components import Effect, find, title, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
-from rigtwin.diagnosis.attribute import MEMBER, Attribution, Explanation, attribute
+from rigtwin.diagnosis.attribute import Attribution, Explanation, attribute
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Judged, gap_level, judged, with_effects
+from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import (
@@ -29,41 +29,25 @@ from rigtwin.diagnosis.finding import (
     Name,
     NextTest,
     Place,
-    Unseen,
+    Unobservable,
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.leftover import leftovers, missed, steps
+from rigtwin.diagnosis.leftover import leftovers, power_without_each, steps
 from rigtwin.diagnosis.levels import compute_levels
-from rigtwin.diagnosis.localisation import placed
-from rigtwin.diagnosis.next_test import proposed
+from rigtwin.diagnosis.localisation import locate
+from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.sampling import Sampled, outstanding
+from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
 from rigtwin.diagnosis.text import sentence
-from rigtwin.diagnosis.unknown_input import Disturbed, located
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
 
-SURE = 0.98
-"""Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
-LESS_SURE = 0.88
-"""The same in one of two effects, or beside something that has no name: so often such names were right."""
-UNSURE = 0.9
-"""Confidence below which another test is proposed."""
-WIDER = 2.5
-"""Times the statistical interval that is reported: a model's form is never exact."""
-TRACE = 0.01
-"""Share of a rough model's gap below which an effect is not claimed."""
-NOTICED = 4.0
-"""Times the power that is left without an effect that is claimed all the same, all others fitted again: twice the gap."""
-POSSIBLE = 0.01
-"""Probability from which on another explanation is kept beside the one named."""
-SOMETHING = 0.03
-"""Share of what noise leaves that a free disturbance of one component must explain for something unnamed to be there."""
 
-
-def _unusable(
+def _answer_unusable(
     machine: Machine,
     recordings: Sequence[Recording],
     configurations: Sequence[Configuration],
@@ -102,6 +86,7 @@ def diagnose(
     held_out: Sequence[Recording] = (),
     tests: Sequence[Experiment] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
+    thresholds: Thresholds = STANDARD,
 ) -> Diagnosis:
     """Says why recordings of one machine and its twin disagree.
 
@@ -114,11 +99,19 @@ def diagnose(
     base
         The twin that they are compared with; by default the described one.
     held_out
-        Recordings that the correction is judged on; without any, each half of the others on a fit to the other half.
+        Recordings that the correction is judged on; without any, each half of the others on a fit
+        to the other half.
     tests
         The menu that a next test is chosen from.
     progress
         Called with a stage's name and the steps done in it.
+    thresholds
+        What the stages hold their figures against.
+
+    Returns
+    -------
+    Diagnosis
+        The answer, and the corrected twin.
 
     Raises
     ------
@@ -128,14 +121,14 @@ def diagnose(
     started = time.perf_counter()
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        if (bad := _unusable(machine, recordings, configurations, started)) is not None:
+        if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
             return Diagnosis(bad, machine, None, configurations[0])
         others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
             require_fit(machine, recording, configuration)
         evidence = Evidence(machine, recordings, configurations)
         apart = Evidence(machine, held_out, others) if held_out else None
-        return _diagnose(evidence, apart, tests, progress, started)
+        return _diagnose(evidence, apart, tests, progress, thresholds, started)
 
 
 def _diagnose(
@@ -143,47 +136,53 @@ def _diagnose(
     held_out: Evidence | None,
     tests: Sequence[Experiment],
     progress: Callable[[str, int], object],
+    thresholds: Thresholds,
     started: float,
 ) -> Diagnosis:
-    found = attribute(evidence, lambda steps: progress("fitting effects", steps))
+    found = attribute(evidence, lambda steps: progress("fitting effects", steps), thresholds)
     best = (
         found.best.fit
         if found.best is not None
         else Fit((), (), found.nothing.misfit, (), evidence.plant)
     )
-    notes = [*_notes(evidence.recordings), *_clipped(evidence)]
+    notes = [*_notes(evidence.recordings), *_clipping_notes(evidence)]
     progress("judging on held-out data", 1)
-    verdict_of_data = judged(evidence, best, held_out)
-    if verdict_of_data.fit is not None:
-        best = verdict_of_data.fit
-    if verdict_of_data.rejected:
-        names = " and ".join(effect.name for effect in verdict_of_data.rejected)
+    validation = validate(evidence, best, held_out, thresholds)
+    if validation.fit is not None:
+        best = validation.fit
+    if validation.rejected:
+        names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
-    plant = with_effects(evidence.plant, best, verdict_of_data.kept)
+    plant = with_effects(evidence.plant, best, validation.kept)
     progress("looking where", 1)
-    disturbed = located(evidence, plant, verdict_of_data.kept, follow=found.unknown)
-    left = best.misfit if verdict_of_data.kept == best.effects else found.nothing.misfit
+    disturbed = locate_disturbance(evidence, plant, validation.kept, follow=found.unknown)
+    left = best.misfit if validation.kept == best.effects else found.nothing.misfit
     something = (
         found.unknown
-        or bool(verdict_of_data.rejected)
-        or (left - disturbed[0].misfit) > SOMETHING * found.expected
+        or bool(validation.rejected)
+        or (left - disturbed[0].misfit) > thresholds.something * found.expected
     )
     deviations = _deviations(evidence)
-    sampled = outstanding(
-        evidence.machine, evidence.recordings, evidence.predicted(plant), evidence.plant
+    sampled = find_outstanding(
+        evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )
-    attributed = _findings(found, verdict_of_data, evidence)
-    # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed to be the cause.
-    lost = missed(evidence, best) if evidence.machine.rough else {}
+    attributed = _findings(found, validation, evidence, thresholds)
+    # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed
+    # to be the cause.
+    lost = power_without_each(evidence, best) if evidence.machine.rough else {}
     traces = tuple(
         each
         for each in attributed
-        if lost and each.share < TRACE and lost[str(each.name)] < NOTICED
+        if lost and each.share < thresholds.trace and lost[str(each.name)] < thresholds.noticed
     )
     effects = [
         *(each for each in attributed if each not in traces),
-        *(_sampled(each, evidence) for each in sampled),
-        *(_deviation(each) for each in deviations if each.kind != "unknown"),
+        *(_sensor_finding(each, evidence, thresholds.sure) for each in sampled),
+        *(
+            _controller_finding(each, thresholds.sure)
+            for each in deviations
+            if each.kind != "unknown"
+        ),
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
     verdict: Verdict
@@ -192,8 +191,8 @@ def _diagnose(
     else:
         verdict = "unknown" if something or odd_controller else "no gap"
     small = {str(each.name) for each in traces}
-    claimed = tuple(effect for effect in verdict_of_data.kept if effect.name not in small)
-    where = _where(evidence, found, plant, claimed, disturbed if something else (), best)
+    claimed = tuple(effect for effect in validation.kept if effect.name not in small)
+    where = _places(evidence, found, plant, claimed, disturbed if something else (), best)
     if odd_controller:
         where.append(
             Place(
@@ -205,10 +204,10 @@ def _diagnose(
             )
         )
     progress("replaying components", 1)
-    gap = _gap(evidence, plant, verdict_of_data, sampled)
+    gap = _gap(evidence, plant, validation, sampled)
     progress("choosing the next test", 1)
-    suggestion = _next(evidence.machine, found, effects, verdict_of_data.kept, tests)
-    corrected = _corrected(evidence.configurations[0], plant, sampled)
+    suggestion = _next_test(evidence.machine, found, effects, validation.kept, tests, thresholds)
+    corrected = _correct(evidence.configurations[0], plant, sampled)
     rough = evidence.machine.rough
     gone = verdict == "no gap"
     answer = Answer(
@@ -221,30 +220,39 @@ def _diagnose(
             (" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]
         ),
         next_test=suggestion,
-        not_observable=_unseen(found, attributed),
+        not_observable=_unobservable_effects(found, attributed),
         notes=tuple(notes),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
         steps=steps(evidence, () if gone else found.chain, held_out or evidence) if rough else (),
         units={row.name: row.unit for row in evidence.machine.rows},
-        leftovers=tuple(leftovers(evidence, plant, disturbed)) if rough and not gone else (),
+        leftovers=tuple(leftovers(evidence, plant, disturbed, thresholds))
+        if rough and not gone
+        else (),
         traces=traces,
     )
     return Diagnosis(
-        answer, evidence.machine, evidence, corrected, _otherwise(found, verdict_of_data.kept)
+        answer,
+        evidence.machine,
+        evidence,
+        corrected,
+        _alternatives(found, validation.kept, thresholds.possible),
     )
 
 
-def _otherwise(found: Attribution, kept: Sequence[Effect]) -> tuple[tuple[Fit, float], ...]:
-    """Explanations other than the one that is named, the likeliest first."""
+def _alternatives(
+    found: Attribution, kept: Sequence[Effect], least: float
+) -> tuple[tuple[Fit, float], ...]:
+    """Explanations other than the one that is named, of that probability at least, the
+    likeliest first."""
     others = [
         each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)
     ]
-    return tuple((each.fit, each.probability) for each in others if each.probability >= POSSIBLE)
+    return tuple((each.fit, each.probability) for each in others if each.probability >= least)
 
 
-def _clipped(evidence: Evidence) -> list[str]:
+def _clipping_notes(evidence: Evidence) -> list[str]:
     return [
         f"{recording.path.name}: {fault.message}; those ticks are left out"
         for recording, configuration in zip(
@@ -270,14 +278,17 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
     return list(found.values())
 
 
-def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[Finding]:
+def _findings(
+    found: Attribution, outcome: Validation, evidence: Evidence, thresholds: Thresholds
+) -> list[Finding]:
     if found.best is None:
         return []
     fit = outcome.fit or found.best.fit
     widths = [
         tuple(
-            # A rough model's error is no noise: how far it leads astray shows between one half of the data and the other.
-            max(width, abs(one - other) / WIDER) if evidence.machine.rough else width
+            # A rough model's error is no noise: how far it leads astray shows between one half of
+            # the data and the other.
+            max(width, abs(one - other) / thresholds.wider) if evidence.machine.rough else width
             for width, one, other in zip(
                 own, *(half.values[number] for half in outcome.halves), strict=True
             )
@@ -286,13 +297,14 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
         else own
         for number, own in enumerate(fit.widths)
     ]
-    surest = SURE if len(fit.effects) == 1 and not found.unknown else LESS_SURE
+    alone = len(fit.effects) == 1 and not found.unknown
+    surest = thresholds.sure if alone else thresholds.less_sure
     return [
         Finding(
             Name(effect.component, effect.kind.name),
-            estimates(effect, values, spread, evidence),
+            estimates(effect, values, spread, evidence, thresholds.wider),
             min(surest, _probability(found.ranking, effect)),
-            _class(found.ranking, found.best, effect),
+            _equivalence_class(found.ranking, found.best, effect, thresholds.member),
             min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
             effect.kind.title,
         )
@@ -302,18 +314,39 @@ def _findings(found: Attribution, outcome: Judged, evidence: Evidence) -> list[F
 
 
 def estimates(
-    effect: Effect, values: Sequence[float], widths: Sequence[float], evidence: Evidence
+    effect: Effect,
+    values: Sequence[float],
+    widths: Sequence[float],
+    evidence: Evidence,
+    wider: float = STANDARD.wider,
 ) -> dict[str, Estimate]:
-    """The parameters of an effect as fitted, with their intervals."""
+    """The parameters of an effect as fitted, with their intervals.
+
+    Parameters
+    ----------
+    effect
+        That was fitted.
+    values, widths
+        Of its parameters, and their standard deviations.
+    evidence
+        That it was fitted to.
+    wider
+        Standard deviations to either side.
+
+    Returns
+    -------
+    dict
+        Parameter → estimate.
+    """
     nominal = effect.nominal(evidence.plant)
     # A delay cannot be known better than when in a tick the samples were taken.
     timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
-    least = {"delay": timing / WIDER}
+    least = {"delay": timing / wider}
     return {
         name: Estimate(
             value,
-            max(value - WIDER * max(width, least.get(name, 0.0)), quantity.low),
-            min(value + WIDER * max(width, least.get(name, 0.0)), quantity.high),
+            max(value - wider * max(width, least.get(name, 0.0)), quantity.low),
+            min(value + wider * max(width, least.get(name, 0.0)), quantity.high),
             nominal[name],
             evidence.machine.unit(effect.group, quantity),
         )
@@ -327,13 +360,15 @@ def _probability(ranking: Sequence[Explanation], effect: Effect) -> float:
     return float(sum(each.probability for each in ranking if effect in each.fit.effects))
 
 
-def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) -> tuple[Name, ...]:
+def _equivalence_class(
+    ranking: Sequence[Explanation], best: Explanation, effect: Effect, least: float
+) -> tuple[Name, ...]:
     """Effects that stand in this one's place in other likely explanations."""
     names = [Name(effect.component, effect.kind.name)]
     rest = [other for other in best.fit.effects if other != effect]
     for each in ranking:
         if (
-            each.probability < MEMBER
+            each.probability < least
             or len(each.fit.effects) != len(best.fit.effects)
             or effect in each.fit.effects
         ):
@@ -344,37 +379,37 @@ def _class(ranking: Sequence[Explanation], best: Explanation, effect: Effect) ->
     return tuple(dict.fromkeys(names))
 
 
-def _sampled(each: Sampled, evidence: Evidence) -> Finding:
+def _sensor_finding(each: SensorProperty, evidence: Evidence, sure: float) -> Finding:
     effect = find(f"{each.kind}@{each.component}", evidence.plant)
     unit = evidence.machine.unit(effect.group, effect.quantities()[each.parameter])
     spread = 0.05 * each.value
     estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
     name = Name(each.component, each.kind)
-    return Finding(name, {each.parameter: estimate}, SURE, (name,), 1.0, effect.kind.title)
+    return Finding(name, {each.parameter: estimate}, sure, (name,), 1.0, effect.kind.title)
 
 
-def _deviation(each: Deviation) -> Finding:
+def _controller_finding(each: Deviation, sure: float) -> Finding:
     name = Name("controller", each.kind)
     spread = 1e-3 * abs(each.used)
     estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
-    return Finding(name, {each.name: estimate}, SURE, (name,), 1.0, title(each.kind))
+    return Finding(name, {each.name: estimate}, sure, (name,), 1.0, title(each.kind))
 
 
-def _where(
+def _places(
     evidence: Evidence,
     found: Attribution,
     plant: Plant,
     kept: tuple[Effect, ...],
-    disturbed: tuple[Disturbed, ...],
+    disturbed: tuple[DisturbanceFit, ...],
     best: Fit,
 ) -> list[Place]:
     places: dict[str, Place] = {}
-    own = evidence.predicted(plant)
+    own = evidence.predict(plant)
     for effect in kept:
         without = with_effects(evidence.plant, best, [other for other in kept if other != effect])
-        change: list[Array] = [a - b for a, b in zip(own, evidence.predicted(without), strict=True)]
+        change: list[Array] = [a - b for a, b in zip(own, evidence.predict(without), strict=True)]
         share = min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0)
-        place = placed(evidence, effect.component, share, change)
+        place = locate(evidence, effect.component, share, change)
         places[effect.name] = replace(place, evidence=f"{effect.kind.title}: {place.evidence}")
     if disturbed:
         foremost = disturbed[0]
@@ -385,14 +420,16 @@ def _where(
             else "what is left has no plain form"
         )
         left = evidence.differences(plant)
-        place = placed(evidence, foremost.component, share, left, words)
+        place = locate(evidence, foremost.component, share, left, words)
         if all(place.component != foremost.component for place in places.values()):
             places["left"] = place
     return sorted(places.values(), key=lambda place: -place.share)
 
 
-def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sampled]) -> Gap:
-    corrected = _corrected(evidence.configurations[0], plant, sampled)
+def _gap(
+    evidence: Evidence, plant: Plant, outcome: Validation, sampled: Sequence[SensorProperty]
+) -> Gap:
+    corrected = _correct(evidence.configurations[0], plant, sampled)
     replays, loop = compute_levels(evidence, plant, corrected)
     return Gap(
         before=gap_level(evidence, evidence.plant),
@@ -406,34 +443,46 @@ def _gap(evidence: Evidence, plant: Plant, outcome: Judged, sampled: Sequence[Sa
     )
 
 
-def _corrected(nominal: Configuration, plant: Plant, sampled: Sequence[Sampled]) -> Configuration:
+def _correct(
+    nominal: Configuration, plant: Plant, sampled: Sequence[SensorProperty]
+) -> Configuration:
     for each in sampled:
         plant = with_parameters(plant, each.component, {each.parameter: each.value})
     return nominal._replace(plant=plant)
 
 
-def _next(
+def _next_test(
     machine: Machine,
     found: Attribution,
     effects: Sequence[Finding],
     kept: tuple[Effect, ...],
     tests: Sequence[Experiment],
+    thresholds: Thresholds,
 ) -> NextTest | None:
     if not tests or found.best is None or not kept:
         return None
-    likely = [each.fit for each in found.ranking if each.fit.effects and each.probability >= MEMBER]
+    likely = [
+        each.fit
+        for each in found.ranking
+        if each.fit.effects and each.probability >= thresholds.member
+    ]
     if (
-        all(effect.confidence >= UNSURE and len(effect.alternatives) == 1 for effect in effects)
+        all(
+            effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
+            for effect in effects
+        )
         or len(likely) < 2
     ):
         return None
-    return proposed(
+    return propose_test(
         machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests
     )
 
 
-def _unseen(found: Attribution, effects: Sequence[Finding]) -> tuple[Unseen, ...]:
+def _unobservable_effects(
+    found: Attribution, effects: Sequence[Finding]
+) -> tuple[Unobservable, ...]:
     why = "no size tried changes these data by more than their noise"
     named = {(effect.name.component, effect.name.kind) for effect in effects}
-    unseen = [Unseen(effect.component, effect.kind.name, why) for effect in found.silent]
+    unseen = [Unobservable(effect.component, effect.kind.name, why) for effect in found.silent]
     return tuple(each for each in unseen if (each.component, each.kind) not in named)

@@ -1,8 +1,10 @@
-"""What recordings say of a plant: the difference between predicted and measured sensors, whitened, frequency by frequency.
+"""What recordings say of a plant: the difference between predicted and measured sensors, whitened,
+frequency by frequency.
 
-Commands are known exactly, so whatever a plant's prediction leaves is noise or a gap. Each line of the difference's
-spectrum is weighed by what may be there without meaning: the sensor's white noise, estimated from the data, and a small
-share of the signal, since no model is exact. The mains line says nothing of the plant and is left out.
+Commands are known exactly, so whatever a plant's prediction leaves is noise or a gap. Each line of
+the difference's spectrum is weighed by what may be there without meaning: the sensor's white noise,
+estimated from the data, and a small share of the signal, since no model is exact. The mains line
+says nothing of the plant and is left out.
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ STARTED = 0.7
 UNSEEN = 0.3
 """Share of that which does not count at all."""
 COARSER = 30.0
-"""How much more variance than rounding the prediction shows is put down to a coarse sensor's bits."""
+"""How much more variance than rounding the prediction shows is put down to a coarse sensor's
+bits."""
 COARSE_BIT = 2.0
 """Bits of this many times the noise, which they themselves then are, are seen in the signal."""
 JUMPS = ("force", "command")
@@ -55,10 +58,11 @@ WIDELY = 32
 
 @dataclass(frozen=True)
 class Lines:
-    """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a difference's transform is
-    multiplied by, shape (rows, lines); spread: variance of noise alone in each line, shape (rows, lines); fade: what a
-    difference is multiplied by before, shape (rows, ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape
-    (rows,); bit: size of one of each signal, shape (rows,)."""
+    """One recording in the frequency domain. frequency: Hz, shape (lines,); weight: what a
+    difference's transform is multiplied by, shape (rows, lines); spread: variance of noise alone in
+    each line, shape (rows, lines); fade: what a difference is multiplied by before, shape (rows,
+    ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape (rows,); bit: size of
+    one of each signal, shape (rows,)."""
 
     frequency: Array
     weight: Array
@@ -73,8 +77,8 @@ class Lines:
 def lines(
     machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
 ) -> Lines:
-    """The lines of a recording's signals, and their weights about a plant. counted: how much each tick counts, 0 to 1,
-    shape (ticks,)."""
+    """The lines of a recording's signals, and their weights about a plant. counted: how much each
+    tick counts, 0 to 1, shape (ticks,)."""
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
@@ -86,7 +90,7 @@ def lines(
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     fade = np.stack([_fade(ticks, recording.period) * counted * ~find_cut_off(row) for row in measured])
-    if (carried := model.carried_noise(plant)) is not None:
+    if (carried := model.propagated_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
     weight, spread = np.empty((rows, int(kept.sum()))), np.empty((rows, int(kept.sum())))
@@ -96,24 +100,33 @@ def lines(
         power = np.abs(rfft(swing, length)[kept]) ** 2
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
         if carried is not None:
-            spread[row] += 0.5 * _smoothed(
+            spread[row] += 0.5 * _smooth(
                 np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY
             )
         if machine.rough:
             # A rough model does not know how what it lacks is spread over the lines.
             variance = spread[row] + 0.5 * form**2 * float(np.mean(power)) + 1e-300
         else:
-            variance = spread[row] + 0.5 * form**2 * _smoothed(power) + 1e-300
+            variance = spread[row] + 0.5 * form**2 * _smooth(power) + 1e-300
             # What a signal's swing is held to says nothing of its mean.
             variance[0] = spread[row, 0] + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
     if carried is not None:
         floor = np.sqrt(floor**2 + np.var(carried, axis=1))
     floor = np.maximum(floor, 1e-300)
-    return Lines(frequency[kept], weight, spread, fade, measured, floor, resolution, length)
+    return Lines(
+        frequency=frequency[kept],
+        weight=weight,
+        spread=spread,
+        fade=fade,
+        measured=measured,
+        noise=floor,
+        bit=resolution,
+        length=length,
+    )
 
 
-def _smoothed(power: Array, lines: int = SMOOTHED) -> Array:
+def _smooth(power: Array, lines: int = SMOOTHED) -> Array:
     """Averaged over neighbouring lines to either side."""
     return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
 
@@ -126,7 +139,8 @@ def _fade(ticks: int, period: float) -> Array:
 
 @kernel
 def despike(signal: Array, height: float) -> None:
-    """Replaces what stands out of the median of seven neighbours by more than `height`, in place."""
+    """Replaces what stands out of the median of seven neighbours by more than `height`, in
+    place."""
     ticks = len(signal)
     if ticks < 7:
         return
@@ -157,8 +171,9 @@ def despike(signal: Array, height: float) -> None:
 class Evidence:
     """Recordings of one rig, and how far a plant's predictions are from them.
 
-    Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if nothing but white noise is
-    left. Several recordings stand one after another. models: under each one's inputs.
+    Residuals are whitened: of unit variance at most if the plant is right. expected: their χ² if
+    nothing but white noise is left. Several recordings stand one after another. models: under each
+    one's inputs.
     """
 
     def __init__(
@@ -169,8 +184,8 @@ class Evidence:
         counted: Sequence[Array] | None = None,
         steps: int = 4,
     ) -> None:
-        """configurations: of the twin, one for each recording, alike in their plant; counted: how much each tick counts, 0
-        to 1; steps: of integration a tick."""
+        """configurations: of the twin, one for each recording, alike in their plant; counted: how
+        much each tick counts, 0 to 1; steps: of integration a tick."""
         counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.machine, self.recordings, self.configurations = (
             machine,
@@ -190,7 +205,7 @@ class Evidence:
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
         for each, recording, predicted in zip(
-            self.lines, self.recordings, self.predicted(self.plant), strict=True
+            self.lines, self.recordings, self.predict(self.plant), strict=True
         ):
             for row, expected in zip(each.measured, predicted, strict=True):
                 row -= (row - expected) - remove_mains(
@@ -206,7 +221,7 @@ class Evidence:
             self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
         self._counted = counted
 
-    def expected_at(self, plant: Plant) -> float:
+    def expected_misfit(self, plant: Plant) -> float:
         """The same about another plant, where the noise of what drives the model may do more."""
         if not self.machine.rough:
             return self.expected
@@ -220,24 +235,27 @@ class Evidence:
             )
         return self.expected + more
 
-    def coarser(self) -> Evidence:
+    def halve_steps(self) -> Evidence:
         """The same with half as many integration steps: for a search, not for its result."""
         like = copy(self)
-        like.models = [model.coarser() for model in self.models]
+        like.models = [model.halve_steps() for model in self.models]
         return like
 
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
         for each, model in zip(self.lines, self.models, strict=True):
-            change = each.fade * (model.sensed(self.plant) - model.finer().sensed(self.plant))
+            change = each.fade * (
+                model.predict(self.plant) - model.double_steps().predict(self.plant)
+            )
             power = np.abs(rfft(change, each.length, axis=1)[:, : len(each.frequency)]) ** 2
             for row in range(len(self.names)):
-                variance = COARSE * 0.5 * _smoothed(power[row])
+                variance = COARSE * 0.5 * _smooth(power[row])
                 each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def _round(self) -> None:
-        """Adds what the bits of a coarse sensor leave, which is no white noise but follows the signal."""
-        for each, predicted in zip(self.lines, self.predicted(self.plant), strict=True):
+        """Adds what the bits of a coarse sensor leave, which is no white noise but follows the
+        signal."""
+        for each, predicted in zip(self.lines, self.predict(self.plant), strict=True):
             for row in range(len(self.names)):
                 bit = float(each.bit[row])
                 if bit > COARSE_BIT * each.noise[row]:
@@ -245,19 +263,20 @@ class Evidence:
                         np.round(predicted[row] / bit) * bit - predicted[row]
                     )
                     power = np.abs(rfft(rounded, each.length))[: len(each.frequency)] ** 2
-                    variance = 0.5 * COARSER * _smoothed(power)
+                    variance = 0.5 * COARSER * _smooth(power)
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
-    def predicted(self, plant: Plant) -> list[Array]:
+    def predict(self, plant: Plant) -> list[Array]:
         """The sensors of every recording, shape (rows, ticks) each."""
-        return [model.sensed(plant) for model in self.models]
+        return [model.predict(plant) for model in self.models]
 
     def differences(self, plant: Plant) -> list[Array]:
-        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that changes sign a tick early
-        or late leaves says nothing of its size, and jumps when anything changes."""
-        return self._despiked(self.predicted(plant))
+        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that
+        changes sign a tick early or late leaves says nothing of its size, and jumps when anything
+        changes."""
+        return self._subtract(self.predict(plant))
 
-    def _despiked(self, predictions: Sequence[Array]) -> list[Array]:
+    def _subtract(self, predictions: Sequence[Array]) -> list[Array]:
         found = []
         for each, predicted in zip(self.lines, predictions, strict=True):
             difference = each.measured - predicted
@@ -267,7 +286,7 @@ class Evidence:
             found.append(difference)
         return found
 
-    def whitened(self, differences: Sequence[Array]) -> Array:
+    def whiten(self, differences: Sequence[Array]) -> Array:
         """Differences in the time domain, shape (rows, ticks) each, as one whitened vector."""
         return np.concatenate(
             [
@@ -287,35 +306,36 @@ class Evidence:
 
     def residual(self, plant: Plant) -> Array:
         """Measured less predicted."""
-        return self.whitened(self.differences(plant))
+        return self.whiten(self.differences(plant))
 
-    def unlike(self, predictions: Sequence[Array]) -> Array:
+    def residual_of(self, predictions: Sequence[Array]) -> Array:
         """The residual of predictions, shape (rows, ticks) each, however they were made."""
-        return self.whitened(self._despiked(predictions))
+        return self.whiten(self._subtract(predictions))
 
     def width(self, tolerance: Tolerance) -> float:
         """A tolerance's half width here, in its parameter's unit."""
         return tolerance.width(self.plant, self.recordings[0].period)
 
-    def shifted(self, plant: Plant, widths: Sequence[float]) -> Plant:
+    def shift(self, plant: Plant, widths: Sequence[float]) -> Plant:
         """The plant with each tolerance used by so many half widths."""
         for tolerance, share in zip(self.machine.tolerances, widths, strict=True):
             if share:
-                plant = tolerance.shifted(plant, share * self.width(tolerance))
+                plant = tolerance.shift(plant, share * self.width(tolerance))
         return plant
 
-    def nuisances(self, plant: Plant) -> Array:
-        """What each tolerance's half width does to the prediction at a plant, shape (size, tolerances)."""
-        before = self.predicted(plant)
+    def tolerance_responses(self, plant: Plant) -> Array:
+        """What each tolerance's half width does to the prediction at a plant, shape (size,
+        tolerances)."""
+        before = self.predict(plant)
         columns = []
         for tolerance in self.machine.tolerances:
             width = self.width(tolerance)
-            after, scale = self.predicted(tolerance.shifted(plant, width)), 1.0
+            after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
             if tolerance.mechanical and width > 0.0:
                 # Friction answers a change unevenly: from both sides, half of it is gone.
-                start, scale = self.predicted(tolerance.shifted(plant, -width)), 0.5
+                start, scale = self.predict(tolerance.shift(plant, -width)), 0.5
             columns.append(
-                self.whitened([scale * (b - a) for a, b in zip(start, after, strict=True)])
+                self.whiten([scale * (b - a) for a, b in zip(start, after, strict=True)])
             )
         return np.stack(columns, axis=1)

@@ -32,9 +32,10 @@ class Name:
 
 @dataclass(frozen=True)
 class Finding:
-    """One effect. confidence: probability that it is this one; alternatives: the effects that these data cannot tell from it,
-    itself first (`class` in JSON); share: of the gap, what would come back without it; for an effect read off a sensor or the
-    controller alone, of that one's own gap; title: its kind in a sentence."""
+    """One effect. confidence: probability that it is this one; alternatives: the effects that these
+    data cannot tell from it, itself first (`class` in JSON); share: of the gap, what would come
+    back without it; for an effect read off a sensor or the controller alone, of that one's own gap;
+    title: its kind in a sentence."""
 
     name: Name
     parameters: dict[str, Estimate]
@@ -46,7 +47,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a gap lies. band_hz: where the middle 80 % of its power lies; region: of operation; evidence: in words."""
+    """Where a gap lies. band_hz: where the middle 80 % of its power lies; region: of operation;
+    evidence: in words."""
 
     component: str
     share: float
@@ -75,10 +77,11 @@ class Level:
 
 @dataclass(frozen=True)
 class Gap:
-    """before, after, floor: rms of all sensors less what the twin predicts from the commands, in units of their white noise.
-    shrinkage: share of the gap above the floor that the correction closes, predicted from the data of the fit, and achieved on
-    data held out of it. replays: each component's own; closed_loop: dB between the spectra of the recording and of the twin's
-    own run, which no phase of a limit cycle changes."""
+    """before, after, floor: rms of all sensors less what the twin predicts from the commands, in
+    units of their white noise. shrinkage: share of the gap above the floor that the correction
+    closes, predicted from the data of the fit, and achieved on data held out of it. replays: each
+    component's own; closed_loop: dB between the spectra of the recording and of the twin's own run,
+    which no phase of a limit cycle changes."""
 
     before: float
     after: float
@@ -92,7 +95,8 @@ class Gap:
 
 @dataclass(frozen=True)
 class NextTest:
-    """The test that would separate the explanations that remain best. command: ready to run; separates: χ² between them."""
+    """The test that would separate the explanations that remain best. command: ready to run;
+    separates: χ² between them."""
 
     experiment: str
     command: str
@@ -101,7 +105,7 @@ class NextTest:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class Unobservable:
     """An effect that these data could not show, and why."""
 
     component: str
@@ -111,8 +115,8 @@ class Unseen:
 
 @dataclass(frozen=True)
 class Step:
-    """One effect more. added: its name, or of all that changed; values: of its parameters then; left: rms of what each
-    signal has left, in its unit, on the data that it is judged on."""
+    """One effect more. added: its name, or of all that changed; values: of its parameters then;
+    left: rms of what each signal has left, in its unit, on the data that it is judged on."""
 
     added: str
     values: dict[str, Estimate]
@@ -121,9 +125,10 @@ class Step:
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """The whole answer. ranking: explanations with their probability, the likeliest first; notes: what people should know;
-    steps: what each effect changed as they were found one after another, the nominal machine first; units: of their signals;
-    leftovers: where what is still left lies; traces: effects that close a little more of the gap, too small to be claimed."""
+    """The whole answer. ranking: explanations with their probability, the likeliest first; notes:
+    what people should know; steps: what each effect changed as they were found one after another,
+    the nominal machine first; units: of their signals; leftovers: where what is still left lies;
+    traces: effects that close a little more of the gap, too small to be claimed."""
 
     verdict: Verdict
     sentence: str
@@ -132,7 +137,7 @@ class Answer:
     gap: Gap | None = None
     ranking: tuple[tuple[str, float], ...] = ()
     next_test: NextTest | None = None
-    not_observable: tuple[Unseen, ...] = ()
+    not_observable: tuple[Unobservable, ...] = ()
     faults: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     recordings: tuple[str, ...]

@@ -1,4 +1,5 @@
-"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their prior beside them."""
+"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their
+prior beside them."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ REFINED = 3
 WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
 LOOKALIKES, RESEMBLES = 3, 0.6
-"""Effects that are tried in another's place at most, if they can explain this share of what it does."""
+"""Effects that are tried in another's place at most, if they can explain this share of what it
+does."""
 LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
 NOTHING = 1e-3
@@ -41,8 +43,8 @@ Values = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their prior; widths: standard
-    deviation of each value; plant: with them."""
+    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their
+    prior; widths: standard deviation of each value; plant: with them."""
 
     effects: tuple[Effect, ...]
     values: Values
@@ -56,22 +58,23 @@ class Fit:
 
 
 def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
-    """The plant with effects of these values, one tuple an effect in the order of its parameters."""
+    """The plant with effects of these values, one tuple an effect in the order of its
+    parameters."""
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
         plant = with_parameters(plant, effect.group, changes)
     return plant
 
 
-def clashing(effect: Effect, others: Sequence[Effect]) -> bool:
+def clashes(effect: Effect, others: Sequence[Effect]) -> bool:
     """Whether an effect sets a parameter that another sets too."""
     own = set(effect.kind.parameters)
     return any(other.group == effect.group and own & set(other.kind.parameters) for other in others)
 
 
-def possible(effects: Sequence[Effect], plant: Plant) -> bool:
-    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is nothing without its dry
-    friction."""
+def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
+    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is
+    nothing without its dry friction."""
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide
@@ -93,7 +96,8 @@ def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]
 
 
 class Space:
-    """The tolerances about one plant: what they can take up of a residual at what price, none beyond its bound."""
+    """The tolerances about one plant: what they can take up of a residual at what price, none
+    beyond its bound."""
 
     def __init__(
         self,
@@ -102,8 +106,9 @@ class Space:
         used: Array | None = None,
         effects: Sequence[Effect] = (),
     ) -> None:
-        """used: by how many half widths the plant already uses each tolerance. An effect's own parameters have none."""
-        self._columns = evidence.nuisances(plant)
+        """used: by how many half widths the plant already uses each tolerance. An effect's own
+        parameters have none."""
+        self._columns = evidence.tolerance_responses(plant)
         machine = evidence.machine
         own = [
             machine.tolerance_of(effect.group, parameter)
@@ -120,7 +125,7 @@ class Space:
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
-    def nuisances(self, residual: Array) -> Array:
+    def estimate_tolerances(self, residual: Array) -> Array:
         """The tolerances that take up most of a residual, in half widths."""
         wanted = self._columns.T @ (residual + self._taken)
         found = np.zeros(len(wanted))
@@ -135,11 +140,11 @@ class Space:
             free &= ~beyond
         return found
 
-    def less(self, residual: Array) -> Array:
+    def subtract_tolerances(self, residual: Array) -> Array:
         """The residual less what the tolerances take up."""
-        return residual + self._columns @ (self._used - self.nuisances(residual))
+        return residual + self._columns @ (self._used - self.estimate_tolerances(residual))
 
-    def apart(self, responses: Array) -> Array:
+    def project_out(self, responses: Array) -> Array:
         """Responses, shape (size, count), less what tolerances without bounds take up."""
         return responses - self._columns @ np.linalg.solve(
             self._normal, self._columns.T @ responses
@@ -147,14 +152,14 @@ class Space:
 
     def misfit(self, residual: Array) -> float:
         """min over tolerances of |residual − what they do|² + their prior."""
-        found = self.nuisances(residual)
+        found = self.estimate_tolerances(residual)
         left = residual + self._columns @ (self._used - found)
         return float(left @ left + PRIOR * found @ found)
 
     def normal_equations(self, jacobian: Array, residual: Array) -> tuple[Array, Array]:
-        """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's columns, with all
-        tolerances that are not at their bound free beside them."""
-        found = self.nuisances(residual)
+        """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's
+        columns, with all tolerances that are not at their bound free beside them."""
+        found = self.estimate_tolerances(residual)
         free = np.abs(found) < BEYOND
         columns = self._columns[:, free]
         shared = columns.T @ jacobian
@@ -165,8 +170,9 @@ class Space:
 
 
 @dataclass(frozen=True)
-class Hope:
-    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start from; space: tolerances."""
+class Proposal:
+    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start
+    from; space: tolerances."""
 
     promised: float
     effects: tuple[Effect, ...]
@@ -192,7 +198,8 @@ class Fitter:
         return effect.starts(self.plant, own, lambda: self._scale(effect.group))
 
     def _scale(self, component: str) -> Scales:
-        """What a component goes through on these recordings, by the nominal plant and by what is measured of the force."""
+        """What a component goes through on these recordings, by the nominal plant and by what is
+        measured of the force."""
         if component not in self._scales:
             longest = max(
                 range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
@@ -208,9 +215,9 @@ class Fitter:
             )
         return self._scales[component]
 
-    def single(self, effect: Effect) -> Fit:
+    def fit_one(self, effect: Effect) -> Fit:
         """The best fit of one effect."""
-        if not possible((effect,), self.plant):
+        if not is_possible((effect,), self.plant):
             start = self.starts(effect).values
             self._responses[effect] = [
                 (values, np.zeros_like(self._nominal, np.float32)) for values in start
@@ -227,9 +234,10 @@ class Fitter:
             responses.append((start, (self._nominal - residual).astype(np.float32)))
         self._responses[effect] = responses
         if found.quadrature:
-            scored += self._blended(effect, responses)
+            scored += self._blend(effect, responses)
         scored.sort()
-        # Another start is followed too where it comes near the best; where none helps, the best is followed alone.
+        # Another start is followed too where it comes near the best; where none helps, the best is
+        # followed alone.
         enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
         followed = [
             start
@@ -237,17 +245,17 @@ class Fitter:
             if number == 0 or misfit < enough
         ]
         return min(
-            (self.refined((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit
+            (self.refine((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit
         )
 
-    def _blended(
+    def _blend(
         self, effect: Effect, responses: list[tuple[tuple[float, ...], Array]]
     ) -> list[tuple[float, tuple[float, ...]]]:
         """The blends of neighbouring quadratures that promise most, with their misfits."""
-        left = self.space.less(self._nominal)
+        left = self.space.subtract_tolerances(self._nominal)
         blends = []
         for (start, one), (_, other) in zip(responses[::2], responses[1::2], strict=True):
-            apart = self.space.apart(np.stack([one, other], axis=1).astype(np.float64))
+            apart = self.space.project_out(np.stack([one, other], axis=1).astype(np.float64))
             strengths = np.linalg.lstsq(apart, left, rcond=None)[0]
             gain = float(np.sum((apart @ strengths) ** 2))
             amplitude = start[0] * float(np.hypot(*strengths))
@@ -265,17 +273,20 @@ class Fitter:
             for _, start in blends[:REFINED]
         ]
 
-    def largest(self, effect: Effect) -> float:
-        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up."""
+    def largest_response(self, effect: Effect) -> float:
+        """χ² of the most that any size tried of an effect changes, beyond what tolerances take
+        up."""
         return max(
             self.space.misfit(response.astype(np.float64))
             for _, response in self._responses[effect]
         )
 
-    def _beside(self, effect: Effect, first: Fit) -> list[tuple[tuple[float, ...], Array]]:
-        """The responses of an effect: at the nominal plant, or beside `first` if it does nothing without that, as a play does
-        nothing without friction."""
-        if self.largest(effect) > NOTHING:
+    def _responses_beside(
+        self, effect: Effect, first: Fit
+    ) -> list[tuple[tuple[float, ...], Array]]:
+        """The responses of an effect: at the nominal plant, or beside `first` if it does nothing
+        without that, as a play does nothing without friction."""
+        if self.largest_response(effect) > NOTHING:
             return self._responses[effect]
         here = self.evidence.residual(first.plant)
         found = []
@@ -284,19 +295,21 @@ class Fitter:
             found.append((start, (here - there).astype(np.float32)))
         return found
 
-    def seconds(self, first: Fit, effects: Sequence[Effect], least: float) -> list[Hope]:
-        """Second effects beside `first` that promise to explain at least `least`, by how well their responses at the nominal
-        plant, or beside it, resemble what it leaves."""
+    def propose_additions(
+        self, first: Fit, effects: Sequence[Effect], least: float
+    ) -> list[Proposal]:
+        """Second effects beside `first` that promise to explain at least `least`, by how well their
+        responses at the nominal plant, or beside it, resemble what it leaves."""
         space = Space(self.evidence, first.plant)
-        left = space.less(self.evidence.residual(first.plant))
+        left = space.subtract_tolerances(self.evidence.residual(first.plant))
         found = []
         for effect in effects:
-            if clashing(effect, first.effects) or not possible(
+            if clashes(effect, first.effects) or not is_possible(
                 (*first.effects, effect), self.plant
             ):
                 continue
-            starts, responses = zip(*self._beside(effect, first), strict=True)
-            apart = space.apart(np.stack(responses, axis=1).astype(np.float64))
+            starts, responses = zip(*self._responses_beside(effect, first), strict=True)
+            apart = space.project_out(np.stack(responses, axis=1).astype(np.float64))
             alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
             # A response may be too strong or too weak, but not the other way round.
             share = np.clip(alike / power, 0.0, 3.0)
@@ -304,22 +317,27 @@ class Fitter:
             best = int(np.argmax(gains))
             if gains[best] > least:
                 promised = first.misfit - float(gains[best])
-                start = self._scaled(effect, starts[best], float(share[best]))
+                start = self._scale_start(effect, starts[best], float(share[best]))
                 found.append(
-                    Hope(promised, (*first.effects, effect), (*first.values, start), space)
+                    Proposal(promised, (*first.effects, effect), (*first.values, start), space)
                 )
         return found
 
-    def _scaled(self, effect: Effect, start: tuple[float, ...], share: float) -> tuple[float, ...]:
-        """A start with that share of its magnitude; limits, which nothing can be scaled from, as they are."""
+    def _scale_start(
+        self, effect: Effect, start: tuple[float, ...], share: float
+    ) -> tuple[float, ...]:
+        """A start with that share of its magnitude; limits, which nothing can be scaled from, as
+        they are."""
         nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
         if effect.kind.name in LIMITS:
             return start
         return (nominal + share * (start[0] - nominal), *start[1:])
 
-    def alike(self, fit: Fit, effects: Sequence[Effect]) -> list[tuple[tuple[Effect, ...], Values]]:
-        """The effects of a fit with each in turn replaced by those whose response is most like its own, and values to start
-        from: what was found first may only resemble what is there."""
+    def propose_replacements(
+        self, fit: Fit, effects: Sequence[Effect]
+    ) -> list[tuple[tuple[Effect, ...], Values]]:
+        """The effects of a fit with each in turn replaced by those whose response is most like its
+        own, and values to start from: what was found first may only resemble what is there."""
         found = []
         here = self.evidence.residual(fit.plant)
         for number in range(len(fit.effects)):
@@ -327,18 +345,18 @@ class Fitter:
             plant = with_values(
                 self.plant, [fit.effects[p] for p in rest], [fit.values[p] for p in rest]
             )
-            own = self.space.apart((self.evidence.residual(plant) - here)[:, None])[:, 0]
+            own = self.space.project_out((self.evidence.residual(plant) - here)[:, None])[:, 0]
             scored = []
             for other in effects:
                 kept = [fit.effects[place] for place in rest]
                 if (
                     other in fit.effects
-                    or clashing(other, kept)
-                    or not possible((*kept, other), self.plant)
+                    or clashes(other, kept)
+                    or not is_possible((*kept, other), self.plant)
                 ):
                     continue
                 starts, responses = zip(*self._responses[other], strict=True)
-                apart = self.space.apart(np.stack(responses, axis=1).astype(np.float64))
+                apart = self.space.project_out(np.stack(responses, axis=1).astype(np.float64))
                 along, power = apart.T @ own, np.maximum(np.sum(apart**2, axis=0), 1e-300)
                 resemblance = np.maximum(along, 0.0) ** 2 / power
                 best = int(np.argmax(resemblance))
@@ -348,7 +366,7 @@ class Fitter:
                         float(resemblance[best]),
                         number,
                         other,
-                        self._scaled(other, starts[best], share),
+                        self._scale_start(other, starts[best], share),
                     )
                 )
             scored.sort(key=lambda item: -item[0])
@@ -359,28 +377,29 @@ class Fitter:
                     found.append((tuple(changed), tuple(values)))
         return found
 
-    def settled(self, fit: Fit) -> Fit:
-        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant itself."""
+    def refit_with_tolerances(self, fit: Fit) -> Fit:
+        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant
+        itself."""
         tolerances = self.evidence.machine.tolerances
         used = np.zeros(len(tolerances))
         space = Space(self.evidence, fit.plant, used, fit.effects)
         residual = self.evidence.residual(fit.plant)
         for _ in range(SETTLING):
-            found = space.nuisances(residual)
+            found = space.estimate_tolerances(residual)
             used = np.array(
                 [share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)]
             )
-            base = self.evidence.shifted(self.plant, used.tolist())
+            base = self.evidence.shift(self.plant, used.tolist())
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
             )
-            fit = self._shaken(self.refined(fit.effects, fit.values, space, base), space, base)
+            fit = self._perturb(self.refine(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
         return fit
 
-    def _shaken(self, fit: Fit, space: Space, base: Plant) -> Fit:
-        """The fit, or a better one a little further away: where a stick begins or is missed, the misfit has a step, and
-        Gauss-Newton does not climb it."""
+    def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
+        """The fit, or a better one a little further away: where a stick begins or is missed, the
+        misfit has a step, and Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):
             nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
             if effect.kind.name in LIMITS:
@@ -398,20 +417,20 @@ class Fitter:
                 ):
                     fit = min(
                         fit,
-                        self.refined(fit.effects, values, space, base),
+                        self.refine(fit.effects, values, space, base),
                         key=lambda each: each.misfit,
                     )
         return fit
 
-    def refined(
+    def refine(
         self,
         effects: tuple[Effect, ...],
         start: Sequence[Sequence[float]],
         space: Space | None = None,
         base: Plant | None = None,
     ) -> Fit:
-        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those about the nominal plant;
-        base: the plant without the effects."""
+        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those
+        about the nominal plant; base: the plant without the effects."""
         space, base = space or self.space, base or self.plant
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)

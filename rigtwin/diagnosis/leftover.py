@@ -9,18 +9,17 @@ import numpy as np
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
-from rigtwin.diagnosis.fit import Fit, Fitter, possible, without_each
-from rigtwin.diagnosis.localisation import placed
-from rigtwin.diagnosis.unknown_input import Disturbed
+from rigtwin.diagnosis.fit import Fit, Fitter, is_possible, without_each
+from rigtwin.diagnosis.localisation import locate
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.unknown_input import DisturbanceFit
 from rigtwin.signals.noise import rms
 
-OUTSTANDING = 1.3
-"""Times its noise from which a signal has something left, if that is more than no model is held to."""
 
-
-def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[Step, ...]:
-    """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal plant first."""
-    found = [Step("nominal", {}, remaining(judged, evidence.plant))]
+def steps(evidence: Evidence, chain: Sequence[Fit], held_out: Evidence) -> tuple[Step, ...]:
+    """The signals' rms left by each fit of a chain on the data that it is judged on, the nominal
+    plant first."""
+    found = [Step("nominal", {}, remaining_rms(held_out, evidence.plant))]
     before: set[str] = set()
     for fit in chain:
         names = {effect.name for effect in fit.effects}
@@ -39,15 +38,15 @@ def steps(evidence: Evidence, chain: Sequence[Fit], judged: Evidence) -> tuple[S
             for part in (f"with {added}" if added else "", f"without {gone}" if gone else "")
             if part
         )
-        found.append(Step(said, values, remaining(judged, fit.plant)))
+        found.append(Step(said, values, remaining_rms(held_out, fit.plant)))
         before = names
     return tuple(found)
 
 
-def remaining(evidence: Evidence, plant: Plant) -> dict[str, float]:
+def remaining_rms(evidence: Evidence, plant: Plant) -> dict[str, float]:
     """rms of what each signal has left, over all recordings."""
     rows: dict[str, float] = {}
-    predicted = evidence.predicted(plant)
+    predicted = evidence.predict(plant)
     for number, name in enumerate(evidence.names):
         parts = [
             (each.measured[number] - model[number])[each.fade[number] > 0.5]
@@ -57,22 +56,29 @@ def remaining(evidence: Evidence, plant: Plant) -> dict[str, float]:
     return rows
 
 
-def missed(evidence: Evidence, fit: Fit) -> dict[str, float]:
-    """Effect → power of what is left without it, the others fitted again, as a multiple of what is left with it."""
+def power_without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
+    """Effect → power of what is left without it, the others fitted again, as a multiple of what is
+    left with it."""
     fitter = Fitter(evidence)
     found = {}
     for effect, others, values in without_each(fit):
-        there = possible(others, evidence.plant)
+        there = is_possible(others, evidence.plant)
         found[effect.name] = (
-            fitter.refined(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
+            fitter.refine(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
         )
     return found
 
 
-def leftovers(evidence: Evidence, plant: Plant, disturbed: Sequence[Disturbed]) -> list[Place]:
-    """Where what is left lies, signal by signal, and what it goes with at the component that explains it best."""
+def leftovers(
+    evidence: Evidence,
+    plant: Plant,
+    disturbed: Sequence[DisturbanceFit],
+    thresholds: Thresholds = STANDARD,
+) -> list[Place]:
+    """Where what is left lies, signal by signal, and what it goes with at the component that
+    explains it best."""
     differences = evidence.differences(plant)
-    levels = remaining(evidence, plant)
+    levels = remaining_rms(evidence, plant)
     found = []
     total = sum(
         (levels[name] / float(evidence.lines[0].noise[n])) ** 2
@@ -87,10 +93,15 @@ def leftovers(evidence: Evidence, plant: Plant, disturbed: Sequence[Disturbed]) 
     for number, (name, row) in enumerate(zip(evidence.names, evidence.machine.rows, strict=True)):
         noise = float(evidence.lines[0].noise[number])
         typical = rms(np.concatenate([each.measured[number] for each in evidence.lines]))
-        if levels[name] < max(OUTSTANDING * noise, evidence.machine.form_of(row) * typical):
+        if levels[name] < max(
+            thresholds.left_over * noise, evidence.machine.form_of(row) * typical
+        ):
             continue
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
         share = (levels[name] / noise) ** 2 / total
-        words = f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} times its noise; {goes_with}"
-        found.append(placed(evidence, name, share, own, words))
+        words = (
+            f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} "
+            f"times its noise; {goes_with}"
+        )
+        found.append(locate(evidence, name, share, own, words))
     return sorted(found, key=lambda place: -place.share)

@@ -1,4 +1,5 @@
-"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and after a correction."""
+"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and
+after a correction."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from rigtwin.diagnosis.finding import Level
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, spectrum
-from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.simulation.runner import simulate, without_limits
 
 COMPONENTS = ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder")
 """Replays whose levels are reported."""
@@ -100,8 +101,8 @@ def _signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
 def _closed_loop(
     recording: Recording, before: Configuration, after: Configuration, own: RigPlant
 ) -> Level | None:
-    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra; None if the test is too
-    short. own: the corrected plant with the noise that the recording has.
+    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra;
+    None if the test is too short. own: the corrected plant with the noise that the recording has.
     """
     if recording.ticks * recording.period < SHORTEST:
         return None
@@ -128,7 +129,11 @@ def _closed_loop(
         found[corrected, SEEDS[0]],
         found[corrected, SEEDS[1]],
     )
-    return Level(_apart(measured, one), _apart(measured, other), _apart(other, again))
+    return Level(
+        _spectral_distance(measured, one),
+        _spectral_distance(measured, other),
+        _spectral_distance(other, again),
+    )
 
 
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
@@ -142,7 +147,7 @@ def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
 
 
 def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
-    return simulated(unlimited(configuration), demands, seed).measurements.T
+    return simulate(without_limits(configuration), demands, seed).measurements.T
 
 
 def _bands(signals: Array, period: float) -> Array:
@@ -158,7 +163,7 @@ def _bands(signals: Array, period: float) -> Array:
     return np.array(rows)
 
 
-def _apart(one: Array, other: Array) -> float:
+def _spectral_distance(one: Array, other: Array) -> float:
     """rms difference in dB over all bands that both have."""
     with np.errstate(divide="ignore", invalid="ignore"):
         decibels = 10.0 * np.log10(one / other)

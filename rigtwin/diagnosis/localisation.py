@@ -33,7 +33,7 @@ TURNED = 0.01
 """Share of the whole motion by which it must go back to have reversed."""
 
 
-def travelled(position: Array) -> Array:
+def distance_since_reversal(position: Array) -> Array:
     """Distance since the last reversal, m, shape (ticks,)."""
     least = TURNED * float(np.ptp(position))
     found = np.empty(len(position))
@@ -51,7 +51,8 @@ def travelled(position: Array) -> Array:
 
 
 def region(difference: Array, motion: Motion, period: float) -> str:
-    """The operating region in which a difference, shape (ticks,), is concentrated, or `throughout`."""
+    """The operating region in which a difference, shape (ticks,), is concentrated, or
+    `throughout`."""
     speed, force, power = motion.speed, motion.force, difference**2
     total = float(np.sum(power))
     if total <= 0.0:
@@ -75,7 +76,7 @@ def region(difference: Array, motion: Motion, period: float) -> str:
         stretch = np.zeros(len(power), bool)
         stretch[start:end] = True
         regions[f"{start * period:.1f} to {end * period:.1f} s"] = stretch
-    after = travelled(motion.position)
+    after = distance_since_reversal(motion.position)
     near = np.sort(after)[
         np.searchsorted(np.cumsum(power[np.argsort(after)]), MOST * total).clip(0, len(power) - 1)
     ]
@@ -93,7 +94,7 @@ def region(difference: Array, motion: Motion, period: float) -> str:
     return name
 
 
-def placed(
+def locate(
     evidence: Evidence, component: str, share: float, differences: list[Array], words: str = ""
 ) -> Place:
     """The place of differences, shape (rows, ticks) for each recording, that a component causes."""

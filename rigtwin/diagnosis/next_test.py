@@ -1,4 +1,5 @@
-"""Which test to run next, where explanations remain: the one whose outcome they predict most differently."""
+"""Which test to run next, where explanations remain: the one whose outcome they predict most
+differently."""
 
 from __future__ import annotations
 
@@ -8,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.description.configuration import Configuration, flattened
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit, Space
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
-from rigtwin.simulation.runner import simulated, unlimited
+from rigtwin.simulation.runner import simulate, without_limits
 
 SEED = 1
 """Of the tests that are tried on the twin, and of the one proposed."""
@@ -29,26 +30,29 @@ def record_on_twin(
     machine: Machine, name: str, configuration: Configuration, demands: np.ndarray
 ) -> Recording:
     """The recording that a test would make on a machine of that configuration."""
-    ran = simulated(unlimited(configuration), demands, SEED)
+    ran = simulate(without_limits(configuration), demands, SEED)
     columns = {
         "/command": dict(zip(Commands._fields, ran.commands.T.copy(), strict=True)),
         "/sensor": dict(zip(Measurements._fields, ran.measurements.T.copy(), strict=True)),
     }
     period = configuration.timing.period
-    controller = flattened(configuration)["controller"]
+    controller = flatten(configuration)["controller"]
     return Recording(
-        Path(name),
-        machine.name,
-        name,
-        period,
-        np.arange(len(ran.commands)) * period,
-        columns,
-        controller,
+        path=Path(name),
+        machine=machine.name,
+        experiment=name,
+        period=period,
+        time=np.arange(len(ran.commands)) * period,
+        columns=columns,
+        controller=controller,
     )
 
 
-def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]) -> NextTest | None:
-    """The test of a menu that separates explanations best; None if none would. fits: the likeliest first."""
+def propose_test(
+    machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment]
+) -> NextTest | None:
+    """The test of a menu that separates explanations best; None if none would. fits: the likeliest
+    first."""
     if len(fits) < 2:
         return None
     best: NextTest | None = None
@@ -61,11 +65,11 @@ def proposed(machine: Machine, fits: Sequence[Fit], tests: Sequence[Experiment])
             machine, [recording], [configuration._replace(plant=fits[0].plant, timing=timing)]
         )
         space = Space(evidence, fits[0].plant)
-        own = evidence.predicted(fits[0].plant)
+        own = evidence.predict(fits[0].plant)
         apart = []
         for other in fits[1:]:
-            difference = [a - b for a, b in zip(own, evidence.predicted(other.plant), strict=True)]
-            apart.append(space.misfit(evidence.whitened(difference)))
+            difference = [a - b for a, b in zip(own, evidence.predict(other.plant), strict=True)]
+            apart.append(space.misfit(evidence.whiten(difference)))
         least = min(apart)
         if least > WORTH and (best is None or least > best.separates):
             best = NextTest(

@@ -43,8 +43,8 @@ class Bar:
 
 
 def bars(answer: Answer) -> list[Bar]:
-    """All sensors together, then each component's replay; widths on a scale common to all, of square roots so that small ones
-    show beside large ones."""
+    """All sensors together, then each component's replay; widths on a scale common to all, of
+    square roots so that small ones show beside large ones."""
     if answer.gap is None:
         return []
     gap = answer.gap
@@ -79,7 +79,8 @@ def _axes(title: str, x: str, y: str) -> tuple[Figure, Any]:
 
 
 def plots(diagnosis: Diagnosis) -> list[str]:
-    """What is left of the sensor with the largest gap by velocity, frequency and time, before and after, as SVG."""
+    """What is left of the sensor with the largest gap by velocity, frequency and time, before and
+    after, as SVG."""
     evidence = diagnosis.evidence
     if evidence is None:
         return []

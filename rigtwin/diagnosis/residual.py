@@ -16,9 +16,10 @@ SIGNIFICANT_DIGITS = 8
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor: what the sensors' white
-    noise alone would leave; ratio: of the two; band_hz: where the middle 80 % of the residual's power lies. unit "1": several
-    outputs together, each in units of its own noise floor, and `outputs` has them apart."""
+    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor:
+    what the sensors' white noise alone would leave; ratio: of the two; band_hz: where the middle 80
+    % of the residual's power lies. unit "1": several outputs together, each in units of its own
+    noise floor, and `outputs` has them apart."""
 
     residual: float
     noise_floor: float
@@ -28,7 +29,7 @@ class Residual:
     outputs: dict[str, Residual] = field(default_factory=dict)
 
 
-def single(difference: Array, floor: float, unit: str, period: float) -> Residual:
+def compute_residual(difference: Array, floor: float, unit: str, period: float) -> Residual:
     """The residual of one output."""
     left = rms(difference)
     return Residual(
@@ -36,7 +37,7 @@ def single(difference: Array, floor: float, unit: str, period: float) -> Residua
     )
 
 
-def together(
+def combine_residuals(
     outputs: dict[str, Residual], differences: dict[str, Array], period: float
 ) -> Residual:
     """Several outputs as one, each in units of its own noise floor."""
@@ -46,7 +47,8 @@ def together(
 
 
 def rounding(recorded: Array) -> float:
-    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit for a column of zeros."""
+    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit
+    for a column of zeros."""
     largest = float(np.max(np.abs(recorded)))
     if largest == 0.0:
         return 1e-12

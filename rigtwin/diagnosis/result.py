@@ -20,9 +20,10 @@ from rigtwin.diagnosis.fit import Fit
 class Diagnosis:
     """Why recordings of a machine and its twin disagree.
 
-    answer: all that is said; described: the machine as described; evidence: None where the data cannot be diagnosed;
-    corrected: the twin of the first recording with what was found; otherwise: other explanations that are not out of the
-    question, with their probability. In a notebook it shows its report.
+    answer: all that is said; described: the machine as described; evidence: None where the data
+    cannot be diagnosed; corrected: the twin of the first recording with what was found; otherwise:
+    other explanations that are not out of the question, with their probability. In a notebook it
+    shows its report.
     """
 
     answer: Answer
@@ -58,12 +59,14 @@ class Diagnosis:
 
     @property
     def machine(self) -> Machine:
-        """The corrected machine: the described one with what was found of plant, sensors and computer."""
+        """The corrected machine: the described one with what was found of plant, sensors and
+        computer."""
         plant = self.corrected.plant
         for effect in self.effects:
             group = GROUPS.get(effect.name.component, "")
             if group and all(name in getattr(plant, group)._fields for name in effect.parameters):
-                # What the computer does late or not at all belongs to the twin as the plant's defects do.
+                # What the computer does late or not at all belongs to the twin as the plant's
+                # defects do.
                 plant = with_parameters(
                     plant, group, {name: each.value for name, each in effect.parameters.items()}
                 )
@@ -78,12 +81,12 @@ class Diagnosis:
         return report.write(Path(path), self)
 
     def save_twin(self, path: str | Path) -> Path:
-        """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be written, or if the data were
-        not fit for a diagnosis."""
+        """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be
+        written, or if the data were not fit for a diagnosis."""
         return calibrated.save(Path(path), self)
 
     def __str__(self) -> str:
-        return text.described(self.answer)
+        return text.describe(self.answer)
 
     def _repr_html_(self) -> str:
         return report.html(self)

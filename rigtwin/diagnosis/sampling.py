@@ -22,7 +22,7 @@ nobody declares exactly."""
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SensorProperty:
     """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value,
     nominal: in the sensor's unit."""
 
@@ -43,7 +43,8 @@ def properties(signal: Array, predicted: Array, period: float, mains: float) -> 
     Parameters
     ----------
     signal, predicted
-        What it read, and what a twin says that it should read, shape (ticks,), in its unit.
+        What it read, and what a twin says that it should
+    read, shape (ticks,), in its unit.
     period
         s, of a tick.
     mains
@@ -61,13 +62,14 @@ def properties(signal: Array, predicted: Array, period: float, mains: float) -> 
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
 
 
-def outstanding(
+def find_outstanding(
     machine: Machine,
     recordings: Sequence[Recording],
     predicted: Sequence[Array],
     plant: Plant,
-) -> tuple[Sampled, ...]:
-    """What stands out of nominal, and of what the other sensors have, where noise is declared.
+) -> tuple[SensorProperty, ...]:
+    """What stands out of nominal, and of what the other sensors have, where noise is
+    declared.
 
     Parameters
     ----------
@@ -91,7 +93,7 @@ def outstanding(
         ]
         table[row.name] = {key: float(np.median([one[key] for one in each])) for key in PROPERTIES}
     possible = {effect.name for effect in machine.effects()}
-    found: list[Sampled] = []
+    found: list[SensorProperty] = []
     for parameter, kind in PROPERTIES.items():
         nominal = {name: float(getattr(getattr(plant, name), parameter)) for name in table}
         # Hum is seen above what white noise alone would show of a line.
@@ -110,5 +112,5 @@ def outstanding(
             others = [other for key, other in ratios.items() if key != name] or [1.0]
             if ratio > OUTSTANDING * max(1.0, float(np.median(others))):
                 value = table[name][parameter]
-                found.append(Sampled(name, kind, parameter, value, nominal[name]))
+                found.append(SensorProperty(name, kind, parameter, value, nominal[name]))
     return tuple(found)

@@ -14,10 +14,13 @@ def number(estimate: Estimate) -> str:
     """A parameter's value with its interval."""
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
     nominal = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}"
-    return f"{estimate.value:.4g}{unit} (95 %: {estimate.low:.4g} to {estimate.high:.4g}), nominal {nominal}"
+    return (
+        f"{estimate.value:.4g}{unit} (95 %: {estimate.low:.4g} "
+        f"to {estimate.high:.4g}), nominal {nominal}"
+    )
 
 
-def described(diagnosis: Answer) -> str:
+def describe(diagnosis: Answer) -> str:
     """The answer, what it rests on, and what to do next."""
     lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
     for fault in diagnosis.faults:
@@ -29,14 +32,16 @@ def described(diagnosis: Answer) -> str:
             lines.append(f"    {name} = {number(estimate)}")
         if len(effect.alternatives) > 1:
             lines.append(
-                f"    these data cannot tell it from {', '.join(str(name) for name in effect.alternatives[1:])}"
+                "    these data cannot tell it from "
+                f"{', '.join(str(name) for name in effect.alternatives[1:])}"
             )
     for effect in diagnosis.traces:
         values = ", ".join(
             f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items()
         )
         lines.append(
-            f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} % of the gap: too little to be claimed"
+            f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} "
+            "% of the gap: too little to be claimed"
         )
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
@@ -49,22 +54,26 @@ def described(diagnosis: Answer) -> str:
     for place in diagnosis.where:
         low, high = place.band_hz
         lines.append(
-            f"  where: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}"
+            f"  where: {place.component}, {place.region}, {low:.3g} "
+            f"to {high:.3g} Hz; {place.evidence}"
         )
     if (gap := diagnosis.gap) is not None:
         lines.append(
-            f"  gap of all sensors: {gap.before:.3g} noise floors before, {gap.after:.3g} after; 1 is noise alone"
+            f"  gap of all sensors: {gap.before:.3g} noise floors "
+            f"before, {gap.after:.3g} after; 1 is noise alone"
         )
         if diagnosis.effects and gap.before > 1.05:
             held = gap.shrinkage_held_out
             lines.append(
-                f"  closes {100 * held.value:.1f} % ({100 * held.low:.1f} to {100 * held.high:.1f}) on {gap.held_out}; "
+                f"  closes {100 * held.value:.1f} % ({100 * held.low:.1f} "
+                f"to {100 * held.high:.1f}) on {gap.held_out}; "
                 f"predicted {100 * gap.shrinkage_predicted:.1f} %"
             )
     for place in diagnosis.leftovers:
         low, high = place.band_hz
         lines.append(
-            f"  left over: {place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}"
+            f"  left over: {place.component}, {place.region}, "
+            f"{low:.3g} to {high:.3g} Hz; {place.evidence}"
         )
     if diagnosis.next_test is not None:
         between = " from ".join(diagnosis.next_test.between[:2])
@@ -80,7 +89,10 @@ def described(diagnosis: Answer) -> str:
 def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
     """The answer in one sentence."""
     if verdict == "no gap":
-        return "No gap: the twin predicts this rig to within its sensors' noise and declared tolerances."
+        return (
+            "No gap: the twin predicts this rig to within its "
+            "sensors' noise and declared tolerances."
+        )
     if verdict == "unknown":
         place = where[0] if where else None
         at = f" at the {place.component.replace('_', ' ')}; {place.evidence}" if place else ""
@@ -95,9 +107,13 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
         article = "an" if title[0] in "aeiou" else "a"
         parts.append(
-            f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} instead of {was} (confidence {likely})"
+            f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} "
+            f"instead of {was} (confidence {likely})"
         )
-    closes = f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} % of the gap on data held out of the fit"
+    closes = (
+        f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} "
+        "% of the gap on data held out of the fit"
+    )
     moves = any(effect.name.kind not in UNMOVING for effect in effects)
     shown = closes if gap.before > 1.05 and moves else ""
     more = "; something that has no name here is left" if verdict == "partly explained" else ""

@@ -1,8 +1,10 @@
-"""Where an effect acts that nobody has a name for: which component, disturbed in any way it could be, explains most.
+"""Where an effect acts that nobody has a name for: which component, disturbed in any way it could
+be, explains most.
 
-Each component gets a set of disturbances at its place, functions of what it goes through: its motion, speed, force, the time.
-Their strengths are fitted together, linearly. A sensor's disturbance shows in that sensor alone; an actuator's moves all that
-hangs on it; a force on what moves shows wherever that motion is seen.
+Each component gets a set of disturbances at its place, functions of what it goes through: its
+motion, speed, force, the time. Their strengths are fitted together, linearly. A sensor's
+disturbance shows in that sensor alone; an actuator's moves all that hangs on it; a force on what
+moves shows wherever that motion is seen.
 """
 
 from __future__ import annotations
@@ -27,9 +29,9 @@ FOLLOWED = 6
 
 
 @dataclass(frozen=True)
-class Disturbed:
-    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the disturbance goes with, the
-    strongest first."""
+class DisturbanceFit:
+    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the
+    disturbance goes with, the strongest first."""
 
     component: str
     misfit: float
@@ -44,7 +46,7 @@ class _Disturbance:
         self.component, self.names = component, [same[0].name for same in forms]
         self._evidence, self._plant = evidence, plant
         self._enter = forms[0][0].entry
-        strength = max(each.strength(self._enter) for each in evidence.models)
+        strength = max(each.disturbance_size(self._enter) for each in evidence.models)
         sizes = [
             float(np.sqrt(np.mean(np.concatenate([form.signal for form in same]) ** 2)))
             for same in forms
@@ -60,18 +62,18 @@ class _Disturbance:
             for number in range(len(evidence.models))
         ]
 
-    def predicted(self, strengths: Array) -> list[Array]:
+    def predict(self, strengths: Array) -> list[Array]:
         """The signals under the disturbance, shape (rows, ticks) for each recording."""
         return [
-            each.disturbed(self._plant, self._enter, strengths @ forms)
+            each.predict_disturbed(self._plant, self._enter, strengths @ forms)
             for each, forms in zip(self._evidence.models, self._forms, strict=True)
         ]
 
-    def fitted(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
+    def fit(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
         """Gauss-Newton: misfit, strengths, and what would be missing without each form."""
         here = np.zeros(len(self.names))
-        predicted = self.predicted(here)
-        residual = self._evidence.unlike(predicted)
+        predicted = self.predict(here)
+        residual = self._evidence.residual_of(predicted)
         misfit, worth = space.misfit(residual), np.zeros_like(here)
         for _ in range(rounds):
             columns = []
@@ -79,8 +81,8 @@ class _Disturbance:
                 there = here.copy()
                 there[number] += 1.0
                 columns.append(
-                    self._evidence.whitened(
-                        [b - a for a, b in zip(predicted, self.predicted(there), strict=True)]
+                    self._evidence.whiten(
+                        [b - a for a, b in zip(predicted, self.predict(there), strict=True)]
                     )
                 )
             normal, gradient = space.normal_equations(np.stack(columns, axis=1), residual)
@@ -88,8 +90,8 @@ class _Disturbance:
             move = np.linalg.solve(normal, gradient)
             gained = 0.0
             for share in (1.0, 0.5, 0.2):
-                tried = self.predicted(here + share * move)
-                left = self._evidence.unlike(tried)
+                tried = self.predict(here + share * move)
+                left = self._evidence.residual_of(tried)
                 if (value := space.misfit(left)) < misfit:
                     gained = misfit - value
                     here, predicted, residual, misfit = here + share * move, tried, left, value
@@ -100,27 +102,34 @@ class _Disturbance:
         return misfit, here, worth
 
 
-def located(
+def locate_disturbance(
     evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True
-) -> tuple[Disturbed, ...]:
-    """Every component disturbed freely, the one that explains most first. plant: with the effects that are known already;
-    follow: fit the foremost anew at what was found, as large disturbances need."""
+) -> tuple[DisturbanceFit, ...]:
+    """Every component disturbed freely, the one that explains most first. plant: with the effects
+    that are known already; follow: fit the foremost anew at what was found, as large disturbances
+    need."""
     space = Space(evidence, plant, None, effects)
     disturbances = [
-        _Disturbance(component, evidence, plant) for component in evidence.models[0].places()
+        _Disturbance(component, evidence, plant) for component in evidence.models[0].components()
     ]
-    found = sorted((_found(each, space, 1) for each in disturbances), key=lambda each: each.misfit)
+    found = sorted(
+        (_fit_component(each, space, 1) for each in disturbances), key=lambda each: each.misfit
+    )
     if follow:
         foremost = [each.component for each in found[:FOLLOWED]]
-        again = [_found(each, space, ROUNDS) for each in disturbances if each.component in foremost]
+        again = [
+            _fit_component(each, space, ROUNDS)
+            for each in disturbances
+            if each.component in foremost
+        ]
         found = sorted([*again, *found[FOLLOWED:]], key=lambda each: each.misfit)
     return tuple(found)
 
 
-def _found(disturbance: _Disturbance, space: Space, rounds: int) -> Disturbed:
-    misfit, _, worth = disturbance.fitted(space, rounds)
+def _fit_component(disturbance: _Disturbance, space: Space, rounds: int) -> DisturbanceFit:
+    misfit, _, worth = disturbance.fit(space, rounds)
     order = np.argsort(-worth)
     forms = tuple(
         dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE)
     )
-    return Disturbed(disturbance.component, misfit + PRICE * len(disturbance.names), forms)
+    return DisturbanceFit(disturbance.component, misfit + PRICE * len(disturbance.names), forms)

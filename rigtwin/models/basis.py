@@ -23,7 +23,7 @@ RELAXATIONS = (0.02, 0.07, 0.25)
 """s; times in which a tyre or a cylinder may relax."""
 TICK_RELAXATIONS = (2.0, 8.0, 30.0, 120.0)
 """Ticks; times in which a part of any machine may relax."""
-Named = Iterator[tuple[str, Array]]
+NamedSignals = Iterator[tuple[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Passage:
         return np.gradient(self.speed, self.period)
 
 
-def relaxed(signal: Array, time_constant: float, period: float) -> Array:
+def low_pass(signal: Array, time_constant: float, period: float) -> Array:
     """The signal through a first-order lag, from where it starts."""
     share = period / (time_constant + period)
     start = [(1.0 - share) * signal[0]]
@@ -54,16 +54,16 @@ def relaxed(signal: Array, time_constant: float, period: float) -> Array:
     return np.asarray(out)
 
 
-def _past(signal: Array, seconds: Sequence[float], period: float) -> Named:
+def _past(signal: Array, seconds: Sequence[float], period: float) -> NamedSignals:
     for each in seconds:
-        yield "its past", relaxed(signal, each, period)
+        yield "its past", low_pass(signal, each, period)
 
 
 def _ticks(period: float) -> list[float]:
     return [ticks * period for ticks in TICK_RELAXATIONS]
 
 
-def _bent(by: Passage) -> Named:
+def _distortion(by: Passage) -> NamedSignals:
     """What a signal may be bent by."""
     time = by.time
     centred = by.signal - np.mean(by.signal)
@@ -79,14 +79,14 @@ def _bent(by: Passage) -> Named:
     yield "its rate of rate", np.gradient(rate, by.period)
 
 
-def _inertial(by: Passage) -> Named:
+def _inertia(by: Passage) -> NamedSignals:
     acceleration = by.acceleration
     yield "acceleration", acceleration
     yield "acceleration growing with time", acceleration * by.time
     yield "acceleration squared", acceleration * np.abs(acceleration)
 
 
-def _rubbed(by: Passage) -> Named:
+def _friction(by: Passage) -> NamedSignals:
     """What dry and viscous friction may go with."""
     sign = np.sign(by.speed)
     yield "speed", by.speed
@@ -96,20 +96,20 @@ def _rubbed(by: Passage) -> Named:
     yield "place", by.position
 
 
-def _motor(by: Passage) -> Named:
-    yield from _bent(by)
-    yield from _rubbed(by)
+def _motor(by: Passage) -> NamedSignals:
+    yield from _distortion(by)
+    yield from _friction(by)
 
 
-def _rail(by: Passage) -> Named:
-    yield from _rubbed(by)
+def _rail(by: Passage) -> NamedSignals:
+    yield from _friction(by)
     sign = np.sign(by.speed)
     for wave in WAVES:
         yield "direction and place", sign * np.sin(2 * np.pi * by.position / wave)
         yield "direction and place", sign * np.cos(2 * np.pi * by.position / wave)
 
 
-def _tyre(by: Passage) -> Named:
+def _tyre(by: Passage) -> NamedSignals:
     deflection, squeeze = by.signal, np.gradient(by.signal, by.period)
     yield "deflection", deflection
     yield "deflection squared", deflection**2
@@ -120,25 +120,25 @@ def _tyre(by: Passage) -> Named:
     yield from _past(deflection, RELAXATIONS, by.period)
 
 
-def _load_cell(by: Passage) -> Named:
-    yield from _bent(by)
+def _load_cell(by: Passage) -> NamedSignals:
+    yield from _distortion(by)
     yield "the carriage's acceleration", by.acceleration
 
 
-def _cylinder(by: Passage) -> Named:
-    yield from _bent(by)
+def _cylinder(by: Passage) -> NamedSignals:
+    yield from _distortion(by)
     yield from _past(by.signal, RELAXATIONS, by.period)
     yield "its load", by.load - np.mean(by.load)
 
 
-def _position(by: Passage) -> Named:
+def _position(by: Passage) -> NamedSignals:
     """A joint's position that is commanded or measured."""
-    yield from _bent(by)
+    yield from _distortion(by)
     yield from _past(by.signal, _ticks(by.period), by.period)
     yield "direction", np.sign(by.speed)
 
 
-def _guide(by: Passage) -> Named:
+def _guide(by: Passage) -> NamedSignals:
     speed, position = by.speed, by.position - np.mean(by.position)
     sign = np.sign(speed)
     typical = float(np.sqrt(np.mean(speed**2))) or 1.0
@@ -160,17 +160,17 @@ def _guide(by: Passage) -> Named:
     yield from _past(speed, _ticks(by.period), by.period)
 
 
-BASES: dict[str, Callable[[Passage], Named]] = {
-    "sensor": _bent,
+BASES: dict[str, Callable[[Passage], NamedSignals]] = {
+    "sensor": _distortion,
     "load cell": _load_cell,
-    "force": _bent,
+    "force": _distortion,
     "position": _position,
     "cylinder": _cylinder,
     "motor": _motor,
     "rail": _rail,
     "guide": _guide,
     "tyre": _tyre,
-    "mass": _inertial,
+    "mass": _inertia,
 }
 """Role of a component → the functions that may disturb it."""
 

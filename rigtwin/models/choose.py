@@ -1,4 +1,5 @@
-"""The model of a machine under one recording's inputs: which one is chosen by the machine's structure alone."""
+"""The model of a machine under one recording's inputs: which one is chosen by the machine's
+structure alone."""
 
 from __future__ import annotations
 
@@ -48,48 +49,50 @@ def model_of(
 
 
 class Joints:
-    """Joints joints of one recording, their rows one after another."""
+    """All joints of one recording, their rows one after another."""
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)
 
-    def sensed(self, plant: Plant) -> Array:
-        return np.concatenate([each.sensed(plant) for each in self._joints])
+    def predict(self, plant: Plant) -> Array:
+        return np.concatenate([each.predict(plant) for each in self._joints])
 
-    def true(self, plant: Plant) -> Array:
-        return np.concatenate([each.true(plant) for each in self._joints])
+    def predict_true(self, plant: Plant) -> Array:
+        return np.concatenate([each.predict_true(plant) for each in self._joints])
 
-    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+    def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         number, _, own = entry.partition(":")
         return np.concatenate(
             [
-                each.disturbed(plant, own, amount) if place == int(number) else each.sensed(plant)
+                each.predict_disturbed(plant, own, amount)
+                if place == int(number)
+                else each.predict(plant)
                 for place, each in enumerate(self._joints)
             ]
         )
 
-    def _of(self, component: str) -> int:
-        return next((n for n, each in enumerate(self._joints) if component in each.places()), 0)
+    def _index_of(self, component: str) -> int:
+        return next((n for n, each in enumerate(self._joints) if component in each.components()), 0)
 
-    def places(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(name for each in self._joints for name in each.places()))
+    def components(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for each in self._joints for name in each.components()))
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
-        number = self._of(component)
+        number = self._index_of(component)
         return [
             Form(each.name, f"{number}:{each.entry}", each.signal)
             for each in self._joints[number].forms(component, plant)
         ]
 
-    def strength(self, entry: str) -> float:
+    def disturbance_size(self, entry: str) -> float:
         number, _, own = entry.partition(":")
-        return self._joints[int(number)].strength(own)
+        return self._joints[int(number)].disturbance_size(own)
 
     def motion(self, component: str, plant: Plant) -> Motion:
-        return self._joints[self._of(component)].motion(component, plant)
+        return self._joints[self._index_of(component)].motion(component, plant)
 
-    def carried_noise(self, plant: Plant) -> Array | None:
-        parts = [each.carried_noise(plant) for each in self._joints]
+    def propagated_noise(self, plant: Plant) -> Array | None:
+        parts = [each.propagated_noise(plant) for each in self._joints]
         if all(part is None for part in parts):
             return None
         ticks = next(part.shape[1] for part in parts if part is not None)
@@ -101,8 +104,8 @@ class Joints:
             ]
         )
 
-    def coarser(self) -> Joints:
-        return Joints([each.coarser() for each in self._joints])
+    def halve_steps(self) -> Joints:
+        return Joints([each.halve_steps() for each in self._joints])
 
-    def finer(self) -> Joints:
-        return Joints([each.finer() for each in self._joints])
+    def double_steps(self) -> Joints:
+        return Joints([each.double_steps() for each in self._joints])

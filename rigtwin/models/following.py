@@ -16,7 +16,7 @@ HELD = 0.5
 
 
 @kernel
-def _followed(
+def _follow_command(
     wanted: Array,
     play: float,
     gain: float,
@@ -27,8 +27,8 @@ def _followed(
     second: Array,
     out: Array,
 ) -> None:
-    """wanted, out: shape (steps,); rate: greatest change a step; shares: of each lag a step; second: transition of the
-    resonance and its entry, shape (2, 3), or of no size."""
+    """wanted, out: shape (steps,); rate: greatest change a step; shares: of each lag a step;
+    second: transition of the resonance and its entry, shape (2, 3), or of no size."""
     passed = wanted[0]
     limited = min(max(gain * passed + offset, -limit), limit)
     one = two = before = limited
@@ -60,10 +60,11 @@ def _followed(
             out[step] = two
 
 
-def followed(
+def follow_command(
     actuator: PositionActuator, command: Array, late: float, period: float, steps: int
 ) -> Array:
-    """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of the computer."""
+    """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of
+    the computer."""
     ticks, h = len(command), period / steps
     count = (ticks - 1) * steps + 1
     time = np.arange(count) * h
@@ -84,15 +85,15 @@ def followed(
         second = np.ascontiguousarray(expm(both * h)[:2])
     out = np.empty(count)
     rate = actuator.rate_limit * h if actuator.rate_limit < UNLIMITED else UNLIMITED
-    _followed(
-        wanted,
-        actuator.deadband,
-        actuator.gain,
-        actuator.offset,
-        actuator.saturation,
-        rate,
-        shares,
-        second,
-        out,
+    _follow_command(
+        wanted=wanted,
+        play=actuator.deadband,
+        gain=actuator.gain,
+        offset=actuator.offset,
+        limit=actuator.saturation,
+        rate=rate,
+        shares=shares,
+        second=second,
+        out=out,
     )
     return np.ascontiguousarray(out[::steps])

@@ -1,8 +1,9 @@
 """One joint's equation of motion: pushed by a force, or moved as prescribed. Compiled.
 
-Dry friction acts through a play and a spring in series with it. Where the description gives no spring it is as stiff as the
-step allows, which holds a sticking joint where it is. The step is implicit in friction and viscous forces, so it neither
-chatters nor creeps; positions are taken at the steps, velocities midway between them.
+Dry friction acts through a play and a spring in series with it. Where the description gives no
+spring it is as stiff as the step allows, which holds a sticking joint where it is. The step is
+implicit in friction and viscous forces, so it neither chatters nor creeps; positions are taken at
+the steps, velocities midway between them.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ import numpy as np
 from controllers.compiled import compilable
 from controllers.formula import Program, run
 from rigtwin.components import Guide
-from rigtwin.components.conditioning import Actuator, ActuatorState, conditioned
-from rigtwin.components.guide import Friction, damping, dry_limits, resting, slid
-from rigtwin.components.sensors import Transducer, TransducerState, transduced
+from rigtwin.components.conditioning import Actuator, ActuatorState, condition
+from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
+from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
@@ -26,8 +27,8 @@ RIGID = 1e6
 
 
 class Inertia(NamedTuple):
-    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions; rest: where the guide's
-    spring is slack."""
+    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions;
+    rest: where the guide's spring is slack."""
 
     mass: float
     first: float
@@ -37,8 +38,9 @@ class Inertia(NamedTuple):
 
 
 class Loop(NamedTuple):
-    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are recorded signals, shape
-    (ticks, inputs), or sensors with `noise` added, of that shape too: sensor[i] is −1 or the number of the sensor that input i comes from."""
+    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are
+    recorded signals, shape (ticks, inputs), or sensors with `noise` added, of that shape too:
+    sensor[i] is −1 or the number of the sensor that input i comes from."""
 
     closed: bool
     program: Program
@@ -60,7 +62,7 @@ def gravity(inertia: Inertia, position: float) -> float:
 
 
 @kernel
-def carried(
+def inverse_dynamics(
     guide: Guide,
     dry_friction: Friction,
     inertia: Inertia,
@@ -69,21 +71,24 @@ def carried(
     motion: Array,
     out: Array,
 ) -> None:
-    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape (3, ticks)."""
+    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape
+    (3, ticks)."""
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
         x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
-        transmitted = inertia.mass * a + gravity(inertia, x) + resting(guide, x, inertia.rest)
+        transmitted = (
+            inertia.mass * a + gravity(inertia, x) + position_force(guide, x, inertia.rest)
+        )
         forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry, by = slid(x - slider, 0.5 * guide.backlash, spring, forward, backward)
+        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
         slider += by
         viscous += share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
 
 
 @kernel
-def pushed(
+def integrate_pushed(
     guide: Guide,
     dry_friction: Friction,
     inertia: Inertia,
@@ -103,9 +108,9 @@ def pushed(
     steps: int,
     out: Array,
 ) -> None:
-    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity; command: as recorded, shape
-    (ticks,), replaced by the controller's if the loop is closed; besides: another force, N; out: position, velocity, force of
-    the actuator, shape (3, ticks)."""
+    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity;
+    command: as recorded, shape (ticks,), replaced by the controller's if the loop is closed;
+    besides: another force, N; out: position, velocity, force of the actuator, shape (3, ticks)."""
     h = period / steps
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0
@@ -120,19 +125,19 @@ def pushed(
                 for each in range(len(sensors)):
                     if each == which:
                         true = x if kinds[each] == 0 else v
-                        sensed = transduced(sensors[each], states[each], true)
+                        sensed = transduce(sensors[each], states[each], true)
                         loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
             earlier = force
-            force = min(max(constant * conditioned(drive, held, command[tick]), -limit), limit)
+            force = min(max(constant * condition(drive, held, command[tick]), -limit), limit)
             coefficient = damping(guide, v)
             # About this position half a step passes under the old force and half under the new one.
             load = (
                 0.5 * (earlier + force)
                 + besides[tick]
                 - gravity(inertia, x)
-                - resting(guide, x, inertia.rest)
+                - position_force(guide, x, inertia.rest)
                 - (1.0 - share) * viscous
             )
             total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
@@ -143,7 +148,7 @@ def pushed(
             if apart > half or apart < -half:
                 edge = math.copysign(half, apart)
                 velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
-                dry, by = slid(x + h * velocity - slider, half, spring, forward, backward)
+                dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
                 if by != 0.0:
                     velocity = (rhs - h * dry) / total
                     slider = x + h * velocity - edge - dry / spring

@@ -1,4 +1,5 @@
-"""A joint replayed: its motion prescribed by a sensor or a position actuator, or pushed by a force actuator."""
+"""A joint replayed: its motion prescribed by a sensor or a position actuator, or pushed by a force
+actuator."""
 
 from __future__ import annotations
 
@@ -13,17 +14,17 @@ from rigtwin.components import (
     PositionSensor,
     measures,
 )
-from rigtwin.components.conditioning import actuator, holding
+from rigtwin.components.conditioning import actuator, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import Sensor, fresh, seen, transducer
+from rigtwin.components.sensors import Sensor, apply_sensor, start_transducer, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.following import followed
-from rigtwin.models.guided import RIGID, Inertia, Loop, carried, pushed
+from rigtwin.models.following import follow_command
+from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -96,18 +97,18 @@ class JointModel:
             and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
         self._last: dict[tuple[object, ...], Array] = {}
-        self._start = self._started()
+        self._start = self._estimate_start()
 
-    def coarser(self) -> JointModel:
+    def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
 
-    def finer(self) -> JointModel:
+    def double_steps(self) -> JointModel:
         return self._with_steps(2 * self._steps)
 
     def _with_steps(self, steps: int) -> JointModel:
         return JointModel(self._machine, self._replay, self._recording, self._configuration, steps)
 
-    def _started(self) -> tuple[float, float]:
+    def _estimate_start(self) -> tuple[float, float]:
         """Position and velocity at the start, as measured."""
         measured = [row.channel for row in self.rows if row.kind == "position"]
         for name in self._sensors:
@@ -140,38 +141,41 @@ class JointModel:
             names += self._sensors
         return tuple(getattr(plant, name) for name in names if name is not None)
 
-    def moved(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
-        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on it, N; shift: of its
-        prescribed motion, m; shape (ticks,)."""
+    def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
+        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on
+        it, N; shift: of its prescribed motion, m; shape (ticks,)."""
         key = self._key(plant)
         if force is None and shift is None and key in self._last:
             return self._last[key]
         mover = getattr(plant, self._mover.name)
         if isinstance(mover, ForceActuator):
-            out = self._pushed(
+            out = self._integrate_pushed(
                 plant, mover, np.zeros(len(self._command)) if force is None else force
             )
         else:
             if isinstance(mover, PositionActuator):
-                position = followed(
+                position = follow_command(
                     mover, self._command, plant.computer.delay, self._period, self._steps
                 )
                 error = 0.0
             else:
-                position = self._unsensed(mover)
+                position = self._undo_sensor(mover)
                 error = 0.0 if self._integrated else self._error / max(mover.gain, 1e-9)
-            out = self._carried(plant, position if shift is None else position + shift, error)
+            out = self._inverse_dynamics(
+                plant, position if shift is None else position + shift, error
+            )
             if force is not None:
                 out[2] -= force
-        # A plant that is not stable runs away; it must be a bad explanation, not an impossible number.
+        # A plant that is not stable runs away; it must be a bad explanation, not an impossible
+        # number.
         out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
-    def _unsensed(self, sensor: Sensor) -> Array:
-        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone. Of a velocity its mean is no
-        motion, as what is tested does not move away."""
+    def _undo_sensor(self, sensor: Sensor) -> Array:
+        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone.
+        Of a velocity its mean is no motion, as what is tested does not move away."""
         assert self._motion is not None
         signal = self._motion
         if sensor.lag > 0.0:
@@ -182,7 +186,7 @@ class JointModel:
         signal = (signal - sensor.offset) / sensor.gain
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
-    def _carried(self, plant: Plant, position: Array, error: float) -> Array:
+    def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
@@ -190,7 +194,15 @@ class JointModel:
         softest = self._softest(guide, inertia, position, acceleration, error)
         out = np.zeros((4, len(position)))
         out[:2] = motion[:2]
-        carried(guide, friction(guide), inertia, 1.0 / softest, self._period, motion, out[2])
+        inverse_dynamics(
+            guide=guide,
+            dry_friction=friction(guide),
+            inertia=inertia,
+            spring=1.0 / softest,
+            period=self._period,
+            motion=motion,
+            out=out[2],
+        )
         return out
 
     def _softest(
@@ -206,8 +218,8 @@ class JointModel:
     def _pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
-        """The joint under its force actuator. besides: another force on it, N, shape (ticks,); noise: of what a controller reads,
-        shape (ticks, inputs)."""
+        """The joint under its force actuator. besides: another force on it, N, shape (ticks,);
+        noise: of what a controller reads, shape (ticks, inputs)."""
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * max(inertia.mass, 1e-12) / h**2
@@ -216,29 +228,29 @@ class JointModel:
         first = float(self._command[0])
         parts = [getattr(plant, name) for name in self._sensors] or [PositionSensor()]
         models = tuple(transducer(part, self._period) for part in parts)
-        states = tuple(fresh(model) for model in models)
+        states = tuple(start_transducer(model) for model in models)
         kinds = np.array([int(measures(part) == "velocity") for part in parts])
         command = self._command.copy()
         out = np.zeros((4, len(command)))
-        pushed(
-            guide,
-            friction(guide),
-            inertia,
-            spring,
-            self._start,
-            mover.constant,
-            min(mover.force_limit, UNLIMITED),
-            conditioning,
-            holding(conditioning, first),
-            models,
-            states,
-            kinds,
-            self._loop(noise),
-            command,
-            np.ascontiguousarray(besides),
-            self._period,
-            self._steps,
-            out,
+        integrate_pushed(
+            guide=guide,
+            dry_friction=friction(guide),
+            inertia=inertia,
+            spring=spring,
+            start=self._start,
+            constant=mover.constant,
+            limit=min(mover.force_limit, UNLIMITED),
+            drive=conditioning,
+            held=hold(conditioning, first),
+            sensors=models,
+            states=states,
+            kinds=kinds,
+            loop=self._loop(noise),
+            command=command,
+            besides=np.ascontiguousarray(besides),
+            period=self._period,
+            steps=self._steps,
+            out=out,
         )
         out[3] = command
         return out
@@ -248,13 +260,13 @@ class JointModel:
         if control is None:
             program = NO_COMMAND.program
             return Loop(
-                False,
-                program,
-                program.registers.copy(),
-                NO_COMMAND.memory(),
-                np.zeros((1, 1)),
-                np.zeros((1, 1)),
-                np.zeros(0, np.int64),
+                closed=False,
+                program=program,
+                registers=program.registers.copy(),
+                memory=NO_COMMAND.memory(),
+                recorded=np.zeros((1, 1)),
+                noise=np.zeros((1, 1)),
+                sensor=np.zeros(0, np.int64),
             )
         program = control.formula.with_settings(self._settings)
         names = [self._machine.components[name].channel for name in self._sensors]
@@ -272,36 +284,42 @@ class JointModel:
         if noise is None:
             noise = np.zeros_like(recorded)
         return Loop(
-            True, program, program.registers.copy(), control.formula.memory(), recorded, noise, which
+            closed=True,
+            program=program,
+            registers=program.registers.copy(),
+            memory=control.formula.memory(),
+            recorded=recorded,
+            noise=noise,
+            sensor=which,
         )
 
-    def true(self, plant: Plant) -> Array:
-        return self._rows(self.moved(plant))
+    def predict_true(self, plant: Plant) -> Array:
+        return self._rows(self.move(plant))
 
     def _rows(self, moved: Array) -> Array:
         places = {"position": 0, "velocity": 1, "force": 2, "command": 3}
         return moved[[places[row.kind] for row in self.rows]]
 
-    def _seen(self, plant: Plant, true: Array) -> Array:
+    def _apply_sensors(self, plant: Plant, true: Array) -> Array:
         found = true.copy()
         for number, row in enumerate(self.rows):
             if row.kind != "command":
-                found[number] = seen(getattr(plant, row.name), true[number], self._period)
+                found[number] = apply_sensor(getattr(plant, row.name), true[number], self._period)
         return found
 
-    def sensed(self, plant: Plant) -> Array:
-        return self._seen(plant, self.true(plant))
+    def predict(self, plant: Plant) -> Array:
+        return self._apply_sensors(plant, self.predict_true(plant))
 
-    def disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+    def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         if entry == "force":
-            return self._seen(plant, self._rows(self.moved(plant, force=amount)))
+            return self._apply_sensors(plant, self._rows(self.move(plant, force=amount)))
         if entry == "motion":
-            return self._seen(plant, self._rows(self.moved(plant, shift=amount)))
-        found = self.sensed(plant)
+            return self._apply_sensors(plant, self._rows(self.move(plant, shift=amount)))
+        found = self.predict(plant)
         found[[row.name for row in self.rows].index(entry)] += amount
         return found
 
-    def places(self) -> tuple[str, ...]:
+    def components(self) -> tuple[str, ...]:
         replay = self._replay
         moving = (
             [replay.guide, replay.mass]
@@ -316,11 +334,11 @@ class JointModel:
         return isinstance(getattr(self._machine.plant, self._mover.name), ForceActuator)
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
-        moved = self.moved(plant)
+        moved = self.move(plant)
         names = [row.name for row in self.rows]
         role, entry, signal = "guide", "force", moved[2]
         if component in names:
-            role, entry, signal = "sensor", component, self.sensed(plant)[names.index(component)]
+            role, entry, signal = "sensor", component, self.predict(plant)[names.index(component)]
         elif component == self._mover.name:
             role, entry, signal = (
                 ("force", "force", moved[2]) if self._free else ("position", "motion", moved[0])
@@ -329,27 +347,28 @@ class JointModel:
             role = "mass"
         return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._period))
 
-    def strength(self, entry: str) -> float:
-        moved = self.moved(self._machine.plant)
+    def disturbance_size(self, entry: str) -> float:
+        moved = self.move(self._machine.plant)
         if entry in ("force", "motion"):
             return SMALL * max(float(np.std(moved[2 if entry == "force" else 0])), 1e-9)
         number = [row.name for row in self.rows].index(entry)
         return SMALL * max(float(np.std(self._rows(moved)[number])), 1e-9)
 
     def motion(self, component: str, plant: Plant) -> Motion:  # noqa: ARG002
-        moved = self.moved(plant)
+        moved = self.move(plant)
         return Motion(moved[0], moved[1], moved[2])
 
-    def carried_noise(self, plant: Plant) -> Array | None:
-        """What the noise of a measured motion makes of the force, or that of a controller's sensors of its command."""
+    def propagated_noise(self, plant: Plant) -> Array | None:
+        """What the noise of a measured motion makes of the force, or that of a controller's sensors
+        of its command."""
         random = np.random.default_rng(SEED)
         ticks = self._recording.ticks
         if self._motion is not None and self._error > 0.0 and not self._integrated:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
-            return self._rows(self.moved(plant, shift=again - self._motion)) - self._rows(
-                self.moved(plant)
+            return self._rows(self.move(plant, shift=again - self._motion)) - self._rows(
+                self.move(plant)
             )
         control = self._control
         if control is None or not self._sensors:
@@ -361,8 +380,8 @@ class JointModel:
             if channel in sensed:
                 noise[:, number] = white_noise(column) * random.standard_normal(ticks)
         mover = getattr(plant, self._mover.name)
-        disturbed = self._pushed(plant, mover, np.zeros(ticks), noise)
+        disturbed = self._integrate_pushed(plant, mover, np.zeros(ticks), noise)
         found = np.zeros((len(self.rows), ticks))
         commands = [row.kind == "command" for row in self.rows]
-        found[commands] = disturbed[3] - self.moved(plant)[3]
+        found[commands] = disturbed[3] - self.move(plant)[3]
         return found

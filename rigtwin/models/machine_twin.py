@@ -10,8 +10,8 @@ import numpy as np
 from rigtwin import __version__
 from rigtwin.components import measures
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import seen
-from rigtwin.description.configuration import Configuration, applied, flattened
+from rigtwin.components.sensors import apply_sensor
+from rigtwin.description.configuration import Configuration, apply_effects, flatten
 from rigtwin.description.control import Channel
 from rigtwin.description.machine import Machine, ReplayOf
 from rigtwin.errors import RigtwinError
@@ -25,8 +25,9 @@ Columns = dict[str, dict[str, Array]]
 
 
 def demanded_channels(machine: Machine) -> list[Channel]:
-    """What a test has to demand of a machine: (topic, field) of commands that no described controller computes, of what the
-    controller is given besides its own sensors, and of motions that are prescribed."""
+    """What a test has to demand of a machine: (topic, field) of commands that no described
+    controller computes, of what the controller is given besides its own sensors, and of motions
+    that are prescribed."""
     found: list[Channel] = []
     for replay in machine.replays:
         mover = machine.components[replay.moved_by[0]]
@@ -79,17 +80,25 @@ def run_machine(
     RigtwinError
         Before anything is written, if a demand is missing or not a number, or an effect is unknown.
     """
-    actual = applied(configuration, effects)
+    actual = apply_effects(configuration, effects)
     wanted = demanded_channels(machine)
     if controller is not None:
         # A controller of one's own takes whatever demands it knows.
         wanted = [("/command", name) for name in demands]
-    columns = _demanded(machine, wanted, demands)
+    columns = _check_demands(machine, wanted, demands)
     ticks = len(next(iter(next(iter(columns.values())).values())))
     random = np.random.default_rng([seed, 3])
     for replay in machine.replays:
-        _simulate(machine, replay, actual, columns, ticks, random, controller)
-    settings = flattened(configuration)
+        _simulate(
+            machine=machine,
+            replay=replay,
+            configuration=actual,
+            columns=columns,
+            ticks=ticks,
+            random=random,
+            controller=controller,
+        )
+    settings = flatten(configuration)
     told = settings.get("controller", {}) if controller is None else {}
     fields = {topic: tuple(names) for topic, names in columns.items()}
     period = configuration.timing.period
@@ -112,7 +121,9 @@ BLOCK = 250
 FINISHED = "completed"
 
 
-def _demanded(machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]) -> Columns:
+def _check_demands(
+    machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]
+) -> Columns:
     columns: Columns = {}
     names = {f"{topic}.{name}" for topic, name in wanted} | {name for _, name in wanted}
     if unknown := [name for name in demands if name not in names]:
@@ -137,7 +148,8 @@ def _demanded(machine: Machine, wanted: Sequence[Channel], demands: Mapping[str,
         columns.setdefault(topic, {})[name] = values
     if len(lengths) > 1:
         raise RigtwinError(
-            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} ticks; expected one length"
+            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} "
+            "ticks; expected one length"
         )
     return columns
 
@@ -173,14 +185,22 @@ def _simulate(
     for _, (topic, name) in sensors:
         made.setdefault(topic, {}).setdefault(name, np.zeros(ticks))
     time = np.arange(ticks) * period
-    recording = Recording(Path("test"), machine.name, "", period, time, made, {})
+    recording = Recording(
+        path=Path("test"),
+        machine=machine.name,
+        experiment="",
+        period=period,
+        time=time,
+        columns=made,
+        controller={},
+    )
     model = MujocoModel(machine, replay, recording, configuration, configuration.substeps)
     model.sensor_noise = {name: _noise(plant, name, ticks, period, random) for name, _ in sensors}
     model.controller = controller
     if mover.element == "sensor":
-        moved = model.carry(plant, columns[mover.channel[0]][mover.channel[1]])
+        moved = model.prescribe(plant, columns[mover.channel[0]][mover.channel[1]])
     else:
-        moved = model.moved(plant)
+        moved = model.move(plant)
     if not np.isfinite(moved).all() or np.max(np.abs(moved[:2])) >= RUNAWAY:
         raise RigtwinError(
             f"{machine.name}: joint {replay.joint.name} runs away; the loop is not stable"
@@ -192,7 +212,9 @@ def _simulate(
             reading = model.read[name]
         else:
             row = ("position", "velocity", "force").index(measures(getattr(plant, name)))
-            reading = seen(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
+            reading = (
+                apply_sensor(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
+            )
             bit = getattr(plant, name).resolution
             reading = np.round(reading / bit) * bit if bit > 0.0 else reading
         columns.setdefault(topic, {})[field] = reading

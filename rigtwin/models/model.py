@@ -1,4 +1,5 @@
-"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any plant."""
+"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any
+plant."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ P = TypeVar("P", bound=Plant, contravariant=True)
 
 @dataclass(frozen=True)
 class Form:
-    """One way to disturb a component freely. entry: where it enters, as `disturbed` takes it; signal: shape (ticks,)."""
+    """One way to disturb a component freely. entry: where it enters, as `predict_disturbed` takes it;
+    signal: shape (ticks,)."""
 
     name: str
     entry: str
@@ -23,21 +25,22 @@ class Form:
 
 
 class Model(Protocol[P]):
-    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in their order."""
+    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in
+    their order."""
 
-    def sensed(self, plant: P) -> Array:
+    def predict(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
         ...
 
-    def true(self, plant: P) -> Array:
+    def predict_true(self, plant: P) -> Array:
         """What ideal sensors would read, shape (rows, ticks)."""
         ...
 
-    def disturbed(self, plant: P, entry: str, amount: Array) -> Array:
-        """The same as `sensed` with a disturbance, shape (ticks,), entering somewhere."""
+    def predict_disturbed(self, plant: P, entry: str, amount: Array) -> Array:
+        """The same as `predict` with a disturbance, shape (ticks,), entering somewhere."""
         ...
 
-    def places(self) -> Sequence[str]:
+    def components(self) -> Sequence[str]:
         """Components that can be disturbed freely."""
         ...
 
@@ -45,7 +48,7 @@ class Model(Protocol[P]):
         """Ways to disturb one of them."""
         ...
 
-    def strength(self, entry: str) -> float:
+    def disturbance_size(self, entry: str) -> float:
         """rms of a disturbance that is small there."""
         ...
 
@@ -53,15 +56,15 @@ class Model(Protocol[P]):
         """What a component goes through."""
         ...
 
-    def carried_noise(self, plant: P) -> Array | None:
-        """What the noise of the signals that drive the model makes of the observed ones, shape (rows, ticks); None if they
-        are known exactly."""
+    def propagated_noise(self, plant: P) -> Array | None:
+        """What the noise of the signals that drive the model makes of the observed ones, shape
+        (rows, ticks); None if they are known exactly."""
         ...
 
-    def coarser(self) -> Model[P]:
+    def halve_steps(self) -> Model[P]:
         """With half the integration steps, if it can be."""
         ...
 
-    def finer(self) -> Model[P]:
+    def double_steps(self) -> Model[P]:
         """With twice the integration steps."""
         ...

@@ -1,4 +1,5 @@
-"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the twin that is run.
+"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the
+twin that is run.
 
 MuJoCo has the masses, the geometry and gravity; the components' laws act on the joint tick by tick.
 It is slow, and takes no shortcut that needs the joint to be alone. Contacts, joint limits and the
@@ -15,10 +16,10 @@ import numpy as np
 
 from controllers.formula import run as run_formula
 from rigtwin.components import UNLIMITED, ForceActuator, Guide, measures
-from rigtwin.components.conditioning import actuator, conditioned, holding
-from rigtwin.components.guide import damping, dry_limits, friction, resting, slid
+from rigtwin.components.conditioning import actuator, condition, hold
+from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import fresh, transduced, transducer
+from rigtwin.components.sensors import start_transducer, transduce, transducer
 from rigtwin.models.guided import Inertia
 from rigtwin.models.joint import JointModel
 from rigtwin.numerics.arrays import Array
@@ -40,7 +41,7 @@ class MujocoModel(JointModel):
     """One joint of a machine in MuJoCo."""
 
     read: dict[str, Array]
-    """Sensor → what the controller read, after `moved`."""
+    """Sensor → what the controller read, after `move`."""
     sensor_noise: Mapping[str, Array] = {}
     """Sensor → what is added to its reading, shape (ticks,)."""
     controller: Tick | None = None
@@ -69,20 +70,20 @@ class MujocoModel(JointModel):
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model, mujoco.MjData(model), place, at
 
-    def carry(self, plant: Plant, signal: Array) -> Array:
-        """The joint under a prescribed motion, shape (4, ticks) as `moved`. signal: what an ideal sensor that moves it would
-        read, shape (ticks,)."""
+    def prescribe(self, plant: Plant, signal: Array) -> Array:
+        """The joint under a prescribed motion, shape (4, ticks) as `move`. signal: what an ideal
+        sensor that moves it would read, shape (ticks,)."""
         position = (
             np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
         )
         self.read = {}
-        return self._carried(plant, position, 0.0)
+        return self._inverse_dynamics(plant, position, 0.0)
 
-    def moved(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
+    def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
         self.read = {}
-        return super().moved(plant, force, shift)
+        return super().move(plant, force, shift)
 
-    def _carried(self, plant: Plant, position: Array, error: float) -> Array:
+    def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         """The force that moves the joint as prescribed, by inverse dynamics."""
         model, data, place, at = self._mechanics(plant, self._period)
         guide, inertia = self._parts(plant)
@@ -101,15 +102,15 @@ class MujocoModel(JointModel):
             if inertia.mass > 0.0:
                 data.qacc[at] = acceleration[tick]
             mujoco.mj_inverse(model, data)
-            load = float(data.qfrc_inverse[at]) + resting(guide, x, inertia.rest)
+            load = float(data.qfrc_inverse[at]) + position_force(guide, x, inertia.rest)
             forward, backward = dry_limits(dry, v, load)
-            rubbed, by = slid(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
+            rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
             viscous += share * (damping(guide, v) * v - viscous)
             out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
         return out
 
-    def _pushed(
+    def _integrate_pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
         """The joint under its force actuator."""
@@ -119,7 +120,7 @@ class MujocoModel(JointModel):
         data.qpos[place], data.qvel[at] = self._start
         passive = _Passive(guide, h, inertia, float(data.qpos[place]))
         drive = actuator(mover, plant.computer, h)
-        held = holding(drive, float(self._command[0]))
+        held = hold(drive, float(self._command[0]))
         limit = min(mover.force_limit, UNLIMITED)
         out, force = np.zeros((4, len(self._command))), 0.0
         loop = self._reader(plant)
@@ -128,7 +129,7 @@ class MujocoModel(JointModel):
             command = loop(tick, float(data.qpos[place]), float(data.qvel[at]))
             out[3, tick] = command
             for _ in range(self._steps):
-                pushed = mover.constant * conditioned(drive, held, command)
+                pushed = mover.constant * condition(drive, held, command)
                 force = min(max(pushed, -limit), limit)
                 load = force + float(besides[tick])
                 passive.act(model, data, at, float(data.qpos[place]), float(data.qvel[at]), force)
@@ -137,18 +138,19 @@ class MujocoModel(JointModel):
         return out
 
     def _reader(self, plant: Plant) -> Callable[[int, float, float], float]:
-        """The command of a tick for the joint's position and velocity, as the controller sees them."""
+        """The command of a tick for the joint's position and velocity, as the controller sees
+        them."""
         names = self._sensors or self.sensors_of_joint()
         parts = [getattr(plant, name) for name in names]
         models = [transducer(part, self._period) for part in parts]
-        states = [fresh(each) for each in models]
+        states = [start_transducer(each) for each in models]
         self.read = {name: np.zeros(self._recording.ticks) for name in names}
 
         def sense(tick: int, position: float, velocity: float) -> dict[str, float]:
             found = {}
             for name, part, each, state in zip(names, parts, models, states, strict=True):
                 true = velocity if measures(part) == "velocity" else position
-                value = transduced(each, state, true)
+                value = transduce(each, state, true)
                 if name in self.sensor_noise:
                     value += float(self.sensor_noise[name][tick])
                 if part.resolution > 0.0:
@@ -210,7 +212,7 @@ class _Passive:
         """Writes friction into the model and all other forces into the joint's applied force."""
         guide = self._guide
         forward, backward = dry_limits(self._dry, v, load)
-        force = -resting(guide, x, self._rest) - guide.drag * v * abs(v)
+        force = -position_force(guide, x, self._rest) - guide.drag * v * abs(v)
         if guide.relaxation > 0.0:
             self._viscous += self._share * (damping(guide, v) * v - self._viscous)
             force -= self._viscous
@@ -218,7 +220,7 @@ class _Passive:
             model.dof_damping[at] = damping(guide, v)
         if guide.compliance > 0.0 or guide.backlash > 0.0:
             half = 0.5 * guide.backlash
-            rubbed, by = slid(x - self._slider, half, self._spring, forward, backward)
+            rubbed, by = slide(x - self._slider, half, self._spring, forward, backward)
             self._slider += by
             force -= rubbed
         else:

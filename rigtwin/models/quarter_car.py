@@ -1,10 +1,13 @@
-"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to search with.
+"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to
+search with.
 
-The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod has no inertia. So one
-scalar inclusion a step, solved exactly, replaces the simulator: rail and motor friction are set-valued. What depends on
-the effects (actuators, cylinders, breakaway, sensors) is the twin's own code; tests hold it against the twin.
+The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod
+has no inertia. So one scalar inclusion a step, solved exactly, replaces the simulator: rail and
+motor friction are set-valued. What depends on the effects (actuators, cylinders, breakaway,
+sensors) is the twin's own code; tests hold it against the twin.
 
-Positions are taken at the steps and velocities midway between them, which makes the scheme second order.
+Positions are taken at the steps and velocities midway between them, which makes the scheme second
+order.
 """
 
 from __future__ import annotations
@@ -18,19 +21,19 @@ from controllers import Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import Computer, Cylinder, Motor, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
+    discretise,
     next_position,
-    sampled,
-    settled,
+    rest_state,
 )
 from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
-from rigtwin.components.sensors import seen
+from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
@@ -38,9 +41,15 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import YIELDING, Contacts, contacts, start_deflection, stiffening
+from rigtwin.simulation.plant import (
+    YIELDING,
+    Contacts,
+    contacts,
+    initial_deflection,
+    stiffness_ratio,
+)
 
-PLACES = (
+COMPONENTS = (
     "motor",
     "rail",
     "tyre",
@@ -50,7 +59,7 @@ PLACES = (
     *Measurements._fields,
 )
 """Components that are disturbed in turn."""
-STRENGTH = {"m": 1e-4, "N": 4.0}
+DISTURBANCE_SIZE = {"m": 1e-4, "N": 4.0}
 """rms of each disturbance as tried; its response is taken as in proportion to it."""
 KEPT = 64
 """Motions of plates that are kept."""
@@ -71,16 +80,17 @@ MECHANICAL = (
 
 
 class Plate(NamedTuple):
-    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks + 1,); onward: where the
-    command held before a tick would take it one step later, shape (ticks,)."""
+    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks +
+    1,); onward: where the command held before a tick would take it one step later, shape
+    (ticks,)."""
 
     position: Array
     onward: Array
 
 
 class Disturbances(NamedTuple):
-    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m, voltage V, force on the carriage
-    N."""
+    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m,
+    voltage V, force on the carriage N."""
 
     ground: Array
     structure: Array
@@ -115,11 +125,11 @@ def _plate(
         onward[tick] = next_position(model, state, held.memory[3])
         for step in range(steps):
             position[tick * steps + step] = state.position[0]
-            advance_cylinder(model, state, conditioned(conditioning, held, commands[tick]))
+            advance_cylinder(model, state, condition(conditioning, held, commands[tick]))
     position[len(commands) * steps] = state.position[0]
 
 
-def plate(
+def move_plate(
     cylinder: Cylinder,
     computer: Computer,
     commands: Array,
@@ -128,30 +138,32 @@ def plate(
     timestep: float,
     steps: int,
 ) -> Plate:
-    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where that command holds it."""
+    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where
+    that command holds it."""
     conditioning = actuator(cylinder, computer, timestep)
-    held = holding(conditioning, start)
+    held = hold(conditioning, start)
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
-    state = settled(cylinder, float(held.memory[3]) if at is None else at)
+    state = rest_state(cylinder, float(held.memory[3]) if at is None else at)
     _plate(
-        sampled(cylinder, timestep),
-        state,
-        conditioning,
-        held,
-        commands,
-        steps,
-        out.position,
-        out.onward,
+        model=discretise(cylinder, timestep),
+        state=state,
+        conditioning=conditioning,
+        held=held,
+        commands=commands,
+        steps=steps,
+        position=out.position,
+        onward=out.onward,
     )
     return out
 
 
 @compilable
-def sliding(
+def solve_velocity(
     rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
 ) -> float:
-    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses, Ns, that it can bear
-    against positive and negative v; motor: against positive and negative plate − v, plate being the plate's velocity."""
+    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses,
+    Ns, that it can bear against positive and negative v; motor: against positive and negative plate
+    − v, plate being the plate's velocity."""
     below = (rhs + rail[1] + motor[0]) / inertia
     if below < min(0.0, plate):
         return below
@@ -186,7 +198,8 @@ def motor_friction(
     elif velocity < 0.0:
         left -= rail[1]
     else:
-        # Both stick: the rail carries what it can, as at the start of a test before anything has moved.
+        # Both stick: the rail carries what it can, as at the start of a test before anything has
+        # moved.
         left += min(max(-left, -rail[1]), rail[0])
     return min(max(left, -motor[1]), motor[0])
 
@@ -208,7 +221,8 @@ def _mechanics(
     pushed: Array,
     out: Array,
 ) -> None:
-    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values, shape (4, ticks)."""
+    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values,
+    shape (4, ticks)."""
     h = carriage.timestep
     x, v, force = start, 0.0, preload
     ground_before = structure_before = 0.0
@@ -216,7 +230,8 @@ def _mechanics(
     share = h / (YIELDING + h)
     for tick in range(len(voltage)):
         for step in range(-1, steps):
-            # Before the tick's commands act, once as if the old ones went on: that is what the sensors see.
+            # Before the tick's commands act, once as if the old ones went on: that is what the
+            # sensors see.
             place = tick * steps + max(step, 0)
             ground_here, structure_here = ground[place], structure[place]
             if step < 0:
@@ -256,18 +271,18 @@ def _mechanics(
             )
             rhs, total, spring = free, inertia, 0.0
             if deflection > 0.0:
-                spring = now.stiffness * deflection * stiffening(now, deflection)
+                spring = now.stiffness * deflection * stiffness_ratio(now, deflection)
                 rhs, total = (
                     free + h * (spring + now.damping * ground_velocity),
                     inertia + h * now.damping,
                 )
-            velocity = sliding(rhs, total, rail, motor, plate_velocity)
+            velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
             tyre = 0.0
             if deflection > 0.0:
                 tyre = spring + now.damping * (ground_velocity - velocity)
                 if tyre < 0.0:
                     tyre, rhs, total = 0.0, free, inertia
-                    velocity = sliding(rhs, total, rail, motor, plate_velocity)
+                    velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
             dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
             cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
             if step < 0:
@@ -281,7 +296,7 @@ def _mechanics(
             ground_before, structure_before = now.yielded[0], now.yielded[1]
             now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
             now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
-            asked = conditioned(motor_drive, motor_command, voltage[tick])
+            asked = condition(motor_drive, motor_command, voltage[tick])
             asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
             force += carriage.motor_share * (carriage.motor_constant * asked - force)
             v = velocity
@@ -289,7 +304,8 @@ def _mechanics(
 
 
 class QuarterCarModel:
-    """The plant under the commands of one test. Plates' motions are kept: most candidates leave them as they are."""
+    """The plant under the commands of one test. Plates' motions are kept: most candidates leave
+    them as they are."""
 
     def __init__(
         self,
@@ -299,7 +315,8 @@ class QuarterCarModel:
         configuration: Configuration,
         steps: int,
     ) -> None:
-        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a tick."""
+        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a
+        tick."""
         self._ground, self._structure, self._voltage = (
             np.ascontiguousarray(c) for c in (ground, structure, voltage)
         )
@@ -320,7 +337,7 @@ class QuarterCarModel:
         )
         return cls(ground, structure, voltage, configuration, steps)
 
-    def coarser(self) -> QuarterCarModel:
+    def halve_steps(self) -> QuarterCarModel:
         """The same with half as many steps."""
         return QuarterCarModel(
             self._ground,
@@ -330,7 +347,7 @@ class QuarterCarModel:
             max(1, self._steps // 2),
         )
 
-    def finer(self) -> QuarterCarModel:
+    def double_steps(self) -> QuarterCarModel:
         """The same with twice as many steps."""
         return QuarterCarModel(
             self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
@@ -350,61 +367,67 @@ class QuarterCarModel:
         if found is None:
             if len(self._plates) > KEPT:
                 self._plates.clear()
-            found = plate(
-                unloaded, computer, commands, start, at, self._period / self._steps, self._steps
+            found = move_plate(
+                cylinder=unloaded,
+                computer=computer,
+                commands=commands,
+                start=start,
+                at=at,
+                timestep=self._period / self._steps,
+                steps=self._steps,
             )
             self._plates[key] = found
         return found
 
-    def true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
-        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what acts on the plant that it
-        does not know."""
+    def predict_true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
+        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what
+        acts on the plant that it does not know."""
         timestep = self._period / self._steps
         ground = self._plate(
             plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
         )
         # The spring is uncompressed at the start, the tyre carries the preload.
-        start = float(ground.position[0]) - start_deflection(plant, self._preload)
+        start = float(ground.position[0]) - initial_deflection(plant, self._preload)
         structure = self._plate(
             plant.structure_cylinder, plant.computer, self._structure, self._start, start
         )
         nothing = np.zeros_like(self._voltage)
         besides = besides or Disturbances(nothing, nothing, nothing, nothing)
         ground, structure = (
-            self._displaced(ground, besides.ground),
-            self._displaced(structure, besides.structure),
+            self._displace(ground, besides.ground),
+            self._displace(structure, besides.structure),
         )
         motor: Motor = plant.motor
         carriage = Carriage(
-            timestep,
-            plant.carriage.mass,
-            plant.rail.viscous,
-            motor.viscous,
-            motor.constant,
-            1.0 - math.exp(-timestep / motor.time_constant),
-            min(motor.voltage_limit, motor.force_limit / motor.constant),
+            timestep=timestep,
+            mass=plant.carriage.mass,
+            rail_viscous=plant.rail.viscous,
+            motor_viscous=motor.viscous,
+            motor_constant=motor.constant,
+            motor_share=1.0 - math.exp(-timestep / motor.time_constant),
+            voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
         )
         conditioning = actuator(motor, plant.computer, timestep)
         out = np.empty((4, len(self._voltage)))
         _mechanics(
-            carriage,
-            contacts(plant, start, 0.0),
-            conditioning,
-            holding(conditioning, self._preload / motor.constant),
-            start,
-            self._preload,
-            self._steps,
-            ground.position,
-            ground.onward,
-            structure.position,
-            structure.onward,
-            self._voltage + besides.voltage,
-            besides.force,
-            out,
+            carriage=carriage,
+            now=contacts(plant, start, 0.0),
+            motor_drive=conditioning,
+            motor_command=hold(conditioning, self._preload / motor.constant),
+            start=start,
+            preload=self._preload,
+            steps=self._steps,
+            ground=ground.position,
+            ground_onward=ground.onward,
+            structure=structure.position,
+            structure_onward=structure.onward,
+            voltage=self._voltage + besides.voltage,
+            pushed=besides.force,
+            out=out,
         )
         return out
 
-    def _displaced(self, of: Plate, by: Array) -> Plate:
+    def _displace(self, of: Plate, by: Array) -> Plate:
         if not by.any():
             return of
         ticks = np.arange(len(by) * self._steps + 1) / self._steps
@@ -412,32 +435,33 @@ class QuarterCarModel:
         ahead = motion[np.arange(len(by)) * self._steps + 1]
         return Plate(of.position + motion, of.onward + ahead)
 
-    def disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
-        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a sensor's name, or a field of
-        Disturbances, whose voltage is taken in N; amount: shape (ticks,)."""
+    def predict_disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
+        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a
+        sensor's name, or a field of Disturbances, whose voltage is taken in N; amount: shape
+        (ticks,)."""
         if entry in Measurements._fields:
-            sensed = self.sensed(plant)
+            sensed = self.predict(plant)
             sensed[Measurements._fields.index(entry)] += amount
             return sensed
         amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
         amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
-        true = self.true(plant, Disturbances(**amounts))
+        true = self.predict_true(plant, Disturbances(**amounts))
         return np.stack(
             [
-                seen(sensor, row, self._period)
+                apply_sensor(sensor, row, self._period)
                 for sensor, row in zip(sensors(plant), true, strict=True)
             ]
         )
 
-    def places(self) -> tuple[str, ...]:
-        return PLACES
+    def components(self) -> tuple[str, ...]:
+        return COMPONENTS
 
     def forms(self, component: str, plant: RigPlant) -> list[Form]:
-        true, sensed = self.true(plant), self.sensed(plant)
+        true, sensed = self.predict_true(plant), self.predict(plant)
         wheel = true[1] - true[2]
         wheel_speed, sliding = np.gradient(wheel, self._period), np.gradient(true[2], self._period)
 
-        def made(
+        def build(
             role: str,
             entry: str,
             signal: Array,
@@ -448,21 +472,21 @@ class QuarterCarModel:
 
         if component in Measurements._fields:
             signal = sensed[Measurements._fields.index(component)]
-            return made("load cell" if component == "load_cell" else "sensor", component, signal)
+            return build("load cell" if component == "load_cell" else "sensor", component, signal)
         if component in ("ground_cylinder", "structure_cylinder"):
             place = component.removesuffix("_cylinder")
-            return made("cylinder", place, sensed[("ground", "structure").index(place)])
+            return build("cylinder", place, sensed[("ground", "structure").index(place)])
         if component == "motor":
-            return made("motor", "voltage", true[3], true[2], sliding)
+            return build("motor", "voltage", true[3], true[2], sliding)
         if component == "tyre":
-            return made("tyre", "force", np.maximum(true[0] - wheel, 0.0))
-        return made("rail" if component == "rail" else "mass", "force", wheel)
+            return build("tyre", "force", np.maximum(true[0] - wheel, 0.0))
+        return build("rail" if component == "rail" else "mass", "force", wheel)
 
-    def strength(self, entry: str) -> float:
-        return STRENGTH["N" if entry in ("voltage", "force", "load_cell") else "m"]
+    def disturbance_size(self, entry: str) -> float:
+        return DISTURBANCE_SIZE["N" if entry in ("voltage", "force", "load_cell") else "m"]
 
     def motion(self, component: str, plant: RigPlant) -> Motion:
-        true = self.true(plant)
+        true = self.predict_true(plant)
         if component in ("motor", "load_cell", "suspension_lvdt", "controller"):
             position = true[2]
         elif component.startswith("ground"):
@@ -473,20 +497,22 @@ class QuarterCarModel:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
-    def carried_noise(self, plant: RigPlant) -> None:
-        """Sensors' noise reaches the plant only through recorded commands, which are known exactly."""
+    def propagated_noise(self, plant: RigPlant) -> None:
+        """Sensors' noise reaches the plant only through recorded commands, which are known
+        exactly."""
 
-    def sensed(self, plant: RigPlant) -> Array:
+    def predict(self, plant: RigPlant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
         mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
         true = self._last.get(mechanical)
         if true is None:
-            true = self.true(plant)
-            # Candidates at sensors leave the mechanics as they are, so what was worked out last often serves again.
+            true = self.predict_true(plant)
+            # Candidates at sensors leave the mechanics as they are, so what was worked out last
+            # often serves again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack(
             [
-                seen(sensor, row, self._period)
+                apply_sensor(sensor, row, self._period)
                 for sensor, row in zip(sensors(plant), true, strict=True)
             ]
         )

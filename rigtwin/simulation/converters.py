@@ -1,4 +1,5 @@
-"""Sensors and converters between the plant and the controller: white noise, mains hum with random phase, 16 bits."""
+"""Sensors and converters between the plant and the controller: white noise, mains hum with random
+phase, 16 bits."""
 
 from __future__ import annotations
 
@@ -10,7 +11,13 @@ import numpy as np
 from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import LoadCell, Lvdt, RigPlant
-from rigtwin.components.sensors import Transducer, TransducerState, fresh, transduced, transducer
+from rigtwin.components.sensors import (
+    Transducer,
+    TransducerState,
+    start_transducer,
+    transduce,
+    transducer,
+)
 from rigtwin.numerics.arrays import Array
 
 
@@ -25,19 +32,25 @@ def resolutions(plant: RigPlant) -> Measurements:
 
 
 class Sensing(NamedTuple):
-    """All transducers in the order of Measurements, and the size of one bit of each channel in its unit."""
+    """All transducers in the order of Measurements, and the size of one bit of each channel in its
+    unit."""
 
     transducers: tuple[Transducer, Transducer, Transducer, Transducer]
     states: tuple[TransducerState, TransducerState, TransducerState, TransducerState]
     resolution: Measurements
 
 
-def sensing(plant: RigPlant, period: float) -> Sensing:
+def build_sensing(plant: RigPlant, period: float) -> Sensing:
     """The plant's sensors before their first sample. period in s."""
     one, two, three, four = (transducer(sensor, period) for sensor in sensors(plant))
     return Sensing(
         (one, two, three, four),
-        (fresh(one), fresh(two), fresh(three), fresh(four)),
+        (
+            start_transducer(one),
+            start_transducer(two),
+            start_transducer(three),
+            start_transducer(four),
+        ),
         resolutions(plant),
     )
 
@@ -45,8 +58,8 @@ def sensing(plant: RigPlant, period: float) -> Sensing:
 class Disturbance:
     """Noise and hum of all sensors, one tick after another, from a seed.
 
-    Every channel draws from a stream of its own, so that changing one leaves the others as they were, and the numbers do
-    not depend on how many ticks are asked for at a time.
+    Every channel draws from a stream of its own, so that changing one leaves the others as they
+    were, and the numbers do not depend on how many ticks are asked for at a time.
     """
 
     def __init__(self, plant: RigPlant, period: float, seed: int) -> None:
@@ -74,7 +87,7 @@ class Disturbance:
 
 
 @compilable
-def converted(value: float, disturbance: float, resolution: float) -> float:
+def quantise(value: float, disturbance: float, resolution: float) -> float:
     """One sample as the DAQ delivers it."""
     raw = value + disturbance
     if resolution > 0.0:
@@ -83,24 +96,22 @@ def converted(value: float, disturbance: float, resolution: float) -> float:
 
 
 @compilable
-def sampled(sensing: Sensing, true: Measurements, disturbance: Array) -> Measurements:
+def sample_sensors(sensing: Sensing, true: Measurements, disturbance: Array) -> Measurements:
     """All samples of one tick; disturbance has shape (4,). Advances the sensors' states."""
     sensors, states, bits = sensing.transducers, sensing.states, sensing.resolution
     return Measurements(
-        converted(
-            transduced(sensors[0], states[0], true.ground_lvdt), disturbance[0], bits.ground_lvdt
+        quantise(
+            transduce(sensors[0], states[0], true.ground_lvdt), disturbance[0], bits.ground_lvdt
         ),
-        converted(
-            transduced(sensors[1], states[1], true.structure_lvdt),
+        quantise(
+            transduce(sensors[1], states[1], true.structure_lvdt),
             disturbance[1],
             bits.structure_lvdt,
         ),
-        converted(
-            transduced(sensors[2], states[2], true.suspension_lvdt),
+        quantise(
+            transduce(sensors[2], states[2], true.suspension_lvdt),
             disturbance[2],
             bits.suspension_lvdt,
         ),
-        converted(
-            transduced(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell
-        ),
+        quantise(transduce(sensors[3], states[3], true.load_cell), disturbance[3], bits.load_cell),
     )

@@ -1,4 +1,5 @@
-"""What an experiment is: a configuration, and what it demands of the machine; and those that a machine has."""
+"""What an experiment is: a configuration, and what it demands of the machine; and those that a
+machine has."""
 
 from __future__ import annotations
 
@@ -11,14 +12,15 @@ import numpy as np
 
 from controllers.formula import formula
 from rigtwin.components.rig import RigPlant
-from rigtwin.description.configuration import Configuration, rebased
+from rigtwin.description.configuration import Configuration, rebase
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 Demands = Array | Mapping[str, Array]
-"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3): ground m, structure m, force N,
-the last two for imposed tests only. Of another machine, each demanded channel's values by its name, shape (ticks,)."""
+"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3):
+ground m, structure m, force N, the last two for imposed tests only. Of another machine, each
+demanded channel's values by its name, shape (ticks,)."""
 
 
 @dataclass(frozen=True)
@@ -59,20 +61,21 @@ class FormulaDemands:
 
 
 def experiments_of(machine: Machine) -> dict[str, Experiment]:
-    """The experiments of a machine by name: those of the Python module that its description names, or its own tables."""
+    """The experiments of a machine by name: those of the Python module that its description names,
+    or its own tables."""
     if isinstance(machine.experiments, str):
         known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
         if machine.plant == RigPlant():
             return dict(known)
         base = machine.configuration
         return {
-            name: replace(e, configuration=rebased(e.configuration, base))
+            name: replace(e, configuration=rebase(e.configuration, base))
             for name, e in known.items()
         }
-    return {name: _described(machine, name, table) for name, table in machine.experiments.items()}
+    return {name: _from_table(machine, name, table) for name, table in machine.experiments.items()}
 
 
-def _described(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
+def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
     base = machine.configuration
     clocks = {key: float(table[key]) for key in ("duration", "period") if key in table}
     timing = base.timing._replace(**clocks)

@@ -1,4 +1,5 @@
-"""The ideal emulated system: what a test would do if the rig were perfect, with no friction, no noise and no delay."""
+"""The ideal emulated system: what a test would do if the rig were perfect, with no friction, no
+noise and no delay."""
 
 from __future__ import annotations
 
@@ -14,16 +15,18 @@ from controllers.skyhook import semi_active_damping
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import start_deflection
+from rigtwin.simulation.plant import initial_deflection
 
 SUBSTEPS = 4
-"""Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear suspension is exact with one."""
+"""Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear
+suspension is exact with one."""
 
 
 @dataclass(frozen=True)
 class Ideal:
-    """Sprung position and velocity (m, m/s; of the beams' centre), wheel position (m), suspension force (N), and what the wing
-    does relative to the ground (m, at 0, 1, 2 and 3 beams from the centre); shape (ticks,), wing (ticks, 4) or None."""
+    """Sprung position and velocity (m, m/s; of the beams' centre), wheel position (m), suspension
+    force (N), and what the wing does relative to the ground (m, at 0, 1, 2 and 3 beams from the
+    centre); shape (ticks,), wing (ticks, 4) or None."""
 
     structure: Array
     velocity: Array
@@ -38,8 +41,8 @@ class Ideal:
 
 @dataclass(frozen=True)
 class _Structure:
-    """The sprung body in modal form: squared angular frequencies, damping rates, centre shape, gravity's modal force, modal
-    displacements at the start, and the wing's shape."""
+    """The sprung body in modal form: squared angular frequencies, damping rates, centre shape,
+    gravity's modal force, modal displacements at the start, and the wing's shape."""
 
     squares: Array
     damping: Array
@@ -72,9 +75,10 @@ def _structure(settings: Settings) -> _Structure:
     )
 
 
-def ideal(configuration: Configuration, ground: Array) -> Ideal:
-    """The system that a test emulates, started as the rig starts: a body or a cross of beams on a spring and damper with
-    skyhook, on the ground (single mass) or on a wheel and its tyre (quarter car). ground: m, held over each tick."""
+def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
+    """The system that a test emulates, started as the rig starts: a body or a cross of beams on a
+    spring and damper with skyhook, on the ground (single mass) or on a wheel and its tyre (quarter
+    car). ground: m, held over each tick."""
     settings, plant, period = (
         configuration.controller,
         configuration.plant,
@@ -86,8 +90,9 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     size = 2 * count + (2 if on_wheel else 0)
     k, b = settings.suspension_stiffness, settings.suspension_damping
     sky = settings.skyhook_damping if settings.skyhook == Skyhook.ACTIVE else 0.0
-    # Rows of the state that give the sprung centre's and the wheel's position and velocity; inputs: ground, its rate, one, and
-    # what is not linear: the force of a semi-active damper less that of a gas spring.
+    # Rows of the state that give the sprung centre's and the wheel's position and velocity; inputs:
+    # ground, its rate, one, and what is not linear: the force of a semi-active damper less that of
+    # a gas spring.
     rate = np.diff(ground, prepend=ground[0]) / period
     inputs = np.column_stack([ground, rate, np.ones_like(ground), np.zeros_like(ground)])
     position, velocity, wheel, wheel_rate = (np.zeros(size) for _ in range(4))
@@ -120,14 +125,25 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     start = np.zeros(size)
     start[:count] = body.start
     if on_wheel:
-        start[-2] = ground[0] - start_deflection(plant, settings.preload)
+        start[-2] = ground[0] - initial_deflection(plant, settings.preload)
     substeps = (
         SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
     )
-    transition, step = _sampled(a, entry, period / substeps)
+    transition, step = _discretise(a, entry, period / substeps)
     states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
     rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
-    _simulated(settings, on_wheel, transition, step, inputs, rows, start, substeps, states, besides)
+    _simulate(
+        settings=settings,
+        on_wheel=on_wheel,
+        transition=transition,
+        step=step,
+        inputs=inputs,
+        rows=rows,
+        start=start,
+        substeps=substeps,
+        states=states,
+        besides=besides,
+    )
     inputs[:, 3] = besides
     wing = None if body.wing is None else states[:, :count] @ body.wing
     return Ideal(
@@ -139,7 +155,7 @@ def ideal(configuration: Configuration, ground: Array) -> Ideal:
     )
 
 
-def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
+def _discretise(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
     count = len(a)
     both = np.zeros((count + entry.shape[1],) * 2)
     both[:count, :count], both[:count, count:] = a, entry
@@ -150,7 +166,7 @@ def _sampled(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
 
 
 @kernel
-def _simulated(
+def _simulate(
     settings: Settings,
     on_wheel: bool,
     transition: Array,
@@ -162,8 +178,9 @@ def _simulated(
     states: Array,
     besides: Array,
 ) -> None:
-    """States at every tick under inputs held over each. rows: give of a state the sprung velocity, the suspension's velocity
-    and its travel, the last two less the ground's where there is no wheel. besides: the force of what is not linear."""
+    """States at every tick under inputs held over each. rows: give of a state the sprung velocity,
+    the suspension's velocity and its travel, the last two less the ground's where there is no
+    wheel. besides: the force of what is not linear."""
     state = start.copy()
     given = np.zeros(inputs.shape[1])
     for tick in range(len(inputs)):

@@ -1,7 +1,7 @@
 """The control loop: read → update → write, tick by tick, until the test is over or a limit trips.
 
-`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving compiled code; both
-give the same numbers.
+`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving
+compiled code; both give the same numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from rigtwin.description.configuration import Configuration, Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Sensing, sampled
+from rigtwin.simulation.converters import Sensing, sample_sensors
 from rigtwin.simulation.plant import PlantState, advance, sense
 from rigtwin.simulation.rig import Rig
 from rigtwin.simulation.safety import (
@@ -49,9 +49,10 @@ BLOCK = 250
 
 @dataclass(frozen=True)
 class Block:
-    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape (ticks, 4), truth None for
-    a rig that does not know it; trip: why the test ends with this block's last tick, or Trip.NONE; column: that tripped, of
-    Measurements or, from 4 on, of Commands."""
+    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape
+    (ticks, 4), truth None for a rig that does not know it; trip: why the test ends with this
+    block's last tick, or Trip.NONE; column: that tripped, of Measurements or, from 4 on, of
+    Commands."""
 
     first: int
     commands: Array
@@ -174,13 +175,14 @@ def _ticks(
     measured_out: Array,
     truth_out: Array,
 ) -> tuple[int, int, int]:
-    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only: making any other Python object
-    can run into a pending Ctrl-C, which compiled code does not survive."""
+    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only:
+    making any other Python object can run into a pending Ctrl-C, which compiled code does not
+    survive."""
     state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
         true = sense(plant)
-        measured = sampled(sensing, true, disturbance[tick])
+        measured = sample_sensors(sensing, true, disturbance[tick])
         demand = Demand(demands[tick, 0], demands[tick, 1], demands[tick, 2])
         commands = held
         if not missed[tick]:
@@ -211,19 +213,19 @@ def run_compiled(
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
         done, number, column = _ticks(
-            twin.simulation.state,
-            controlling,
-            configuration.safety,
-            limit_memory,
-            twin.sensing,
-            memory,
-            twin.held,
-            asked,
-            twin.misses(len(asked)),
-            twin.disturbance.take(len(asked)),
-            commands,
-            measured,
-            truth,
+            plant=twin.simulation.state,
+            controlling=controlling,
+            limits=configuration.safety,
+            limit_memory=limit_memory,
+            sensing=twin.sensing,
+            memory=memory,
+            held=twin.held,
+            demands=asked,
+            missed=twin.misses(len(asked)),
+            disturbance=twin.disturbance.take(len(asked)),
+            commands_out=commands,
+            measured_out=measured,
+            truth_out=truth,
         )
         trip = Trip(number)
         yield Block(first, commands[:done], measured[:done], truth[:done], trip, column)

@@ -1,4 +1,5 @@
-"""The mechanics: the MJCF model with a plant's values written into it, and the views of it that compiled code needs."""
+"""The mechanics: the MJCF model with a plant's values written into it, and the views of it that
+compiled code needs."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ MECHANICS = files("models") / "xml" / "suspension_rig.xml"
 
 
 class Handles(NamedTuple):
-    """Addresses of MuJoCo's structures, live views of their arrays, and where each part stands in them."""
+    """Addresses of MuJoCo's structures, live views of their arrays, and where each part stands in
+    them."""
 
     model: int
     data: int
@@ -46,8 +48,8 @@ class Handles(NamedTuple):
 
 @cache
 def _nominal() -> mujoco.MjModel:
-    """The model as the XML has it, compiled once; never changed. With its lights and cameras, so that a running twin can be
-    looked at; they change no digit of its motion."""
+    """The model as the XML has it, compiled once; never changed. With its lights and cameras, so
+    that a running twin can be looked at; they change no digit of its motion."""
     return mujoco.MjModel.from_xml_path(str(SCENE))
 
 
@@ -76,10 +78,12 @@ def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:
 
 
 def tyre_scale(model: mujoco.MjModel) -> float:
-    """What to multiply a stiffness (N/m) or damping (Ns/m) by for −solref of the tyre's contact, 1/kg.
+    """What to multiply a stiffness (N/m) or damping (Ns/m) by for −solref of the tyre's contact,
+    1/kg.
 
-    MuJoCo solves f·(A + R) = −k·r − b·v with R = (1 − d)/d·D, k and b = −solref/d, where d is the impedance, A the contact's
-    exact inverse mass and D its approximate one (MuJoCo documentation, computation, "Parameters"). Solved for solref here.
+    MuJoCo solves f·(A + R) = −k·r − b·v with R = (1 − d)/d·D, k and b = −solref/d, where d is the
+    impedance, A the contact's exact inverse mass and D its approximate one (MuJoCo documentation,
+    computation, "Parameters"). Solved for solref here.
     """
     pair = model.pair("tyre")
     impedance = float(pair.solimp[0])

@@ -1,6 +1,8 @@
-"""How well a test emulates what it should: the ideal system beside the model's output and what was sensed.
+"""How well a test emulates what it should: the ideal system beside the model's output and what was
+sensed.
 
-e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error); thesis Eq. 3.1, 3.2.
+e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error);
+thesis Eq. 3.1, 3.2.
 """
 
 from __future__ import annotations
@@ -13,12 +15,13 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
-from rigtwin.simulation.ideal import Ideal, ideal
+from rigtwin.simulation.ideal import Ideal, simulate_ideal
 
 
 @dataclass(frozen=True)
 class Tracking:
-    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2 at every tick."""
+    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2
+    at every tick."""
 
     position_e1: float
     position_e2: float
@@ -28,9 +31,11 @@ class Tracking:
     force_total: float
 
 
-def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) -> Tracking:
-    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands: shape (ticks, 3 or more);
-    structure, load_cell: what was sensed, m and N."""
+def compute_tracking(
+    target: Ideal, commands: Array, structure: Array, load_cell: Array
+) -> Tracking:
+    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands:
+    shape (ticks, 3 or more); structure, load_cell: what was sensed, m and N."""
     position, force = commands[:, 1], commands[:, 2]
     return Tracking(
         position_e1=rms(target.structure - position),
@@ -42,7 +47,7 @@ def tracked(target: Ideal, commands: Array, structure: Array, load_cell: Array) 
     )
 
 
-def tracking(recording: Recording, configuration: Configuration) -> Tracking:
+def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
     """e1 and e2 of a recorded test. What was sensed is without noise where a twin knows it."""
     known = "/truth" in recording.columns
     structure = (
@@ -54,4 +59,6 @@ def tracking(recording: Recording, configuration: Configuration) -> Tracking:
     commands = np.column_stack(
         [recording.column("/command", name) for name in ("ground", "structure", "force")]
     )
-    return tracked(ideal(configuration, commands[:, 0]), commands, structure, load_cell)
+    return compute_tracking(
+        simulate_ideal(configuration, commands[:, 0]), commands, structure, load_cell
+    )

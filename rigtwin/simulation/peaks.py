@@ -13,7 +13,8 @@ from rigtwin.simulation.safety import VELOCITY_SPAN
 
 @dataclass(frozen=True)
 class Peak:
-    """One limited quantity of a test. peak and limit in the unit; margin: share of the limit that is left."""
+    """One limited quantity of a test. peak and limit in the unit; margin: share of the limit that
+    is left."""
 
     name: str
     peak: float
@@ -26,8 +27,8 @@ class Peak:
 
 
 def peaks(commands: Array, measurements: Array, configuration: Configuration) -> tuple[Peak, ...]:
-    """Every limited quantity of a test. commands, measurements: shape (ticks, 4), columns of controllers.Commands and
-    .Measurements."""
+    """Every limited quantity of a test. commands, measurements: shape (ticks, 4), columns of
+    controllers.Commands and .Measurements."""
     limits, period = configuration.safety, configuration.timing.period
     ground, structure, force, voltage = commands.T
     ground_lvdt, structure_lvdt, travel, load_cell = measurements.T

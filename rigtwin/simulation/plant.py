@@ -1,6 +1,7 @@
 """The running plant.
 
-MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled code.
+MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled
+code.
 """
 
 from __future__ import annotations
@@ -14,14 +15,14 @@ import numpy as np
 from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import GasSpring, RigPlant
-from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, conditioned, holding
+from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
     CylinderState,
     advance_cylinder,
+    discretise,
     next_position,
-    sampled,
-    settled,
+    rest_state,
 )
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import Friction, breakaway, friction, gap_at
@@ -38,7 +39,8 @@ common solution."""
 class Contacts(NamedTuple):
     """What changes with the motion in the mechanics, and its states.
 
-    gaps: of the backlashes, shape (1,) each; yielded: of the ground and structure plate under
+    gaps: of the backlashes, shape
+    (1,) each; yielded: of the ground and structure plate under
     load, m, shape (2,).
     """
 
@@ -63,7 +65,8 @@ class Contacts(NamedTuple):
 class PlantState(NamedTuple):
     """All that compiled code needs to run one plant: its parts and their states.
 
-    `plain` says whether its commands act as they are and its contacts do not change with the
+    `plain` says whether its commands act as they are
+    and its contacts do not change with the
     motion, as in the nominal rig.
     """
 
@@ -121,10 +124,11 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
     )
 
 
-def start_deflection(plant: RigPlant, preload: float) -> float:
+def initial_deflection(plant: RigPlant, preload: float) -> float:
     """The tyre's deflection at the start, m.
 
-    It carries the motor's preload (N) and the extended gas spring.
+    It carries the motor's preload (N) and the extended
+    gas spring.
     """
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
@@ -132,7 +136,8 @@ def start_deflection(plant: RigPlant, preload: float) -> float:
 class Simulation:
     """One plant at its start.
 
-    Ground at its first command, spring uncompressed, tyre and motor carrying the preload, all at
+    Ground at its first command, spring uncompressed, tyre and motor
+    carrying the preload, all at
     rest. Owns the MuJoCo structures that `state` looks into.
     """
 
@@ -147,7 +152,8 @@ class Simulation:
     ) -> None:
         """timestep s.
 
-        Ground and structure: commands at the start, m; preload: motor force at the start, N.
+        Ground and structure: commands at the start, m; preload: motor force at the
+        start, N.
         """
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
@@ -157,13 +163,13 @@ class Simulation:
             for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
         ]
         held = [
-            holding(drives[0], ground),
-            holding(drives[1], structure),
-            holding(drives[2], preload / plant.motor.constant),
+            hold(drives[0], ground),
+            hold(drives[1], structure),
+            hold(drives[2], preload / plant.motor.constant),
         ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - start_deflection(
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - initial_deflection(
             plant, preload
         )
         view.activation[0] = view.control[0] = preload / plant.motor.constant
@@ -172,12 +178,12 @@ class Simulation:
             mechanics=view,
             substeps=substeps,
             plain=not touching.changing and all(each.neutral for each in drives),
-            ground=sampled(plant.ground_cylinder, timestep),
-            ground_state=settled(plant.ground_cylinder, here),
+            ground=discretise(plant.ground_cylinder, timestep),
+            ground_state=rest_state(plant.ground_cylinder, here),
             ground_drive=drives[0],
             ground_command=held[0],
-            structure=sampled(plant.structure_cylinder, timestep),
-            structure_state=settled(plant.structure_cylinder, carriage),
+            structure=discretise(plant.structure_cylinder, timestep),
+            structure_state=rest_state(plant.structure_cylinder, carriage),
             structure_drive=drives[1],
             structure_command=held[1],
             motor_drive=drives[2],
@@ -206,7 +212,7 @@ def brace(mechanics: Handles) -> None:
 
 
 @compilable
-def stiffening(now: Contacts, deflection: float) -> float:
+def stiffness_ratio(now: Contacts, deflection: float) -> float:
     """How many times its nominal secant stiffness the tyre has at a deflection, m."""
     if now.hardening == 0.0 or deflection <= 0.0:
         return 1.0
@@ -219,7 +225,8 @@ def stiffening(now: Contacts, deflection: float) -> float:
 def touch(mechanics: Handles, now: Contacts) -> None:
     """Writes into the mechanics what depends on the motion.
 
-    Dry friction, cogging, the tyre's slope.
+    Dry friction, cogging, the tyre's
+    slope.
     """
     if not now.changing:
         return
@@ -238,7 +245,7 @@ def touch(mechanics: Handles, now: Contacts) -> None:
     cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
     mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
-    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffening(now, deflection)
+    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffness_ratio(now, deflection)
 
 
 @compilable
@@ -314,11 +321,11 @@ def advance(
             state.ground_state.position[0] + yielded[0],
             state.structure_state.position[0] + yielded[1],
         )
-        asked = conditioned(state.ground_drive, state.ground_command, ground_command)
+        asked = condition(state.ground_drive, state.ground_command, ground_command)
         advance_cylinder(state.ground, state.ground_state, asked)
-        asked = conditioned(state.structure_drive, state.structure_command, structure_command)
+        asked = condition(state.structure_drive, state.structure_command, structure_command)
         advance_cylinder(state.structure, state.structure_state, asked)
-        mechanics.control[0] = conditioned(state.motor_drive, state.motor_command, voltage)
+        mechanics.control[0] = condition(state.motor_drive, state.motor_command, voltage)
         if state.contacts.changing:
             give_way(mechanics, state.contacts)
         drive(mechanics, mechanics.ground, ground, state.ground_state.position[0] + yielded[0])

@@ -7,7 +7,8 @@ from rigtwin.recording import Recording
 
 
 class Replay:
-    """Plays a recording's measurements to a controller. `written` collects its commands, one a tick."""
+    """Plays a recording's measurements to a controller. `written` collects its commands, one a
+    tick."""
 
     def __init__(self, recording: Recording) -> None:
         """Raises RigtwinError if a sensor is missing."""

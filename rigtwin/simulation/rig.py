@@ -8,7 +8,8 @@ from controllers import Commands, Measurements
 
 
 class Rig(Protocol):
-    """Four verbs. The loop calls `start`, then `read` and `write` once a tick, then `stop`, also after a fault."""
+    """Four verbs. The loop calls `start`, then `read` and `write` once a tick, then `stop`, also
+    after a fault."""
 
     def start(self) -> None:
         """Makes the rig ready at its start position."""
@@ -28,7 +29,8 @@ class Rig(Protocol):
 
 
 class DrivenRig(Rig, Protocol):
-    """A rig that is ramped in and out, as the real one must be: it also has hydraulic pressure, and may be late.
+    """A rig that is ramped in and out, as the real one must be: it also has hydraulic pressure, and
+    may be late.
 
     missed: ticks that passed unread before the last `read`.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, Safety, applied, flattened
+from rigtwin.description.configuration import Configuration, Safety, apply_effects, flatten
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.recording.channels import DEFAULT_MACHINE
@@ -21,7 +21,8 @@ from rigtwin.simulation.twin import Twin
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it early."""
+    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it
+    early."""
 
     path: Path
     ticks: int
@@ -30,9 +31,9 @@ class RunResult:
 
 
 @dataclass(frozen=True)
-class Ran:
-    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of controllers.Commands, .Measurements;
-    trip: why it ended early, or Trip.NONE."""
+class SimulationResult:
+    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of
+    controllers.Commands, .Measurements; trip: why it ended early, or Trip.NONE."""
 
     commands: Array
     measurements: Array
@@ -40,7 +41,7 @@ class Ran:
     trip: Trip
 
 
-def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
+def simulate(configuration: Configuration, demands: Array, seed: int) -> SimulationResult:
     """Runs `demands`, shape (ticks, 3), on the twin and keeps everything in memory."""
     blocks = list(
         run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
@@ -50,10 +51,10 @@ def simulated(configuration: Configuration, demands: Array, seed: int) -> Ran:
         np.concatenate([getattr(block, name) for block in blocks])
         for name in ("commands", "measurements")
     )
-    return Ran(commands, measured, truth, blocks[-1].trip)
+    return SimulationResult(commands, measured, truth, blocks[-1].trip)
 
 
-def unlimited(configuration: Configuration) -> Configuration:
+def without_limits(configuration: Configuration) -> Configuration:
     """The same without trips, to see what a twin would do wherever it goes."""
     return configuration._replace(safety=Safety(*(math.inf for _ in Safety._fields)))
 
@@ -101,9 +102,9 @@ def record(
     RigtwinError
         Before anything is written, if the configuration is at fault.
     """
-    actual = applied(configuration, list(effects))
+    actual = apply_effects(configuration, list(effects))
     twin = Twin(actual, float(demands[0, 0]), seed)
-    settings = flattened(configuration)
+    settings = flatten(configuration)
     told: dict[str, object] = dict(settings["controller"])
     blocks = run_compiled(twin, actual, demands)
     if controller is not None:

@@ -19,7 +19,7 @@ from controllers import (
     update,
 )
 from controllers.mil import PLACES
-from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, override
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
@@ -45,8 +45,10 @@ def _states(
 def states(settings: Settings, period: float, measured: Array, demands: Array) -> Array:
     """The controller's packed state after every tick, shape (ticks, SIZE).
 
-    measured: shape (ticks, 4), columns of controllers.Measurements; demands: shape (ticks, 3), of
-    controllers.Demand; period: s.
+    measured: shape (ticks,
+    4), columns of controllers.Measurements; demands: shape (ticks, 3), of
+    controllers.Demand;
+    period: s.
     """
     controlling = controller(settings, period)
     out = np.empty((len(measured), SIZE))
@@ -58,7 +60,8 @@ def states(settings: Settings, period: float, measured: Array, demands: Array) -
 def wing(settings: Settings, period: float, packed_states: Array) -> Array:
     """Of the cross of beams.
 
-    Height over its centre at 0, 1, 2 and 3 beams from it, m, shape (ticks, 4).
+    Height over its centre at 0, 1, 2 and 3 beams from it, m, shape
+    (ticks, 4).
     """
     heights = packed_states[:, PLACES["modal"]] @ controller(settings, period).modes.wing
     return heights - heights[:, :1]
@@ -66,7 +69,7 @@ def wing(settings: Settings, period: float, packed_states: Array) -> Array:
 
 def recorded_wing(recording: Recording) -> Array | None:
     """The same of a recording, or None if its structure model was not of beams."""
-    settings = overridden(Configuration(), {"controller": recording.controller}).controller
+    settings = override(Configuration(), {"controller": recording.controller}).controller
     if settings.structure != Structure.BEAM:
         return None
     measured = np.column_stack([recording.column("/sensor", name) for name in Measurements._fields])

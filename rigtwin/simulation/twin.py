@@ -10,7 +10,7 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Disturbance, sampled, sensing
+from rigtwin.simulation.converters import Disturbance, build_sensing, sample_sensors
 from rigtwin.simulation.plant import PlantState, Simulation, advance, sense
 
 _advance = kernel(advance)
@@ -26,7 +26,8 @@ def _sense(plant: PlantState, out: Array) -> None:
 class Twin:
     """A simulated rig.
 
-    The same configuration, first ground command and seed give the same measurements to the bit.
+    The same configuration, first ground command and seed give the same
+    measurements to the bit.
 
     `truth` holds the last measurements before noise and quantisation.
     """
@@ -34,7 +35,8 @@ class Twin:
     def __init__(self, configuration: Configuration, ground: float, seed: int) -> None:
         """ground: the first ground command, m.
 
-        Raises RigtwinError unless the period is a multiple of the timestep.
+        Raises RigtwinError unless the period is a multiple
+        of the timestep.
         """
         controller = configuration.controller
         self.simulation = Simulation(
@@ -46,7 +48,7 @@ class Twin:
             preload=controller.preload,
         )
         self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
-        self.sensing = sensing(configuration.plant, configuration.timing.period)
+        self.sensing = build_sensing(configuration.plant, configuration.timing.period)
         self._missed = np.random.default_rng([seed, 2])
         self._share_missed = configuration.plant.computer.missed_ticks
         self.held = Commands(
@@ -61,12 +63,13 @@ class Twin:
         true = np.empty(4)
         _sense(self.simulation.state, true)
         self.truth = Measurements(*true.tolist())
-        return sampled(self.sensing, self.truth, self.disturbance.take(1)[0])
+        return sample_sensors(self.sensing, self.truth, self.disturbance.take(1)[0])
 
     def misses(self, ticks: int) -> NDArray[np.bool_]:
         """Which of the next ticks the computer misses, shape (ticks,).
 
-        Its outputs then stay as they are.
+        Its outputs then stay as
+        they are.
         """
         return self._missed.random(ticks) < self._share_missed
 

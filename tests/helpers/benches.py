@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from referee.bench_cases import Case, recorded
+from referee.bench_cases import Case, record
 from rigtwin.recording import Recording
 
 
 def recording_of(case: Case) -> Recording:
-    data = recorded(case)
+    data = record(case)
     time = np.arange(len(data.first)) * case.period
     if case.machine == "actuator":
         columns = {"/command": {"position": data.first}, "/sensor": {"position": data.second}}

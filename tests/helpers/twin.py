@@ -7,7 +7,7 @@ from functools import cache
 from experiments import EXPERIMENTS
 from rigtwin.components import Effect, find
 from rigtwin.description.catalogue import find as machine_of
-from rigtwin.description.configuration import Configuration, applied
+from rigtwin.description.configuration import Configuration, apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.next_test import record_on_twin
@@ -30,7 +30,7 @@ def recorded(
     configuration = EXPERIMENTS[name].configuration
     configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
     demands = EXPERIMENTS[name].demands(configuration, seed)
-    return record_on_twin(RIG, name, applied(configuration, list(effects)), demands)
+    return record_on_twin(RIG, name, apply_effects(configuration, list(effects)), demands)
 
 
 def evidence_of(*recordings: Recording) -> Evidence:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 from controllers import Measurements
 from controllers.quantity import Quantity, fields
-from rigtwin.description.configuration import Safety, checked, read_toml
+from rigtwin.description.configuration import Safety, check_value, read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.channels import CHANNELS
 
@@ -213,7 +213,7 @@ def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
         if key not in meanings:
             raise RigtwinError(f"unknown setting {where}.{key}; there are {', '.join(meanings)}")
     return kind(
-        **{key: checked(f"{where}.{key}", value, meanings[key]) for key, value in table.items()}
+        **{key: check_value(f"{where}.{key}", value, meanings[key]) for key, value in table.items()}
     )
 
 

@@ -24,7 +24,7 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.converters import Sensing, sampled, sensors
+from rigtwin.simulation.converters import Sensing, sample_sensors, sensors
 from rigtwin.simulation.plant import PlantState, advance, sense
 from rigtwin.simulation.twin import Twin
 
@@ -53,7 +53,7 @@ def _sample(
     volts: Array,
 ) -> None:
     true = sense(plant)
-    measured = sampled(sensing, true, disturbance)
+    measured = sample_sensors(sensing, true, disturbance)
     for column in range(4):
         truth[column], volts[column] = true[column], measured[column]
     volts_of(inputs, volts, volts)

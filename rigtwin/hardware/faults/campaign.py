@@ -15,7 +15,7 @@ from google.protobuf.message import Message
 
 from controllers import Commands, Controller, Demand, Measurements, State
 from controllers import update as healthy
-from rigtwin.description.configuration import overridden
+from rigtwin.description.configuration import override
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import ChannelTable
@@ -158,7 +158,7 @@ def plan_test(fault: Fault, experiment: Experiment, table: ChannelTable) -> Test
         The experiment cut to DURATION and RAMP.
     """
     changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
-    configuration = overridden(experiment.configuration, changes)
+    configuration = override(experiment.configuration, changes)
     demands = experiment.demands(configuration, fault.seed)
     return Test(fault.experiment, configuration, demands, fault.seed, table)
 

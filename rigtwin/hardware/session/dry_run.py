@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.description.configuration import Configuration, flattened
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, to_toml
 from rigtwin.numerics.arrays import Array
@@ -64,7 +64,7 @@ def digest(
     str
         SHA-256, in hexadecimal.
     """
-    told = json.dumps([experiment, flattened(configuration), to_toml(table)], sort_keys=True)
+    told = json.dumps([experiment, flatten(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
 
 

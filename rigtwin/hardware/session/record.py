@@ -13,7 +13,7 @@ from pathlib import Path
 
 from controllers import update
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, applied, flattened
+from rigtwin.description.configuration import Configuration, apply_effects, flatten
 from rigtwin.hardware.daq.card import Card, connect, require_client
 from rigtwin.hardware.daq.table import ChannelTable, require_ranges, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
@@ -75,7 +75,7 @@ class Test:
 
     def terminals(self) -> Terminals:
         """Builds the twin at the card's terminals, wired as the table says."""
-        return Terminals(applied(self.configuration, list(self.effects)), self.table, self.seed)
+        return Terminals(apply_effects(self.configuration, list(self.effects)), self.table, self.seed)
 
 
 def open_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
@@ -113,7 +113,7 @@ def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
     told = {CARD_RECORD: {"table": to_toml(test.table)}}
     if virtual:
         told[TWIN_RECORD] = twin_values(
-            test.seed, flattened(test.configuration), test.effects, __version__
+            test.seed, flatten(test.configuration), test.effects, __version__
         )
     return told
 
@@ -125,7 +125,7 @@ def _writer_of(path: Path, test: Test) -> Callable[[], Writer]:
         path,
         test.experiment,
         test.configuration.timing.period,
-        controller=flattened(test.configuration)["controller"],
+        controller=flatten(test.configuration)["controller"],
     )
 
 

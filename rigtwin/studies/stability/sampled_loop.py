@@ -34,13 +34,13 @@ from controllers import (
     update,
 )
 from rigtwin.components import RigPlant
-from rigtwin.components.cylinder import continuous
+from rigtwin.components.cylinder import state_space
 from rigtwin.components.gas_spring import stiffness
 from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import start_deflection
+from rigtwin.simulation.plant import initial_deflection
 
 PERTURBATION = 1e-6
 """In each variable's unit; far within every threshold of the controllers."""
@@ -144,7 +144,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     velocity.
     """
     cylinder, motor = plant.structure_cylinder, plant.motor
-    inner, entry, out = continuous(cylinder)
+    inner, entry, out = state_space(cylinder)
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
     for number, (lag, gain, place) in enumerate(
@@ -165,7 +165,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     plate[CYLINDER], rate[CYLINDER] = out, out @ inner
     cell = -motor.viscous * rate
     cell[FORCE], cell[SPEED] = 1.0, motor.viscous
-    squeezed, step = start_deflection(plant, preload), 1e-6
+    squeezed, step = initial_deflection(plant, preload), 1e-6
     around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0

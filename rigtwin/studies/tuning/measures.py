@@ -13,8 +13,8 @@ from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import rms
-from rigtwin.simulation.ideal import Ideal, ideal
-from rigtwin.simulation.metrics import Tracking, tracked
+from rigtwin.simulation.ideal import Ideal, simulate_ideal
+from rigtwin.simulation.metrics import Tracking, compute_tracking
 from rigtwin.studies.stability.sampled_loop import decay
 
 HEAVE = 3.0
@@ -67,11 +67,11 @@ class Trial:
     @cached_property
     def tracking(self) -> Tracking:
         """The errors of thesis Eq. 3.1 and 3.2 against the ideal vehicle."""
-        target = ideal(self.configuration, self.commands[:, 0])
+        target = simulate_ideal(self.configuration, self.commands[:, 0])
         late = slice(self.first, None)
         motions = (target.structure[late], target.velocity[late], target.wheel[late])
         shown = Ideal(*motions, target.force[late], None)
-        return tracked(shown, self.commands[late], self.plate, self.sensed[late, 3])
+        return compute_tracking(shown, self.commands[late], self.plate, self.sensed[late, 3])
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ import json
 import math
 from dataclasses import dataclass
 
-from rigtwin.description.configuration import Configuration, flattened
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
-from rigtwin.simulation.runner import Ran, simulated
+from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.tuning.measures import MEASURES, Trial
 
@@ -47,7 +47,7 @@ class Run:
         """The same for the same run, whoever asks."""
         told = [
             self.experiment.name,
-            flattened(self.configuration),
+            flatten(self.configuration),
             self.seed,
             self.first,
             sorted(self.measures),
@@ -65,10 +65,10 @@ def run(job: Run) -> dict[str, float]:
         not numbers.
     """
     demands = job.experiment.demands(job.configuration, job.seed)
-    return figures(job, simulated(job.configuration, demands, job.seed))
+    return figures(job, simulate(job.configuration, demands, job.seed))
 
 
-def figures(job: Run, ran: Ran) -> dict[str, float]:
+def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
     """Name → figure of a run that was made, as `run` gives it."""
     configuration = job.configuration
     shares = (1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, configuration))

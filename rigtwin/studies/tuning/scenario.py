@@ -12,8 +12,8 @@ import numpy as np
 
 from rigtwin.components import RigPlant
 from rigtwin.description.catalogue import find
-from rigtwin.description.configuration import Configuration, overridden
-from rigtwin.description.posterior import Changes, Posterior, shifted_within, value_of
+from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.posterior import Changes, Posterior, shift_within, value_of
 from rigtwin.recording.channels import DEFAULT_MACHINE
 from rigtwin.studies.tuning.study import Study
 
@@ -65,7 +65,7 @@ NOMINAL = Rig("nominal twin", lambda configuration, _: configuration)
 
 def calibrated_rig(posterior: Posterior) -> Rig:
     """The rig of a diagnosis, each value as uncertain as that left it."""
-    return Rig("calibrated twin", posterior.drawn, frozenset(posterior.intervals))
+    return Rig("calibrated twin", posterior.draw, frozenset(posterior.intervals))
 
 
 def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scenario]:
@@ -92,13 +92,13 @@ def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scena
 
         def shift(key: str, width: float) -> Configuration:
             amount = width * random.uniform(-1.0, 1.0)
-            return configuration if key in rig.known else shifted_within(configuration, key, amount)
+            return configuration if key in rig.known else shift_within(configuration, key, amount)
 
         for tolerance in tolerances:
             width = study.variation.tolerances * tolerance.width(configuration.plant)
             configuration = shift(f"{tolerance.group}.{tolerance.parameter}", width)
         for key, share in study.variation.shares.items():
             configuration = shift(key, value_of(configuration, key) * share)
-        return Scenario(seed, overridden(configuration, rig.certain).plant)
+        return Scenario(seed, override(configuration, rig.certain).plant)
 
     return [draw(seed) for seed in range(first, first + count)]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from controllers import Settings
-from rigtwin.description.configuration import Configuration, overridden
+from rigtwin.description.configuration import Configuration, override
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Parameter
@@ -150,9 +150,9 @@ class Study:
     @property
     def baseline_settings(self) -> Settings:
         """The controller that is compared with."""
-        return overridden(self.configuration, self.baseline_changes).controller
+        return override(self.configuration, self.baseline_changes).controller
 
     @property
     def search_configuration(self) -> Configuration:
         """What a search runs: perhaps shorter or coarser than what is evaluated."""
-        return overridden(self.configuration, self.search_changes)
+        return override(self.configuration, self.search_changes)

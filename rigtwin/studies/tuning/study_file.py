@@ -11,7 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from controllers.quantity import Quantity, fields
-from rigtwin.description.configuration import Configuration, assigned, groups, overridden, read_toml
+from rigtwin.description.configuration import (
+    Configuration,
+    groups,
+    override,
+    parse_assignments,
+    read_toml,
+)
 from rigtwin.description.posterior import value_of
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
@@ -57,7 +63,7 @@ def read_study(
         Naming the file, the entry and what was expected.
     """
     given: dict[str, dict[str, object]] = {}
-    for own in assigned(assignments):
+    for own in parse_assignments(assignments):
         for group, values in own.items():
             given.setdefault(group, {}).update(values)
     other = {key: number for key, number in numbers.items() if number is not None}
@@ -99,10 +105,10 @@ def parse_study(
         if key not in tables:
             raise RigtwinError(f"{key} is missing")
     experiment, given = _experiment(tables["experiment"], experiments), given or {}
-    own = overridden(experiment.configuration, _changes("set", tables.get("set", {})))
-    configuration = overridden(own, given)
+    own = override(experiment.configuration, _changes("set", tables.get("set", {})))
+    configuration = override(own, given)
     search = _search(tables.get("search", {}), given)
-    shorter = overridden(configuration, search)
+    shorter = override(configuration, search)
     _ = shorter.ticks, shorter.substeps
     first = _number("from", tables.get("from", 0.0), 0.0, 86_400.0)
     shortest = min(configuration.timing.duration, shorter.timing.duration)
@@ -177,7 +183,7 @@ def _changes(where: str, table: object) -> dict[str, dict[str, object]]:
             expected = 'expected group.name, such as "controller.kp" = 0.5'
             raise RigtwinError(f"{where}: {key} = {value!r}: {expected}")
     try:
-        overridden(Configuration(), found)
+        override(Configuration(), found)
     except RigtwinError as error:
         raise RigtwinError(f"{where}: {error}") from None
     return found

@@ -1,0 +1,94 @@
+"""The thresholds that decide what a diagnosis says.
+
+They were set on cases of the withheld-effect check with seeds other than those reported
+(docs/diagnosis.md).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class NamingRules:
+    """When effects are named."""
+
+    most: int
+    """Effects that are named at once."""
+    more: float
+    """Share of what is left that each further effect must explain."""
+    enough: float
+    """Share of the gap that they must explain to be named at all if something is left."""
+    too_much: float
+    """χ² per degree of freedom above 1 from which what is left forbids to name anything."""
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What the stages of a diagnosis hold their figures against."""
+
+    detected: float = 60.0
+    """χ² that an effect must explain to be a finding,"""
+    noticeable: float = 0.015
+    """and share of what noise alone leaves: less is a trace that no closed loop shows."""
+    unexplained: float = 0.10
+    """χ² per degree of freedom above 1 from which what is left counts as a gap."""
+    much: float = 0.03
+    """Share of what noise leaves from which what one effect leaves is worth a search among many
+    pairs."""
+    far_behind: float = 0.7
+    """Share of what the best effect explains that a first of two may lack."""
+    temper: float = 4.0
+    """χ² by which explanations must differ for the better one to be e^½ times as likely."""
+    form_temper: float = 0.05
+    """How much of what is left widens that."""
+    member: float = 0.05
+    """Probability from which an effect belongs to the class that is reported."""
+    known: NamingRules = field(default=NamingRules(most=2, more=0.5, enough=0.97, too_much=0.4))
+    """Of a machine whose nominal values are well known: what is left is something else."""
+    rough: NamingRules = field(
+        default=NamingRules(most=6, more=0.08, enough=0.75, too_much=math.inf)
+    )
+    """Of one whose nominal values are only a start: something is always left; half the gap, in
+    amplitude, must be explained."""
+    price: float = 8.0
+    """Of each parameter, in χ²: a simpler explanation is preferred."""
+    within_tolerance: float = 1.5
+    """Tolerances below which a deviation is no finding."""
+    slight: float = 1e-3
+    """Share of what is explained by which an explanation must do better than a simpler one."""
+    second: float = 2.0
+    """Times what a first effect must explain that each further one must."""
+    near: float = 0.2
+    """Share of what is explained that an explanation with one effect replaced may lack."""
+    worse: float = 1.05
+    """Times the gap without it from which held-out data reject a correction."""
+    better: float = 0.995
+    """The same for a rough model, where an effect must help to stay."""
+    sure: float = 0.98
+    """Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
+    less_sure: float = 0.88
+    """The same in one of two effects, or beside something that has no name: so often such names
+    were right."""
+    unsure: float = 0.9
+    """Confidence below which another test is proposed."""
+    wider: float = 2.5
+    """Times the statistical interval that is reported: a model's form is never exact."""
+    trace: float = 0.01
+    """Share of a rough model's gap below which an effect is not claimed."""
+    noticed: float = 4.0
+    """Times the power that is left without an effect that is claimed all the same, all others
+    fitted again: twice the gap."""
+    possible: float = 0.01
+    """Probability from which on another explanation is kept beside the one named."""
+    something: float = 0.03
+    """Share of what noise leaves that a free disturbance of one component must explain for
+    something unnamed to be there."""
+    left_over: float = 1.3
+    """Times its noise from which a signal has something left, if that is more than no model is
+    held to."""
+
+
+STANDARD = Thresholds()
+"""Those that every published figure was made with."""
