@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
 from rigtwin.components.guide import THROUGH_FRICTION
-from rigtwin.components.plant import Plant, with_parameters
+from rigtwin.components.plant import P, Plant, with_parameters
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -57,7 +56,7 @@ class Fit:
         return " + ".join(effect.name for effect in self.effects) or "none"
 
 
-def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
+def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> P:
     """The plant with effects of these values, one tuple an effect in the order of its
     parameters."""
     for effect, numbers in zip(effects, values, strict=True):
