@@ -124,7 +124,7 @@ def answer(files: Files) -> dict[str, Any]:
         recording, held_out = (load(Path(folder) / name) for name in names)
         return module.diagnose(
             find(DEFAULT_MACHINE), [recording], Configuration(), [held_out]
-        ).diagnosis.document()
+        ).answer.document()
 
 
 def name_effect(content: bytes) -> str:

@@ -123,7 +123,7 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
         path = Path(folder) / "recording.mcap"
         write(path, law, *run(truth, law, demands, random))
         outcome = diagnose(find(DEFAULT_MACHINE), [load(path)], Configuration())
-    return outcome.diagnosis.sentence, toml(outcome)
+    return outcome.answer.sentence, toml(outcome)
 
 
 def run_on_rig(job: RigRun) -> dict[str, float]:
