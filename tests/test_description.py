@@ -13,7 +13,7 @@ from rigtwin.components import RigPlant, Scales, Swing
 from rigtwin.components import find as effect_of
 from rigtwin.components.effect import SHARES
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.configuration import from_assignments, override
+from rigtwin.description.configuration import from_assignments, override, without_effect
 from rigtwin.description.document import examine, load
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import is_possible

@@ -160,8 +160,20 @@ class Configuration(NamedTuple, Generic[P, C]):
 
 
 def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
-    """Numbers by name as a group of settings: a NamedTuple whose fields say that any number is
-    allowed."""
+    """Numbers by name as a group of settings.
+
+    Parameters
+    ----------
+    values
+        Name → number.
+    source
+        Where they come from, in words.
+
+    Returns
+    -------
+    tuple
+        A NamedTuple whose fields say that any number is allowed.
+    """
     made = namedtuple("Settings", list(values), defaults=list(values.values()))  # type: ignore[misc]
     made.__annotations__ = {
         name: Annotated[float, Quantity("1", -1e300, 1e300, source)] for name in values
@@ -170,8 +182,18 @@ def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
 
 
 def groups(configuration: Configuration) -> dict[str, Any]:
-    """Group name → its NamedTuple: the plant's components side by side with the rest; none that is
-    empty."""
+    """The groups of settings.
+
+    Parameters
+    ----------
+    configuration
+        Of any machine.
+
+    Returns
+    -------
+    dict
+        Name → NamedTuple: the plant's components side by side with the rest; none that is empty.
+    """
     rest = {
         name: value
         for name, value in configuration._asdict().items()
@@ -181,7 +203,18 @@ def groups(configuration: Configuration) -> dict[str, Any]:
 
 
 def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
-    """Group → name → number or label, as TOML and recordings hold it."""
+    """The settings as TOML and recordings hold them.
+
+    Parameters
+    ----------
+    configuration
+        Of any machine.
+
+    Returns
+    -------
+    dict
+        Group → name → number or label.
+    """
     return {
         name: {
             key: value.label if isinstance(value, Choice) else float(value)
@@ -199,7 +232,27 @@ def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantit
 
 
 def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
-    """The value, if it is allowed. Raises RigtwinError naming the key and what is allowed."""
+    """The value of a setting, if it is allowed.
+
+    Parameters
+    ----------
+    key
+        Its name, for the message.
+    value
+        A number, or a label.
+    meaning
+        What is allowed.
+
+    Returns
+    -------
+    float or Choice
+        The value.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the key and what is allowed.
+    """
     if not isinstance(meaning, Quantity):
         try:
             return meaning.parse(str(value))
@@ -225,8 +278,25 @@ def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> fl
 def override(
     configuration: Configuration, changes: Mapping[str, Mapping[str, object]]
 ) -> Configuration:
-    """The configuration with `changes` (group → name → value) applied. Raises RigtwinError for any
-    key or value not allowed."""
+    """The configuration with changes.
+
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    changes
+        Group → name → value.
+
+    Returns
+    -------
+    Configuration
+        With them.
+
+    Raises
+    ------
+    RigtwinError
+        For any key or value that is not allowed.
+    """
     plant, rest = configuration.plant, configuration
     known = groups(configuration)
     for group_name, values in changes.items():
@@ -256,7 +326,25 @@ def override(
 
 
 def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Applied:
-    """What `apply` makes of a TOML file's tables. Raises RigtwinError naming file and fault."""
+    """What a function makes of a TOML file's tables.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    apply
+        The function.
+
+    Returns
+    -------
+    object
+        What it returns.
+
+    Raises
+    ------
+    RigtwinError
+        Naming file and fault.
+    """
     try:
         return apply(tomllib.loads(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
@@ -279,8 +367,25 @@ def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str
 
 
 def from_toml(configuration: Configuration, path: Path) -> Configuration:
-    """The configuration with a TOML file's settings applied. Raises RigtwinError naming file and
-    fault."""
+    """The configuration with a TOML file's settings.
+
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    path
+        Of the file.
+
+    Returns
+    -------
+    Configuration
+        With them.
+
+    Raises
+    ------
+    RigtwinError
+        Naming file and fault.
+    """
     return read_toml(path, lambda tables: override(configuration, values_of(tables)))
 
 
@@ -291,7 +396,25 @@ def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
-    """The configuration with `group.name=value` texts applied."""
+    """The configuration with settings as `--set` takes them.
+
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    assignments
+        `group.name=value` each.
+
+    Returns
+    -------
+    Configuration
+        With them.
+
+    Raises
+    ------
+    RigtwinError
+        For any other text, key or value.
+    """
     for changes in parse_assignments(assignments):
         configuration = override(configuration, changes)
     return configuration
@@ -304,8 +427,25 @@ Changes = Mapping[str, Mapping[str, object]] | str | Path
 def with_changes(
     configuration: Configuration, changes: Changes | Sequence[Changes]
 ) -> Configuration:
-    """The configuration with changes, or with several, one over the other. Raises RigtwinError for
-    any that is not allowed."""
+    """The configuration with changes, or with several, one over the other.
+
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    changes
+        Group → name → value, a TOML file, or several of them.
+
+    Returns
+    -------
+    Configuration
+        With them.
+
+    Raises
+    ------
+    RigtwinError
+        For any that is not allowed.
+    """
     if isinstance(changes, str | Path):
         return from_toml(configuration, Path(changes))
     if isinstance(changes, Mapping):
@@ -318,15 +458,49 @@ def with_changes(
 def with_effect(
     configuration: Configuration, effect: Effect, values: Mapping[str, float]
 ) -> Configuration:
-    """The configuration with an effect. Raises RigtwinError for a value out of bounds."""
+    """The configuration with an effect.
+
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    effect
+        One that the plant can have.
+    values
+        Parameter → value.
+
+    Returns
+    -------
+    Configuration
+        With it.
+
+    Raises
+    ------
+    RigtwinError
+        For a value out of bounds.
+    """
     return override(configuration, {effect.group: values})
 
 
 def without_effect(configuration: Configuration, name: str) -> Configuration:
-    """The configuration with an effect of the nominal machine taken out, such as `coulomb@rail`:
-    its magnitude set to 0.
+    """The configuration with an effect of the nominal machine taken out: its magnitude set to 0.
 
-    Raises RigtwinError if the machine has none of it to take out.
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    name
+        Such as `coulomb@rail`.
+
+    Returns
+    -------
+    Configuration
+        Without it.
+
+    Raises
+    ------
+    RigtwinError
+        If the machine has none of it to take out.
     """
     effect = find(name, configuration.plant)
     if not _is_removable(effect, configuration.plant):
@@ -348,11 +522,25 @@ def _is_removable(effect: Effect, plant: Plant) -> bool:
 
 
 def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configuration:
-    """The configuration with effects as `--effect` takes them: `coulomb@rail=80`,
-    `stribeck@rail=20,stribeck_velocity=0.02`, or `setting@controller=kp:0.5` for a setting that is
-    not what the recording will say.
+    """The configuration with effects as `--effect` takes them.
 
-    Raises RigtwinError naming the effect and what is allowed.
+    Parameters
+    ----------
+    configuration
+        To start from; it stays as it is.
+    texts
+        `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or `setting@controller=kp:0.5`
+        for a setting that is not what the recording will say.
+
+    Returns
+    -------
+    Configuration
+        With them.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the effect and what is allowed.
     """
     for text in texts:
         name, equals, values = text.partition("=")
@@ -380,8 +568,20 @@ def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configu
 
 
 def rebase(configuration: Configuration, base: Configuration) -> Configuration:
-    """What a configuration changes of the nominal suspension rig, on top of another base of the
-    same settings."""
+    """What a configuration changes of the nominal suspension rig, on top of another base.
+
+    Parameters
+    ----------
+    configuration
+        Of the suspension rig.
+    base
+        Of the same settings.
+
+    Returns
+    -------
+    Configuration
+        The base with those changes.
+    """
     changes: dict[str, dict[str, object]] = {}
     for (key, value, _), (_, nominal, _) in zip(
         parameters(configuration), parameters(Configuration()), strict=True

@@ -4,7 +4,8 @@ diagnosis, never a finding."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+
+from rigtwin.components.plant import P, Plant
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 """Parameters that change the motion itself, and not only when or how it is sensed."""
@@ -21,7 +22,7 @@ class Tolerance:
     relative: bool = False
     ticks: bool = False
 
-    def width(self, plant: Any, period: float = 1.0) -> float:
+    def width(self, plant: Plant, period: float = 1.0) -> float:
         """Its half width in the parameter's unit, at that plant. period: s, of a tick."""
         if self.ticks:
             return self.half_width * period
@@ -31,7 +32,7 @@ class Tolerance:
             else 1.0
         )
 
-    def shift(self, plant: Any, amount: float) -> Any:
+    def shift(self, plant: P, amount: float) -> P:
         """The plant with this parameter higher by that much, in its unit."""
         group = getattr(plant, self.group)
         value = float(getattr(group, self.parameter)) + amount

@@ -71,7 +71,18 @@ class Attribution:
 
 
 def library(evidence: Evidence) -> list[Effect]:
-    """The candidates that are searched for."""
+    """The candidates that are searched for.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+
+    Returns
+    -------
+    list of Effect
+        Those that the machine can have and that are not read off a signal.
+    """
     return [effect for effect in evidence.machine.effects() if effect.searched]
 
 
@@ -191,7 +202,20 @@ def _excess(misfit: float, evidence: Evidence) -> float:
 
 
 def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
-    """χ² that an effect must explain to be a finding on this evidence."""
+    """χ² that an effect must explain to be a finding on this evidence.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    float
+        The greater of an absolute limit and a share of what noise alone leaves.
+    """
     return max(thresholds.detected, thresholds.noticeable * evidence.expected)
 
 

@@ -52,6 +52,11 @@ def compare(
     progress
         Called with each replay's name.
 
+    Returns
+    -------
+    Comparison
+        What each replay leaves, and what could not be replayed.
+
     Raises
     ------
     RigtwinError
@@ -83,7 +88,18 @@ def compare(
 
 
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
-    """What each signal of the first recording has left, by its name."""
+    """What each signal of the first recording has left.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+
+    Returns
+    -------
+    dict
+        Name of the signal → its residual.
+    """
     lines, period = evidence.lines[0], evidence.recordings[0].period
     difference = lines.measured - evidence.predict(evidence.plant)[0]
     return {
@@ -95,7 +111,18 @@ def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
 
 
 def differences(first: Recording, second: Recording) -> tuple[str, ...]:
-    """What was not the same in two tests, a line each; empty if they were asked the same."""
+    """What was not the same in two tests.
+
+    Parameters
+    ----------
+    first, second
+        Their recordings.
+
+    Returns
+    -------
+    tuple of str
+        A line each; empty if they were asked the same.
+    """
     notes = []
     if first.experiment != second.experiment:
         notes.append(f"different experiments: {first.experiment} and {second.experiment}")
@@ -123,10 +150,24 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
 def compare_recordings(
     machine: Machine, first: Recording, second: Recording
 ) -> dict[str, Residual]:
-    """Two recordings of one test, sensor by sensor over their common length. The floor is both
-    sensors' noise together.
+    """Two recordings of one test, sensor by sensor over their common length.
 
-    Raises RigtwinError if their periods differ or they share no sensor.
+    Parameters
+    ----------
+    machine
+        That both are of.
+    first, second
+        The recordings.
+
+    Returns
+    -------
+    dict
+        Name of the sensor → its residual, whose floor is both sensors' noise together.
+
+    Raises
+    ------
+    RigtwinError
+        If their periods differ, they have too little in common or share no sensor.
     """
     if first.period != second.period:
         raise RigtwinError(

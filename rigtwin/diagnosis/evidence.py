@@ -77,8 +77,26 @@ class Lines:
 def lines(
     machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
 ) -> Lines:
-    """The lines of a recording's signals, and their weights about a plant. counted: how much each
-    tick counts, 0 to 1, shape (ticks,)."""
+    """The lines of a recording's signals, and their weights about a plant.
+
+    Parameters
+    ----------
+    machine
+        That it is of.
+    recording
+        The data.
+    model
+        Of the machine under the recording's inputs.
+    plant
+        That the weights are taken about.
+    counted
+        How much each tick counts, 0 to 1, shape (ticks,).
+
+    Returns
+    -------
+    Lines
+        The recording in the frequency domain.
+    """
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     rows, ticks = measured.shape
     length = int(next_fast_len(ticks, real=True) or ticks)
@@ -222,7 +240,18 @@ class Evidence:
         self._counted = counted
 
     def expected_misfit(self, plant: Plant) -> float:
-        """The same about another plant, where the noise of what drives the model may do more."""
+        """χ² of noise alone about a plant: what drives the model may carry more noise there.
+
+        Parameters
+        ----------
+        plant
+            Whose predictions are meant.
+
+        Returns
+        -------
+        float
+            `expected` at least.
+        """
         if not self.machine.rough:
             return self.expected
         more = 0.0
@@ -267,13 +296,36 @@ class Evidence:
                     each.weight[row] /= np.sqrt(1.0 + variance * each.weight[row] ** 2)
 
     def predict(self, plant: Plant) -> list[Array]:
-        """The sensors of every recording, shape (rows, ticks) each."""
+        """The sensors of every recording as a plant would have them.
+
+        Parameters
+        ----------
+        plant
+            Whose predictions are meant.
+
+        Returns
+        -------
+        list of arrays
+            One a recording, shape (rows, ticks) each.
+        """
         return [model.predict(plant) for model in self.models]
 
     def differences(self, plant: Plant) -> list[Array]:
-        """Measured less predicted, spikes apart, shape (rows, ticks) each: what a friction that
-        changes sign a tick early or late leaves says nothing of its size, and jumps when anything
-        changes."""
+        """Measured less predicted, spikes apart.
+
+        What a friction that changes sign a tick early or late leaves says nothing of its size, and
+        jumps when anything changes.
+
+        Parameters
+        ----------
+        plant
+            Whose predictions are meant.
+
+        Returns
+        -------
+        list of arrays
+            One a recording, shape (rows, ticks) each.
+        """
         return self._subtract(self.predict(plant))
 
     def _subtract(self, predictions: Sequence[Array]) -> list[Array]:
@@ -287,7 +339,18 @@ class Evidence:
         return found
 
     def whiten(self, differences: Sequence[Array]) -> Array:
-        """Differences in the time domain, shape (rows, ticks) each, as one whitened vector."""
+        """Differences as one whitened vector.
+
+        Parameters
+        ----------
+        differences
+            In the time domain, one a recording, shape (rows, ticks) each.
+
+        Returns
+        -------
+        array
+            Real and imaginary parts of all lines, one after another.
+        """
         return np.concatenate(
             [
                 part.ravel()
@@ -317,15 +380,38 @@ class Evidence:
         return tolerance.width(self.plant, self.recordings[0].period)
 
     def shift(self, plant: Plant, widths: Sequence[float]) -> Plant:
-        """The plant with each tolerance used by so many half widths."""
+        """A plant that uses its tolerances.
+
+        Parameters
+        ----------
+        plant
+            Whose predictions are meant.
+        widths
+            By how many half widths, one a tolerance.
+
+        Returns
+        -------
+        Plant
+            With the parameters moved.
+        """
         for tolerance, share in zip(self.machine.tolerances, widths, strict=True):
             if share:
                 plant = tolerance.shift(plant, share * self.width(tolerance))
         return plant
 
     def tolerance_responses(self, plant: Plant) -> Array:
-        """What each tolerance's half width does to the prediction at a plant, shape (size,
-        tolerances)."""
+        """What each tolerance's half width does to the prediction at a plant.
+
+        Parameters
+        ----------
+        plant
+            Whose predictions are meant.
+
+        Returns
+        -------
+        array
+            Whitened, shape (size, tolerances).
+        """
         before = self.predict(plant)
         columns = []
         for tolerance in self.machine.tolerances:

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
 from rigtwin.components.guide import THROUGH_FRICTION
-from rigtwin.components.plant import Plant, with_parameters
+from rigtwin.components.plant import P, Plant, with_parameters
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -57,9 +56,23 @@ class Fit:
         return " + ".join(effect.name for effect in self.effects) or "none"
 
 
-def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> Any:
-    """The plant with effects of these values, one tuple an effect in the order of its
-    parameters."""
+def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> P:
+    """The plant with effects of these values.
+
+    Parameters
+    ----------
+    plant
+        Without them.
+    effects
+        Any that do not clash.
+    values
+        One tuple an effect, in the order of its parameters.
+
+    Returns
+    -------
+    plant
+        Of the same type.
+    """
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
         plant = with_parameters(plant, effect.group, changes)
@@ -67,14 +80,39 @@ def with_values(plant: Plant, effects: Sequence[Effect], values: Sequence[Sequen
 
 
 def clashes(effect: Effect, others: Sequence[Effect]) -> bool:
-    """Whether an effect sets a parameter that another sets too."""
+    """Whether an effect sets a parameter that another sets too.
+
+    Parameters
+    ----------
+    effect
+        The one.
+    others
+        The others.
+
+    Returns
+    -------
+    bool
+        True if they cannot stand together.
+    """
     own = set(effect.kind.parameters)
     return any(other.group == effect.group and own & set(other.kind.parameters) for other in others)
 
 
 def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
-    """Whether each effect has what it acts through: a guide's play, spring or Stribeck peak is
-    nothing without its dry friction."""
+    """Whether each effect has what it acts through.
+
+    Parameters
+    ----------
+    effects
+        Of one explanation.
+    plant
+        Without them.
+
+    Returns
+    -------
+    bool
+        False if a guide's play, spring or Stribeck peak has no dry friction to act through.
+    """
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide
@@ -86,7 +124,18 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
 
 
 def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]]:
-    """Each effect of a fit in turn, the others, and their values."""
+    """Leaves out each effect of a fit in turn.
+
+    Parameters
+    ----------
+    fit
+        Of one effect or more.
+
+    Yields
+    ------
+    tuple
+        The effect left out, the others, and their values.
+    """
     for number, effect in enumerate(fit.effects):
         yield (
             effect,
@@ -216,7 +265,18 @@ class Fitter:
         return self._scales[component]
 
     def fit_one(self, effect: Effect) -> Fit:
-        """The best fit of one effect."""
+        """The best fit of one effect.
+
+        Parameters
+        ----------
+        effect
+            One that is searched for.
+
+        Returns
+        -------
+        Fit
+            From the best of its starts.
+        """
         if not is_possible((effect,), self.plant):
             start = self.starts(effect).values
             self._responses[effect] = [
@@ -274,8 +334,18 @@ class Fitter:
         ]
 
     def largest_response(self, effect: Effect) -> float:
-        """χ² of the most that any size tried of an effect changes, beyond what tolerances take
-        up."""
+        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up.
+
+        Parameters
+        ----------
+        effect
+            One that was fitted alone before.
+
+        Returns
+        -------
+        float
+            χ².
+        """
         return max(
             self.space.misfit(response.astype(np.float64))
             for _, response in self._responses[effect]
@@ -298,8 +368,23 @@ class Fitter:
     def propose_additions(
         self, first: Fit, effects: Sequence[Effect], least: float
     ) -> list[Proposal]:
-        """Second effects beside `first` that promise to explain at least `least`, by how well their
-        responses at the nominal plant, or beside it, resemble what it leaves."""
+        """Further effects beside a fit, by how well their responses at the nominal plant, or beside
+        it, resemble what it leaves.
+
+        Parameters
+        ----------
+        first
+            The fit.
+        effects
+            Candidates, all fitted alone before.
+        least
+            χ² that one must promise to explain.
+
+        Returns
+        -------
+        list of Proposal
+            In the order of the candidates.
+        """
         space = Space(self.evidence, first.plant)
         left = space.subtract_tolerances(self.evidence.residual(first.plant))
         found = []
@@ -337,7 +422,20 @@ class Fitter:
         self, fit: Fit, effects: Sequence[Effect]
     ) -> list[tuple[tuple[Effect, ...], Values]]:
         """The effects of a fit with each in turn replaced by those whose response is most like its
-        own, and values to start from: what was found first may only resemble what is there."""
+        own: what was found first may only resemble what is there.
+
+        Parameters
+        ----------
+        fit
+            The fit.
+        effects
+            Candidates, all fitted alone before.
+
+        Returns
+        -------
+        list of pairs
+            Effects, and values to start from.
+        """
         found = []
         here = self.evidence.residual(fit.plant)
         for number in range(len(fit.effects)):
@@ -379,7 +477,18 @@ class Fitter:
 
     def refit_with_tolerances(self, fit: Fit) -> Fit:
         """The fit again with the tolerances taken at it, and the mechanical ones used in the plant
-        itself."""
+        itself.
+
+        Parameters
+        ----------
+        fit
+            To start from.
+
+        Returns
+        -------
+        Fit
+            Of the same effects.
+        """
         tolerances = self.evidence.machine.tolerances
         used = np.zeros(len(tolerances))
         space = Space(self.evidence, fit.plant, used, fit.effects)
@@ -429,8 +538,24 @@ class Fitter:
         space: Space | None = None,
         base: Plant | None = None,
     ) -> Fit:
-        """Gauss-Newton with halved steps from a start. space: the tolerances, by default those
-        about the nominal plant; base: the plant without the effects."""
+        """Gauss-Newton with halved steps.
+
+        Parameters
+        ----------
+        effects
+            That are fitted together.
+        start
+            Values to start from, one tuple an effect.
+        space
+            The tolerances, by default those about the nominal plant.
+        base
+            The plant without the effects, by default the nominal one.
+
+        Returns
+        -------
+        Fit
+            Where no step gains any more.
+        """
         space, base = space or self.space, base or self.plant
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)

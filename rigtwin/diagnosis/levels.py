@@ -50,8 +50,9 @@ def compute_levels(
 
     Returns
     -------
-    Level of each component's replay, or of each signal of joints; and that of the closed loop's spectra, None where the machine
-    has no twin of it or the test is too short for spectra.
+    tuple
+        Level of each component's replay, or of each signal of joints; and that of the closed
+        loop's spectra, None where the machine has no twin of it or the test is too short.
     """
     if evidence.machine.structure is Structure.JOINTS:
         return _signal_levels(evidence, plant), None

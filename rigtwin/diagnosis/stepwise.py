@@ -40,7 +40,20 @@ BEHIND = ("compliance", "backlash")
 
 
 def penalised_cost(fit: Fit, price: float) -> float:
-    """χ² of a fit, and `price` for each of its parameters."""
+    """χ² of a fit with a price on its parameters.
+
+    Parameters
+    ----------
+    fit
+        Of any effects.
+    price
+        χ² for each parameter.
+
+    Returns
+    -------
+    float
+        What explanations are ranked by, the least first.
+    """
     return fit.misfit + price * sum(len(effect.kind.parameters) for effect in fit.effects)
 
 
@@ -80,7 +93,22 @@ def drop_needless(
 
 
 def within_tolerance(fit: Fit, evidence: Evidence, thresholds: Thresholds = STANDARD) -> bool:
-    """Whether one of the effects is no more than its declared tolerance."""
+    """Whether one of the effects is no more than its declared tolerance.
+
+    Parameters
+    ----------
+    fit
+        Of any effects.
+    evidence
+        That it was fitted to.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    bool
+        True if it explains nothing but a tolerance.
+    """
     return any(
         _is_tolerated(effect, values[0], evidence, thresholds.within_tolerance)
         for effect, values in zip(fit.effects, fit.values, strict=True)
@@ -128,8 +156,24 @@ class Growth:
 def fit_stepwise(
     tried: Sequence[Fit], first: Fit, growth: Growth, map_fits: MapFits
 ) -> tuple[list[Fit], list[Fit]]:
-    """(further fits, the chain of fits that leads to the best one, from its first effect on).
-    tried: of one and two."""
+    """Adds one effect after another to the best explanation, then replaces and removes each.
+
+    Parameters
+    ----------
+    tried
+        Fits of one and of two effects.
+    first
+        The best of one.
+    growth
+        What the search needs.
+    map_fits
+        Runs fits side by side.
+
+    Returns
+    -------
+    two lists of Fit
+        Further fits, and the chain of fits that leads to the best one.
+    """
     found: list[Fit] = []
     before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
     level = sorted(

@@ -47,7 +47,20 @@ class Passage:
 
 
 def low_pass(signal: Array, time_constant: float, period: float) -> Array:
-    """The signal through a first-order lag, from where it starts."""
+    """The signal through a first-order lag, from where it starts.
+
+    Parameters
+    ----------
+    signal
+        Shape (ticks,).
+    time_constant, period
+        s.
+
+    Returns
+    -------
+    array
+        Shape (ticks,).
+    """
     share = period / (time_constant + period)
     start = [(1.0 - share) * signal[0]]
     out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=start)
@@ -176,5 +189,20 @@ BASES: dict[str, Callable[[Passage], NamedSignals]] = {
 
 
 def forms(role: str, entry: str, by: Passage) -> list[Form]:
-    """All of them for one component. entry: where the disturbance enters the model."""
+    """All ways to disturb one component freely.
+
+    Parameters
+    ----------
+    role
+        Its part in the machine, see `BASES`.
+    entry
+        Where the disturbance enters the model.
+    by
+        What the component goes through.
+
+    Returns
+    -------
+    list of Form
+        One a function.
+    """
     return [Form(name, entry, signal) for name, signal in BASES[role](by)]

@@ -35,6 +35,11 @@ def model_of(
     steps
         Of integration a tick.
 
+    Returns
+    -------
+    Model
+        That of a quarter car, or of one or several joints.
+
     Raises
     ------
     RigtwinError

@@ -63,8 +63,26 @@ def _follow_command(
 def follow_command(
     actuator: PositionActuator, command: Array, late: float, period: float, steps: int
 ) -> Array:
-    """The position at every tick, shape (ticks,), under commands of that shape. late: s besides, of
-    the computer."""
+    """What a position actuator makes of its command.
+
+    Parameters
+    ----------
+    actuator
+        Its parameters.
+    command
+        m, shape (ticks,).
+    late
+        s besides, of the computer.
+    period
+        s, of a tick.
+    steps
+        Of integration a tick.
+
+    Returns
+    -------
+    array
+        Position at every tick, m, shape (ticks,).
+    """
     ticks, h = len(command), period / steps
     count = (ticks - 1) * steps + 1
     time = np.arange(count) * h

@@ -53,7 +53,20 @@ class Loop(NamedTuple):
 
 @compilable
 def gravity(inertia: Inertia, position: float) -> float:
-    """The load at a position, straight between the grid's points."""
+    """The gravity load at a position, straight between the grid's points.
+
+    Parameters
+    ----------
+    inertia
+        Of the joint.
+    position
+        m.
+
+    Returns
+    -------
+    float
+        N.
+    """
     place = (position - inertia.first) / inertia.spacing
     place = min(max(place, 0.0), len(inertia.load) - 1.000001)
     whole = int(place)
@@ -71,8 +84,21 @@ def inverse_dynamics(
     motion: Array,
     out: Array,
 ) -> None:
-    """The force that moves the joint as prescribed. motion: position, velocity, acceleration, shape
-    (3, ticks)."""
+    """The force that moves the joint as prescribed.
+
+    Parameters
+    ----------
+    guide, dry_friction, inertia
+        What moves.
+    spring
+        In series with the dry friction, N/m.
+    period
+        s, of a tick.
+    motion
+        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+    out
+        The force is written here, N, shape (ticks,).
+    """
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
@@ -108,9 +134,35 @@ def integrate_pushed(
     steps: int,
     out: Array,
 ) -> None:
-    """The joint under its force actuator. kinds: 0 for a sensor of position, 1 of velocity;
-    command: as recorded, shape (ticks,), replaced by the controller's if the loop is closed;
-    besides: another force, N; out: position, velocity, force of the actuator, shape (3, ticks)."""
+    """The joint under its force actuator.
+
+    Parameters
+    ----------
+    guide, dry_friction, inertia
+        What moves.
+    spring
+        In series with the dry friction, N/m.
+    start
+        Position m and velocity m/s.
+    constant, limit
+        Of the actuator: N per unit of its command, and N.
+    drive, held
+        Conditioning of its command, and its state.
+    sensors, states, kinds
+        That the controller reads; kind 0 of position, 1 of velocity.
+    loop
+        What commands the actuator.
+    command
+        As recorded, shape (ticks,); replaced by the controller's if the loop is closed.
+    besides
+        Another force, N, shape (ticks,).
+    period
+        s, of a tick.
+    steps
+        Of integration a tick.
+    out
+        Position, velocity and the actuator's force are written here, shape (3, ticks).
+    """
     h = period / steps
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0

@@ -25,9 +25,19 @@ Columns = dict[str, dict[str, Array]]
 
 
 def demanded_channels(machine: Machine) -> list[Channel]:
-    """What a test has to demand of a machine: (topic, field) of commands that no described
-    controller computes, of what the controller is given besides its own sensors, and of motions
-    that are prescribed."""
+    """What a test has to demand of a machine.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+
+    Returns
+    -------
+    list of channels
+        Commands that no described controller computes, what the controller is given besides its own
+        sensors, and motions that are prescribed.
+    """
     found: list[Channel] = []
     for replay in machine.replays:
         mover = machine.components[replay.moved_by[0]]
@@ -74,6 +84,11 @@ def run_machine(
         That the machine has and the operator does not know of, as `--effect` takes them.
     controller
         That commands the machine's actuator instead of the described one.
+
+    Returns
+    -------
+    RunResult
+        How it went.
 
     Raises
     ------

@@ -16,8 +16,8 @@ P = TypeVar("P", bound=Plant, contravariant=True)
 
 @dataclass(frozen=True)
 class Form:
-    """One way to disturb a component freely. entry: where it enters, as `predict_disturbed` takes it;
-    signal: shape (ticks,)."""
+    """One way to disturb a component freely. entry: where it enters, as `predict_disturbed` takes
+    it; signal: shape (ticks,)."""
 
     name: str
     entry: str

@@ -9,7 +9,6 @@ MJCF's own actuators are left out.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -47,7 +46,9 @@ class MujocoModel(JointModel):
     controller: Tick | None = None
     """What commands the actuator instead of the description's controller."""
 
-    def _mechanics(self, plant: Plant, timestep: float) -> tuple[Any, Any, int, int]:
+    def _mechanics(
+        self, plant: Plant, timestep: float
+    ) -> tuple[mujoco.MjModel, mujoco.MjData, int, int]:
         """Model and data with the plant's mass, and where the joint's position and velocity are."""
         model = mujoco.MjModel.from_xml_path(str(self._machine.model))
         joint, mass = self._replay.joint, self._replay.mass
@@ -208,7 +209,9 @@ class _Passive:
         self._slider, self._viscous = position, 0.0
         self._share = timestep / (guide.relaxation + timestep)
 
-    def act(self, model: Any, data: Any, at: int, x: float, v: float, load: float) -> None:
+    def act(
+        self, model: mujoco.MjModel, data: mujoco.MjData, at: int, x: float, v: float, load: float
+    ) -> None:
         """Writes friction into the model and all other forces into the joint's applied force."""
         guide = self._guide
         forward, backward = dry_limits(self._dry, v, load)

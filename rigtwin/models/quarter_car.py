@@ -138,8 +138,28 @@ def move_plate(
     timestep: float,
     steps: int,
 ) -> Plate:
-    """A cylinder under its commands, m, from rest at `at` under the command `start`; None: where
-    that command holds it."""
+    """A cylinder under its commands, from rest.
+
+    Parameters
+    ----------
+    cylinder, computer
+        Their parameters.
+    commands
+        m, shape (ticks,).
+    start
+        Command that was held before, m.
+    at
+        Where it rests, m; None: where that command holds it.
+    timestep
+        s.
+    steps
+        Of integration a tick.
+
+    Returns
+    -------
+    Plate
+        Its unloaded motion.
+    """
     conditioning = actuator(cylinder, computer, timestep)
     held = hold(conditioning, start)
     out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
@@ -161,9 +181,24 @@ def move_plate(
 def solve_velocity(
     rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
 ) -> float:
-    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs. rail: impulses,
-    Ns, that it can bear against positive and negative v; motor: against positive and negative plate
-    − v, plate being the plate's velocity."""
+    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs.
+
+    Parameters
+    ----------
+    rhs, inertia
+        Momentum Ns, and kg.
+    rail
+        Impulses, Ns, that it can bear against positive and negative v.
+    motor
+        The same against positive and negative plate − v.
+    plate
+        The plate's velocity, m/s.
+
+    Returns
+    -------
+    float
+        m/s.
+    """
     below = (rhs + rail[1] + motor[0]) / inertia
     if below < min(0.0, plate):
         return below
@@ -187,7 +222,20 @@ def motor_friction(
     plate: float,
     velocity: float,
 ) -> float:
-    """The dry friction of the motor at that solution, as an impulse on the carriage in Ns."""
+    """The dry friction of the motor at that solution.
+
+    Parameters
+    ----------
+    rhs, inertia, rail, motor, plate
+        As `solve_velocity` takes them.
+    velocity
+        Its solution, m/s.
+
+    Returns
+    -------
+    float
+        Impulse on the carriage, Ns.
+    """
     if velocity < plate:
         return motor[0]
     if velocity > plate:

@@ -61,8 +61,18 @@ class FormulaDemands:
 
 
 def experiments_of(machine: Machine) -> dict[str, Experiment]:
-    """The experiments of a machine by name: those of the Python module that its description names,
-    or its own tables."""
+    """The experiments of a machine.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+
+    Returns
+    -------
+    dict
+        Name → experiment: those of the Python module that the description names, or its own tables.
+    """
     if isinstance(machine.experiments, str):
         known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
         if machine.plant == RigPlant():
@@ -93,7 +103,25 @@ def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experi
 
 
 def find_experiment(machine: Machine, name: str) -> Experiment:
-    """The experiment of that name. Raises RigtwinError listing what there is."""
+    """The experiment of a name.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    name
+        Of the experiment.
+
+    Returns
+    -------
+    Experiment
+        As described.
+
+    Raises
+    ------
+    RigtwinError
+        Listing what there is, for an unknown name.
+    """
     known = experiments_of(machine)
     if name not in known:
         there = ", ".join(known) or "none in its description"

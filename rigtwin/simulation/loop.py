@@ -67,7 +67,23 @@ Tick = Callable[[Measurements, Demand], Commands]
 
 
 def check_commands(given: object) -> Commands:
-    """Commands that can be written to a rig. Raises RigtwinError for anything else."""
+    """Commands that can be written to a rig.
+
+    Parameters
+    ----------
+    given
+        What a controller returned.
+
+    Returns
+    -------
+    Commands
+        Four finite numbers.
+
+    Raises
+    ------
+    RigtwinError
+        For anything else.
+    """
     try:
         commands = Commands(*(float(value) for value in given))  # type: ignore[attr-defined]
     except (TypeError, ValueError):
@@ -113,6 +129,11 @@ def run(
         Columns of controllers.Demand, shape (ticks, 3).
     tick
         A controller of one's own; by default the rig's with the configuration's settings.
+
+    Yields
+    ------
+    Block
+        Consecutive ticks; the last says why the test ended.
 
     Raises
     ------
@@ -206,7 +227,24 @@ def _ticks(
 def run_compiled(
     twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK
 ) -> Iterator[Block]:
-    """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast."""
+    """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast.
+
+    Parameters
+    ----------
+    twin
+        At its start.
+    configuration
+        Of the test.
+    demands
+        Columns of controllers.Demand, shape (ticks, 3).
+    block
+        Ticks handed on at a time.
+
+    Yields
+    ------
+    Block
+        Consecutive ticks; the last says why the test ended.
+    """
     controlling = controller(configuration.controller, configuration.timing.period)
     memory, limit_memory = np.array(packed(initial_state(controlling))), empty_memory_arrays()
     for first in range(0, len(demands), block):

@@ -42,7 +42,22 @@ class SimulationResult:
 
 
 def simulate(configuration: Configuration, demands: Array, seed: int) -> SimulationResult:
-    """Runs `demands`, shape (ticks, 3), on the twin and keeps everything in memory."""
+    """Runs a test on the twin and keeps everything in memory.
+
+    Parameters
+    ----------
+    configuration
+        Of the test.
+    demands
+        Columns of controllers.Demand, shape (ticks, 3).
+    seed
+        Of the sensors' noise.
+
+    Returns
+    -------
+    SimulationResult
+        Commands, measurements and truth at every tick, and why it ended.
+    """
     blocks = list(
         run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
     )
@@ -55,7 +70,18 @@ def simulate(configuration: Configuration, demands: Array, seed: int) -> Simulat
 
 
 def without_limits(configuration: Configuration) -> Configuration:
-    """The same without trips, to see what a twin would do wherever it goes."""
+    """The same without trips, to see what a twin would do wherever it goes.
+
+    Parameters
+    ----------
+    configuration
+        Of a test.
+
+    Returns
+    -------
+    Configuration
+        With infinite limits.
+    """
     return configuration._replace(safety=Safety(*(math.inf for _ in Safety._fields)))
 
 
@@ -96,6 +122,11 @@ def record(
     controller
         One of one's own instead of the rig's, tick by tick in Python; the recording then says
         nothing of a controller's settings but where the test started.
+
+    Returns
+    -------
+    RunResult
+        How it went.
 
     Raises
     ------
