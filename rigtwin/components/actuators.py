@@ -1,5 +1,5 @@
 """Actuators of a described machine: parameters alone. Units are those of a joint that slides; of
-one that turns, read rad for m and Nm for N. What becomes of a command is in `signal_path`."""
+one that turns, read rad for m and Nm for N. What becomes of a command is in `conditioning`."""
 
 from __future__ import annotations
 

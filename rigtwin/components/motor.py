@@ -1,5 +1,5 @@
 """The linear motor and its amplifier: parameters alone. What its friction does is in `guide`, its
-command in `signal_path`."""
+command in `conditioning`."""
 
 from __future__ import annotations
 

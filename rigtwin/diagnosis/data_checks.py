@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Row
+from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
@@ -136,6 +136,11 @@ def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
             "recording",
             f"it is of machine {recording.machine!r}; this twin is {machine.name!r}",
         )
+    observed = any(row.kind == "command" for row in machine.rows)
+    if OWN in recording.controller and observed:
+        message = "its controller was not the described one, whose command is what is observed"
+        yield Fault("other controller", "recording", message)
+        return
     for topic, name in channels(machine):
         if not recording.has(topic, name):
             there = ", ".join(f"{t}.{n}" for t, fields in recording.columns.items() for n in fields)

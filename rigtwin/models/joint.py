@@ -21,7 +21,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import Sensor, apply_sensor, start_transducer, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
@@ -70,10 +70,10 @@ class JointModel:
         self._mover = machine.components[replay.moved_by[0]]
         assert self._mover.channel is not None
         topic, name = self._mover.channel
+        # Another controller than the described one cannot be run along: what it commanded is taken.
+        closed = replay.closed and OWN not in recording.controller
         self._control = control = (
-            machine.control
-            if isinstance(machine.control, FormulaControl) and replay.closed
-            else None
+            machine.control if isinstance(machine.control, FormulaControl) and closed else None
         )
         self._command = np.zeros(recording.ticks)
         self._motion: Array | None = None
@@ -82,7 +82,7 @@ class JointModel:
         self._integrated = measures(kind) == "velocity"
         if measures(kind) in ("position", "velocity"):
             self._motion, self._error = smooth(recording.column(topic, name), self._period)
-        elif not replay.closed:
+        elif not closed:
             self._command = recording.column(topic, name)
         self._inputs = {}
         if control is not None:
@@ -137,7 +137,7 @@ class JointModel:
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """What the motion depends on."""
         names = [self._replay.guide, self._replay.mass, self._mover.name, "computer"]
-        if self._replay.closed:
+        if self._control is not None:
             names += self._sensors
         return tuple(getattr(plant, name) for name in names if name is not None)
 

@@ -13,7 +13,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration, apply_effects, flatten
 from rigtwin.description.control import Channel
-from rigtwin.description.machine import Machine, ReplayOf
+from rigtwin.description.machine import OWN, Machine, ReplayOf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.joint import RUNAWAY
 from rigtwin.models.mujoco import MujocoModel, Tick
@@ -114,7 +114,7 @@ def run_machine(
             controller=controller,
         )
     settings = flatten(configuration)
-    told = settings.get("controller", {}) if controller is None else {}
+    told = settings.get("controller", {}) if controller is None else {OWN: True}
     fields = {topic: tuple(names) for topic, names in columns.items()}
     period = configuration.timing.period
     with Writer(path, experiment, period, told, machine.name, fields) as writer:
@@ -200,6 +200,7 @@ def _simulate(
     for _, (topic, name) in sensors:
         made.setdefault(topic, {}).setdefault(name, np.zeros(ticks))
     time = np.arange(ticks) * period
+    told: dict[str, object] = {} if controller is None else {OWN: True}
     recording = Recording(
         path=Path("test"),
         machine=machine.name,
@@ -207,7 +208,7 @@ def _simulate(
         period=period,
         time=time,
         columns=made,
-        controller={},
+        controller=told,
     )
     model = MujocoModel(machine, replay, recording, configuration, configuration.substeps)
     model.sensor_noise = {name: _noise(plant, name, ticks, period, random) for name, _ in sensors}

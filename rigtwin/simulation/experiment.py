@@ -74,7 +74,13 @@ def experiments_of(machine: Machine) -> dict[str, Experiment]:
         Name → experiment: those of the Python module that the description names, or its own tables.
     """
     if isinstance(machine.experiments, str):
-        known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
+        try:
+            known: Mapping[str, Experiment] = import_module(machine.experiments).EXPERIMENTS
+        except (ImportError, AttributeError) as error:
+            raise RigtwinError(
+                f"{machine.path}: [experiments] python = {machine.experiments!r}: {error}; "
+                "expected a module with EXPERIMENTS, name to Experiment"
+            ) from None
         if machine.plant == RigPlant():
             return dict(known)
         base = machine.configuration
@@ -96,7 +102,7 @@ def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experi
     return Experiment(
         name=name,
         summary=str(table.get("summary", "")),
-        source=str(machine.path),
+        source=machine.path.name,
         configuration=base._replace(timing=timing),
         demands=FormulaDemands(demands),
     )

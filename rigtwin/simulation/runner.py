@@ -11,6 +11,7 @@ import numpy as np
 
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, Safety, apply_effects, flatten
+from rigtwin.description.machine import OWN
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.recording.channels import DEFAULT_MACHINE
@@ -139,7 +140,7 @@ def record(
     told: dict[str, object] = dict(settings["controller"])
     blocks = run_compiled(twin, actual, demands)
     if controller is not None:
-        told = {"own": True, **{name: told[name] for name in ("start", "preload")}}
+        told = {OWN: True, **{name: told[name] for name in ("start", "preload")}}
         blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
     with Writer(path, experiment, configuration.timing.period, told, machine) as writer:
