@@ -249,7 +249,7 @@ def run(
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         kept = Path(folder) / f"{test.name}-{seed}.mcap"
         _record(kept, on, test, configuration, seed, effect_texts(effects), controller, progress)
-        return _faced(reader.load(kept), on)
+        return replace(_faced(reader.load(kept), on), path=Path(kept.name))
 
 
 def _experiment(of: Machine, experiment: str | Experiment | Demanding) -> Experiment:
@@ -329,7 +329,7 @@ def diagnose(
     """
     several = list(_several(recordings))
     apart = list(_several(held_out))
-    paths = [each.path.resolve() for each in (*several, *apart)]
+    paths = [each.path.resolve() for each in (*several, *apart) if each.path.exists()]
     if len(set(paths)) < len(paths) or not several:
         raise RigtwinError(
             "a recording is named twice; each counts once, and what is held out must not be fitted"
