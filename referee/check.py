@@ -114,7 +114,7 @@ def answer(files: Files) -> dict[str, Any]:
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import load
-    from rigtwin.recording.channels import DEFAULT_MACHINE
+    from machines import DEFAULT_MACHINE
 
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         names = ("recording.mcap", "held-out.mcap")

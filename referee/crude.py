@@ -13,7 +13,7 @@ from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.recording import load
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 from rigtwin.signals.noise import white_noise
 from rigtwin.simulation.runner import simulate, without_limits
 

@@ -114,7 +114,7 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     from rigtwin.diagnosis.calibrated import toml
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import load
-    from rigtwin.recording.channels import DEFAULT_MACHINE
+    from machines import DEFAULT_MACHINE
 
     truth, _, random = draw_rig(*case)
     law, demands = draw_demands("imposed", random)

@@ -139,7 +139,7 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda rig: rigtwin.run(rig, "nope"), "unknown experiment 'nope'; suspension-rig has drop"),
+        (lambda rig: rigtwin.run(rig, "nope"), "unknown experiment 'nope'; there are drop"),
         (lambda rig: rigtwin.run(rig, "drop", seed=-1), "seed -1: expected 0 or more"),
         (lambda rig: rigtwin.run(rig, "drop", effects={"coulomb@wing": 1}), "unknown effect"),
         (lambda rig: rigtwin.run(rig, "drop", settings={"rail": {"coulomb": -1}}), "rail.coulomb = -1"),

@@ -188,7 +188,7 @@ def test_settings_are_checked():
     assert (changed.plant.guide.viscous, changed.controller.kp) == (210.0, 150.0)
     assert without_effect(base, "viscous@guide").plant.guide.viscous == 0.0
     for changes, said in (
-        ({"gide": {}}, "unknown component"),
+        ({"gide": {}}, "unknown group"),
         ({"guide": {"viscuos": 1}}, "unknown setting guide.viscuos; guide has coulomb"),
         ({"guide": {"viscous": -1}}, "expected a number from 0"),
         ({"controller": {"ki": 1}}, "unknown setting"),

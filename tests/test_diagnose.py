@@ -202,7 +202,7 @@ def test_a_controller_as_told_has_no_deviation():
 )
 def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     evidence = evidence_of(recorded("imposed", (text,)))
-    predicted = evidence.predicted(RIG.plant)
+    predicted = evidence.predict(RIG.plant)
     (found,) = find_outstanding(RIG, evidence.recordings, predicted, RIG.plant)
     assert f"{found.kind}@{found.component}" == text.partition("=")[0]
     assert found.value == pytest.approx(value, rel=0.1)

@@ -61,7 +61,7 @@ def test_the_list_is_that_of_the_design():
         "rail": slides,
         "carriage": {"mass"},
         "tyre": {"stiffness", "damping", "hardening"},
-        "motor": slides | actuators | {"cogging"},
+        "motor": slides | actuators | {"cogging", "load_friction"},
         "structure_cylinder": actuators | {"compliance"},
         "ground_cylinder": actuators | {"compliance"},
         **dict.fromkeys(("load_cell", "suspension_lvdt", "structure_lvdt", "ground_lvdt"), sensors),

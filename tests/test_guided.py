@@ -14,7 +14,7 @@ from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.choose import model_of
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import Inertia
+from rigtwin.models.guided import Inertia, inverse_dynamics
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of

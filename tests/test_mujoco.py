@@ -86,7 +86,7 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
     scale = 0.15 if sort == "pendulum" else 1.0
     plain = with_parameters(machine.plant, "guide", {k: scale * v for k, v in FRICTION.items()})
     assert {e.kind.name for e in mechanical(machine)} <= set(SIZES), "every kind has a size here"
-    unmoved = reference.moved(plain)[0]
+    unmoved = reference.move(plain)[0]
     for effect in mechanical(machine):
         size = SIZES[effect.kind.name]
         if sort == "pendulum" and effect.quantities()[effect.kind.parameters[0]].unit in ("N", "Ns/m", "N/m", "Ns^2/m^2"):
@@ -96,7 +96,7 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
         if sort == "pendulum" and effect.kind.name == "mass":
             size = 1.5 * machine.plant.mass.mass
         plant = with_parameters(plain, effect.group, {effect.kind.parameters[0]: size})
-        ours, theirs = fast.moved(plant)[0], reference.moved(plant)[0]
+        ours, theirs = fast.move(plant)[0], reference.move(plant)[0]
         felt = rms(theirs - unmoved)
         assert felt > 1e-3 * rms(unmoved), f"{effect.name} is not felt"
         apart = rms(ours - theirs)
@@ -109,12 +109,12 @@ def test_every_effect_of_a_carried_joint_takes_the_force_that_mujoco_says(tmp_pa
     column = {"/sensor": {"position": MOTION, "cell": np.zeros_like(TIME)}}
     fast, reference = models(machine, column)
     plain = rubbed(machine)
-    unmoved = reference.moved(plain)[2]
+    unmoved = reference.move(plain)[2]
     for effect in mechanical(machine):
         if effect.group == "drive":
             continue
         plant = with_effect(plain, effect)
-        ours, theirs = fast.moved(plant)[2], reference.moved(plant)[2]
+        ours, theirs = fast.move(plant)[2], reference.move(plant)[2]
         felt = rms(theirs - unmoved)
         assert felt > 1e-3 * rms(unmoved), f"{effect.name} is not felt"
         apart = rms(ours - theirs)

@@ -90,7 +90,7 @@ def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
             writer.add_message(other, tick * 1_000_000, b"{}", tick * 1_000_000)
         writer.finish()
     recording = load(path)
-    assert list(recording.columns["/sensor"]) == fields
+    assert list(recording.columns["/sensor"]) == [*fields, "extra"], "the table's first, then what else there is"
     assert np.allclose(recording.column("/sensor", "ground_lvdt"), data["sensor"][:, 0], rtol=0, atol=0)
     if omit:
         with pytest.raises(RigtwinError, match=f"channel /sensor.{omit} is missing; it has /sensor.ground_lvdt"):

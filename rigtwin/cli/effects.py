@@ -6,7 +6,7 @@ import argparse
 
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 
 SUMMARY = "list the effects that a machine can have"
 MORE = """\

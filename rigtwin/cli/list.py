@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from rigtwin.console import table
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 
 SUMMARY = "list the experiments, or the settings"
 MORE = """\

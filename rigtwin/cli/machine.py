@@ -53,6 +53,6 @@ def execute(parsed: argparse.Namespace) -> int:
     for name, source in found.sources.items():
         print(f"{name}: {source}")
     if found.control is not None:
-        print(f"controller: {found.control.output} = {found.control.formula.text}")
+        print(f"controller: {found.control.text}")
     print("no mistakes")
     return 0

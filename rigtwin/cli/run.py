@@ -9,7 +9,7 @@ from rigtwin.cli.options import add_effect, add_settings, settings_of
 from rigtwin.cli.rig_options import add_supervised
 from rigtwin.console import apart, writable
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 
 SUMMARY = "run an experiment on the twin and record it"
 MORE = """\

@@ -302,7 +302,7 @@ def override(
     for group_name, values in changes.items():
         if group_name not in known:
             raise RigtwinError(
-                f"unknown component or group {group_name!r}; there are {', '.join(known)}"
+                f"unknown group {group_name!r}; there are {', '.join(known)}"
             )
         if not isinstance(values, Mapping):
             raise RigtwinError(

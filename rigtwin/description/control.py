@@ -45,6 +45,11 @@ class Control(Protocol):
         ...
 
     @property
+    def text(self) -> str:
+        """What it is, in a line."""
+        ...
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """What it reads, in order."""
         ...
@@ -94,6 +99,10 @@ class FormulaControl:
         return settings_of(values, "the description") if values else Nothing()
 
     @property
+    def text(self) -> str:
+        return f"{self.output} = {self.formula.text}"
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         return tuple(self.inputs[name] for name in self.formula.inputs)
 
@@ -130,6 +139,10 @@ class RigControl:
     @property
     def settings(self) -> Settings:
         return Settings()
+
+    @property
+    def text(self) -> str:
+        return "controllers.mil, in Python"
 
     @property
     def channels(self) -> tuple[Channel, ...]:

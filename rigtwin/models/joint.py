@@ -215,7 +215,7 @@ class JointModel:
         stroke = max(float(np.ptp(position)), 1e-12)
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
-    def _pushed(
+    def _integrate_pushed(
         self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
         """The joint under its force actuator. besides: another force on it, N, shape (ticks,);

@@ -21,8 +21,6 @@ class Channel:
     meaning: str
 
 
-DEFAULT_MACHINE = "suspension-rig"
-"""Of recordings and commands that name none."""
 CHANNELS = (
     Channel("/command", "ground", "m", "ground cylinder position demanded"),
     Channel("/command", "structure", "m", "structure cylinder position demanded"),

@@ -42,7 +42,8 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import DEFAULT_MACHINE, topic_fields
+from machines import DEFAULT_MACHINE
+from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,

@@ -130,6 +130,6 @@ def find_experiment(machine: Machine, name: str) -> Experiment:
     """
     known = experiments_of(machine)
     if name not in known:
-        there = ", ".join(known) or "none in its description"
-        raise RigtwinError(f"unknown experiment {name!r}; {machine.name} has {there}")
+        there = f"there are {', '.join(known)}" if known else f"{machine.name} describes none"
+        raise RigtwinError(f"unknown experiment {name!r}; {there}")
     return known[name]

@@ -14,7 +14,7 @@ from rigtwin.description.configuration import Configuration, Safety, apply_effec
 from rigtwin.description.machine import OWN
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 from rigtwin.simulation.loop import Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explain_trip
 from rigtwin.simulation.twin import Twin

@@ -8,7 +8,7 @@ import pytest
 
 NOTICEABLE = {
     "coulomb@rail": "90", "viscous@rail": "400", "stribeck@rail": "30", "asymmetry@rail": "30", "backlash@rail": "0.002",
-    "coulomb@motor": "24", "viscous@motor": "60", "stribeck@motor": "12", "asymmetry@motor": "12", "backlash@motor": "0.002",
+    "coulomb@motor": "24", "viscous@motor": "60", "stribeck@motor": "12", "asymmetry@motor": "12", "load_friction@motor": "0.05", "backlash@motor": "0.002",
     "mass@carriage": "40", "stiffness@tyre": "42000", "damping@tyre": "500", "hardening@tyre": "60",
     "gain@motor": "1.05", "lag@motor": "0.005", "delay@motor": "0.005", "saturation@motor": "1.5", "deadband@motor": "0.1",
     "rate_limit@motor": "5", "cogging@motor": "10",

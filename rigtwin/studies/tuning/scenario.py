@@ -14,7 +14,7 @@ from rigtwin.components import RigPlant
 from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Configuration, override
 from rigtwin.description.posterior import Changes, Posterior, shift_within, value_of
-from rigtwin.recording.channels import DEFAULT_MACHINE
+from machines import DEFAULT_MACHINE
 from rigtwin.studies.tuning.study import Study
 
 APART = 1_000_000
