@@ -1,4 +1,5 @@
-"""`python -m benchmarks.realtime`: what a tick costs on the way to the card, and how late a loop in real time is here."""
+"""`python -m benchmarks.realtime`: what a tick costs on the way to the card, and how late a loop in
+real time is here."""
 
 from __future__ import annotations
 
@@ -51,8 +52,9 @@ class _Taped:
 
 
 class _Timed:
-    """A card, and the time of each tick from its beginning to the end of all its work, less what the virtual card takes to
-    answer, which stands for the driver and the hardware. pacer: None for ticks one after the other, without a pause."""
+    """A card, and the time of each tick from its beginning to the end of all its work, less what
+    the virtual card takes to answer, which stands for the driver and the hardware. pacer: None for
+    ticks one after the other, without a pause."""
 
     def __init__(self, card: Card, device: VirtualCard, pacer: Pacer | None) -> None:
         self._card, self._pacer, self.missed, self.late = card, pacer, 0, 0.0
@@ -88,7 +90,8 @@ class _Timed:
 
 
 def _test(name: str) -> Test:
-    """Without the class a shared computer may keep a loop waiting for longer than a rig could bear; here nothing moves."""
+    """Without the class a shared computer may keep a loop waiting for longer than a rig could bear;
+    here nothing moves."""
     experiment = EXPERIMENTS[name]
     configuration = from_assignments(
         experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"]
@@ -97,8 +100,9 @@ def _test(name: str) -> Test:
 
 
 def compute(name: str, folder: Path, paced: bool) -> Array:
-    """s of each tick of a test on the virtual card: driver's client, conversion, limits, controller, recording; not the twin,
-    not the card. paced: one tick a period, from a cold cache as on the rig, or one after the other."""
+    """s of each tick of a test on the virtual card: driver's client, conversion, limits,
+    controller, recording; not the twin, not the card. paced: one tick a period, from a cold cache
+    as on the rig, or one after the other."""
     test = _test(name)
     tape = _Taped(test.terminals())
     card, _ = open_virtual_card(test, tape)
@@ -112,7 +116,8 @@ def compute(name: str, folder: Path, paced: bool) -> Array:
 
 
 def late(fifo: bool, folder: Path) -> dict[str, str]:
-    """Figures of a recording's lateness, of the twin in real time, with the scheduling class or without."""
+    """Figures of a recording's lateness, of the twin in real time, with the scheduling class or
+    without."""
     test = _test("road1.6")
     twin = InRealTime(WiredTwin(test.terminals(), test.table), test.configuration.timing.period)
     path = folder / f"{fifo}.mcap"

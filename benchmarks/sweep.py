@@ -1,4 +1,5 @@
-"""`python -m benchmarks.sweep`: what a sweep costs besides its runs, what a second worker brings, and its memory."""
+"""`python -m benchmarks.sweep`: what a sweep costs besides its runs, what a second worker brings,
+and its memory."""
 
 from __future__ import annotations
 
@@ -59,9 +60,14 @@ def alone(job: Run) -> float:
 
 
 def scaling(folder: Path) -> None:
-    """1 against 2 workers, side by side; and two processes that know nothing of each other, which is what the machine gives."""
+    """1 against 2 workers, side by side; and two processes that know nothing of each other, which
+    is what the machine gives."""
     ratios, machine = [], []
-    with open_workers(1) as one, open_workers(2) as two, multiprocessing.get_context("spawn").Pool(2) as pool:
+    with (
+        open_workers(1) as one,
+        open_workers(2) as two,
+        multiprocessing.get_context("spawn").Pool(2) as pool,
+    ):
         jobs = [job for _, job in asked(6.0, 2)]
         timed(one, folder, 900)
         timed(two, folder, 900)
@@ -70,8 +76,14 @@ def scaling(folder: Path) -> None:
             ratios.append(timed(one, folder, number) / timed(two, folder, number))
             single = pool.apply(alone, (jobs[0],))
             machine.append(2.0 * single / max(pool.map(alone, jobs, chunksize=1)))
-    print(f"1 → 2 workers: {statistics.median(ratios):.2f} times as fast ({min(ratios):.2f} to {max(ratios):.2f})")
-    print(f"two processes apart: {statistics.median(machine):.2f} times ({min(machine):.2f} to {max(machine):.2f})")
+    print(
+        f"1 → 2 workers: {statistics.median(ratios):.2f} times as "
+        f"fast ({min(ratios):.2f} to {max(ratios):.2f})"
+    )
+    print(
+        f"two processes apart: {statistics.median(machine):.2f} "
+        f"times ({min(machine):.2f} to {max(machine):.2f})"
+    )
 
 
 def overhead(folder: Path) -> None:
@@ -91,7 +103,12 @@ def overhead(folder: Path) -> None:
         run_jobs(store, workers, nothing, asked(6.0, 50, 10**6))
         begin = time.perf_counter()
         run_jobs(store, workers, nothing, asked(6.0, TRIVIAL))
-        rows.append((f"cluster of {workers.capacity}", f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
+        rows.append(
+            (
+                f"cluster of {workers.capacity}",
+                f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}",
+            )
+        )
     print(table(rows))
 
 
@@ -104,7 +121,15 @@ def cluster(folder: Path) -> Iterator[str]:
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", *common]
     processes = [subprocess.Popen(begin, env=environment, **quiet)]
-    begin = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *common]
+    begin = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_worker",
+        "--nthreads",
+        "1",
+        "--no-nanny",
+        *common,
+    ]
     processes += [subprocess.Popen(begin, env=environment, **quiet) for _ in range(2)]
     try:
         time.sleep(10.0)
@@ -128,9 +153,15 @@ def memory(folder: Path) -> None:
         for done in range(0, MANY, GENERATION):
             run_jobs(store, workers, run, asked(0.05, GENERATION, done))
             if done + GENERATION in (1000, 2500, 5000, 7500, MANY):
-                own = [child.pid for child in multiprocessing.active_children() if child.pid is not None]
+                own = [
+                    child.pid
+                    for child in multiprocessing.active_children()
+                    if child.pid is not None
+                ]
                 largest = max(map(resident, own))
-                rows.append((str(done + GENERATION), f"{resident(os.getpid()):.1f}", f"{largest:.1f}"))
+                rows.append(
+                    (str(done + GENERATION), f"{resident(os.getpid()):.1f}", f"{largest:.1f}")
+                )
     print(table(rows))
 
 

@@ -1,4 +1,5 @@
-"""Controllers of the rig: plain functions of (settings, state, input) that run as Python or compiled, on twin or rig.
+"""Controllers of the rig: plain functions of (settings, state, input) that run as Python or
+compiled, on twin or rig.
 
 They know nothing of the twin. `update` is one tick of the whole controller.
 """

@@ -1,7 +1,9 @@
-"""The cross of elastic beams: finite elements, their modes, and one tick of the few modes that its centre feels (thesis §7.2).
+"""The cross of elastic beams: finite elements, their modes, and one tick of the few modes that its
+centre feels (thesis §7.2).
 
-Four arms of three Bernoulli beams; 13 nodes of three displacements and three rotations each, 78 in all. Of the modes only those
-that are symmetric about the centre move it vertically; they alone are in the loop.
+Four arms of three Bernoulli beams; 13 nodes of three displacements and three rotations each, 78 in
+all. Of the modes only those that are symmetric about the centre move it vertically; they alone are
+in the loop.
 """
 
 from __future__ import annotations
@@ -26,18 +28,21 @@ ARMS, BEAMS = 4, 3
 NODES = 1 + ARMS * BEAMS
 FREEDOMS = 6 * NODES
 HEAVE = 2
-"""Number of the vertical displacement among a node's freedoms x, y, z, about x, about y, about z."""
+"""Number of the vertical displacement among a node's freedoms x, y, z, about x, about y, about
+z."""
 MODES = 6
-"""Symmetric modes in the loop: heave and five elastic ones, up to 135 Hz with the beams of thesis Table 7.4."""
+"""Symmetric modes in the loop: heave and five elastic ones, up to 135 Hz with the beams of thesis
+Table 7.4."""
 AT_REST: Six = (0.0,) * 6
 
 
 class Modes(NamedTuple):
     """The structure model sampled at the controller's period; one row a mode.
 
-    transition: of (displacement, rate), shape (MODES, 2, 2); entry: of the modal force, shape (MODES, 2); centre: of the mode
-    shape at the centre, 1/√kg; weight: modal force of gravity; wing: of the mode shape at 0, 1, 2, 3 beams from the centre,
-    shape (MODES, 4); frequencies in Hz.
+    transition: of (displacement, rate), shape (MODES, 2, 2); entry: of the modal force, shape
+    (MODES, 2); centre: of the mode shape at the centre, 1/√kg; weight: modal force of gravity;
+    wing: of the mode shape at 0, 1, 2, 3 beams from the centre, shape (MODES, 4); frequencies in
+    Hz.
     """
 
     transition: Array
@@ -51,8 +56,9 @@ class Modes(NamedTuple):
 def element(settings: Settings) -> tuple[Array, Array]:
     """Consistent mass and stiffness of one beam along x, shape (12, 12) each; thesis Eq. 7.2, 7.3.
 
-    A vertical load at the centre of a symmetric cross bends its arms in the vertical plane alone, so torsion and horizontal
-    bending do not matter (thesis §7.2.1): the section is taken as equal both ways, with a Poisson ratio of 0.3.
+    A vertical load at the centre of a symmetric cross bends its arms in the vertical plane alone,
+    so torsion and horizontal bending do not matter (thesis §7.2.1): the section is taken as equal
+    both ways, with a Poisson ratio of 0.3.
     """
     modulus, inertia, length = settings.beam_modulus, settings.beam_inertia, settings.beam_length
     line = settings.beam_density * settings.beam_area
@@ -100,12 +106,19 @@ def element(settings: Settings) -> tuple[Array, Array]:
 
 
 def assembled(settings: Settings) -> tuple[Array, Array]:
-    """Mass and stiffness of the whole cross, shape (78, 78) each. Node 0 is the centre; arm i has nodes 1 + 3i to 3 + 3i."""
+    """Mass and stiffness of the whole cross, shape (78, 78) each. Node 0 is the centre; arm i has
+    nodes 1 + 3i to 3 + 3i."""
     mass, stiffness = np.zeros((FREEDOMS, FREEDOMS)), np.zeros((FREEDOMS, FREEDOMS))
     of_one = element(settings)
     for arm in range(ARMS):
         angle = arm * math.pi / 2
-        turn = np.array([[math.cos(angle), math.sin(angle), 0.0], [-math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+        turn = np.array(
+            [
+                [math.cos(angle), math.sin(angle), 0.0],
+                [-math.sin(angle), math.cos(angle), 0.0],
+                [0.0, 0.0, 1.0],
+            ]
+        )
         whole = np.kron(np.eye(4), turn)
         nodes = [0, *range(1 + BEAMS * arm, 1 + BEAMS * (arm + 1))]
         for inner, outer in pairwise(nodes):
@@ -116,7 +129,8 @@ def assembled(settings: Settings) -> tuple[Array, Array]:
 
 
 def all_modes(settings: Settings) -> tuple[Array, Array]:
-    """Angular frequencies (rad/s, ascending, shape (78,)) and mass-normalised shapes (columns) of the free cross."""
+    """Angular frequencies (rad/s, ascending, shape (78,)) and mass-normalised shapes (columns) of
+    the free cross."""
     mass, stiffness = assembled(settings)
     squares, shapes = eigh(stiffness, mass)
     # The six rigid motions come out as rounding; the elastic ones are far above.
@@ -126,7 +140,9 @@ def all_modes(settings: Settings) -> tuple[Array, Array]:
 
 def modes(settings: Settings, period: float) -> Modes:
     """The symmetric modes, sampled exactly for a force held over each period (s)."""
-    described = {name: getattr(settings, name) for name in Settings._fields if name.startswith("beam_")}
+    described = {
+        name: getattr(settings, name) for name in Settings._fields if name.startswith("beam_")
+    }
     # A diagnosis asks for controllers by the hundred, whose beams are all the same.
     return _modes(Settings(gravity=settings.gravity, **{**described, "beam_sag": 0.0}), period)
 
@@ -155,9 +171,11 @@ def _modes(settings: Settings, period: float) -> Modes:
 
 
 def _symmetric(settings: Settings) -> tuple[Array, Array]:
-    """The lowest MODES modes that the cross has under a vertical force at its centre: frequencies and shapes."""
+    """The lowest MODES modes that the cross has under a vertical force at its centre: frequencies
+    and shapes."""
     mass, stiffness = assembled(settings)
-    # What is left when every arm does the same: heave of the centre, heave and slope of the three nodes of an arm.
+    # What is left when every arm does the same: heave of the centre, heave and slope of the three
+    # nodes of an arm.
     base = np.zeros((FREEDOMS, 1 + 2 * BEAMS))
     base[HEAVE, 0] = 1.0
     for arm in range(ARMS):
@@ -173,15 +191,25 @@ def _symmetric(settings: Settings) -> tuple[Array, Array]:
 
 
 def at_start(settings: Settings, model: Modes) -> Six:
-    """Modal displacements with the centre at `start`: straight, or bent by a share of the preload."""
+    """Modal displacements with the centre at `start`: straight, or bent by a share of the
+    preload."""
     angular = 2 * math.pi * model.frequencies[1:]
     bent = settings.beam_sag * settings.preload * model.centre[1:] / angular**2
     heave = (settings.start - model.centre[1:] @ bent) / model.centre[0]
-    return float(heave), float(bent[0]), float(bent[1]), float(bent[2]), float(bent[3]), float(bent[4])
+    return (
+        float(heave),
+        float(bent[0]),
+        float(bent[1]),
+        float(bent[2]),
+        float(bent[3]),
+        float(bent[4]),
+    )
 
 
 @compilable
-def _advanced(model: Modes, number: int, displacement: float, rate: float, force: float) -> tuple[float, float]:
+def _advanced(
+    model: Modes, number: int, displacement: float, rate: float, force: float
+) -> tuple[float, float]:
     pushed = model.centre[number] * force + model.weight[number]
     step, entry = model.transition[number], model.entry[number]
     return (
@@ -192,7 +220,8 @@ def _advanced(model: Modes, number: int, displacement: float, rate: float, force
 
 @compilable
 def beam(model: Modes, at: Six, rates: Six, force: float) -> tuple[Six, Six]:
-    """One tick of the modes under a force (N) on the centre, held. at, rates: modal displacements and their rates."""
+    """One tick of the modes under a force (N) on the centre, held. at, rates: modal displacements
+    and their rates."""
     # Written out, since compiled code knows tuples by their length.
     a = _advanced(model, 0, at[0], rates[0], force)
     b = _advanced(model, 1, at[1], rates[1], force)
@@ -205,7 +234,8 @@ def beam(model: Modes, at: Six, rates: Six, force: float) -> tuple[Six, Six]:
 
 @compilable
 def centre(model: Modes, modal: Six) -> float:
-    """Of the centre: its position (m) of modal displacements, or its velocity (m/s) of their rates."""
+    """Of the centre: its position (m) of modal displacements, or its velocity (m/s) of their
+    rates."""
     total = 0.0
     for number in range(MODES):
         total += model.centre[number] * modal[number]

@@ -1,4 +1,5 @@
-"""One source, two ways to run: called from Python a function stays Python; called from a compiled loop it is compiled."""
+"""One source, two ways to run: called from Python a function stays Python; called from a compiled
+loop it is compiled."""
 
 from __future__ import annotations
 
@@ -11,5 +12,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compilable(function: Function) -> Function:
-    """Marks a plain function of numbers and NamedTuples as usable inside compiled code; returns it unchanged."""
+    """Marks a plain function of numbers and NamedTuples as usable inside compiled code; returns it
+    unchanged."""
     return register_jitable(function)

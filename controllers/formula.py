@@ -1,7 +1,7 @@
 """Controllers written as a formula: `kp * (reference - position) - kv * derivative(position)`.
 
-A formula is compiled into a short program of blocks, which the same function runs from Python and inside compiled loops. Every
-block that remembers something starts at rest at its first sample.
+A formula is compiled into a short program of blocks, which the same function runs from Python and
+inside compiled loops. Every block that remembers something starts at rest at its first sample.
 """
 
 from __future__ import annotations
@@ -24,7 +24,13 @@ LONGEST = 4096
 ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE = range(5)
 ABSOLUTE, SIGN, SINE, COSINE, ROOT, SMALLER, LARGER = range(5, 12)
 DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, LATE, CLIP = range(12, 18)
-PLAIN = {"abs": (ABSOLUTE, 1), "sign": (SIGN, 1), "sin": (SINE, 1), "cos": (COSINE, 1), "sqrt": (ROOT, 1)}
+PLAIN = {
+    "abs": (ABSOLUTE, 1),
+    "sign": (SIGN, 1),
+    "sin": (SINE, 1),
+    "cos": (COSINE, 1),
+    "sqrt": (ROOT, 1),
+}
 PLAIN |= {"min": (SMALLER, 2), "max": (LARGER, 2), "limit": (CLIP, 3)}
 BLOCKS = {
     "derivative": (DERIVATIVE, 1, "derivative(x): of its last two samples"),
@@ -38,8 +44,9 @@ FUNCTIONS = (*PLAIN, *BLOCKS)
 
 
 class Program(NamedTuple):
-    """A compiled formula. Registers hold inputs, then settings, then numbers, then each operation's result; operations: code,
-    three registers, and where its memory begins, shape (operations, 5); registers: as they start, shape (registers,)."""
+    """A compiled formula. Registers hold inputs, then settings, then numbers, then each operation's
+    result; operations: code, three registers, and where its memory begins, shape (operations, 5);
+    registers: as they start, shape (registers,)."""
 
     operations: NDArray[np.int64]
     registers: NDArray[np.float64]
@@ -49,7 +56,8 @@ class Program(NamedTuple):
 
 @dataclass(frozen=True)
 class Formula:
-    """A controller. inputs: names in the order in which `run` takes their values; settings: name → value."""
+    """A controller. inputs: names in the order in which `run` takes their values; settings: name →
+    value."""
 
     text: str
     inputs: tuple[str, ...]
@@ -63,7 +71,9 @@ class Formula:
             registers[place] = settings.get(name, self.settings[name])
         return self.program._replace(registers=registers)
 
-    def replayed(self, settings: Mapping[str, float], inputs: Sequence[NDArray[Any]], period: float) -> NDArray[np.float64]:
+    def replayed(
+        self, settings: Mapping[str, float], inputs: Sequence[NDArray[Any]], period: float
+    ) -> NDArray[np.float64]:
         """Its value at every tick. inputs: in their order, shape (ticks,) each."""
         program, ticks = self.with_settings(settings), len(inputs[0])
         out = np.empty(ticks)
@@ -77,7 +87,8 @@ class Formula:
 
 
 def formula(text: str, settings: Mapping[str, float]) -> Formula:
-    """Compiles a formula. Every name that is no setting is an input. Raises ValueError saying what is wrong and where."""
+    """Compiles a formula. Every name that is no setting is an input. Raises ValueError saying what
+    is wrong and where."""
     try:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -91,21 +102,30 @@ def formula(text: str, settings: Mapping[str, float]) -> Formula:
     registers = np.array([*([0.0] * len(inputs)), *settings.values(), *builder.numbers], float)
     first = len(registers)
     table = np.array(
-        [[code, *(r if r >= 0 else first - r - 1 for r in used), at] for code, *used, at in builder.operations], np.int64
+        [
+            [code, *(r if r >= 0 else first - r - 1 for r in used), at]
+            for code, *used, at in builder.operations
+        ],
+        np.int64,
     )
-    program = Program(table, np.concatenate([registers, np.zeros(len(table))]), len(inputs), builder.remembered)
+    program = Program(
+        table, np.concatenate([registers, np.zeros(len(table))]), len(inputs), builder.remembered
+    )
     return Formula(text, inputs, dict(settings), program)
 
 
 def _names(tree: ast.expr, settings: Mapping[str, float]) -> list[str]:
     calls = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in calls]
+    found = [
+        node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in calls
+    ]
     found.sort(key=lambda node: (node.lineno, node.col_offset))
     return [node.id for node in found if node.id not in settings]
 
 
 class _Builder:
-    """Registers of results are counted −1, −2, …, since how many numbers there are is known only at the end."""
+    """Registers of results are counted −1, −2, …, since how many numbers there are is known only at
+    the end."""
 
     def __init__(self, inputs: Sequence[str], settings: Mapping[str, float]) -> None:
         self._place = {name: number for number, name in enumerate([*inputs, *settings])}
@@ -124,30 +144,44 @@ class _Builder:
 
     def result(self, node: ast.expr) -> int:
         """The register that a part of the formula ends in."""
-        if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, int | float)
+            and not isinstance(node.value, bool)
+        ):
             return self.number(float(node.value))
         if isinstance(node, ast.Name):
             return self._place[node.id]
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-            return self.operation(OPERATORS[type(node.op)], self.result(node.left), self.result(node.right))
+            return self.operation(
+                OPERATORS[type(node.op)], self.result(node.left), self.result(node.right)
+            )
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             return self.operation(NEGATE, self.result(node.operand))
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and not node.keywords:
             return self._call(node.func.id, node.args)
-        raise ValueError(f"{ast.unparse(node)!r} is not allowed; there are + - * /, numbers, names, {', '.join(FUNCTIONS)}")
+        raise ValueError(
+            f"{ast.unparse(node)!r} is not allowed; there are + - "
+            f"* /, numbers, names, {', '.join(FUNCTIONS)}"
+        )
 
     def _call(self, name: str, given: list[ast.expr]) -> int:
         if name not in FUNCTIONS:
             raise ValueError(f"unknown function {name!r}; there are {', '.join(FUNCTIONS)}")
         code, count = PLAIN[name] if name in PLAIN else BLOCKS[name][:2]
         if len(given) != count:
-            raise ValueError(f"{name} takes {count} value{'s' if count > 1 else ''}, not {len(given)}")
+            raise ValueError(
+                f"{name} takes {count} value{'s' if count > 1 else ''}, not {len(given)}"
+            )
         memory = 2 if name in BLOCKS else 0
         if name in ("mean", "late"):
             last = given[1]
             whole = last.value if isinstance(last, ast.Constant) else None
             if not isinstance(whole, int) or not 1 <= whole <= LONGEST:
-                raise ValueError(f"{name}: expected a whole number of samples from 1 to {LONGEST}, not {ast.unparse(last)}")
+                raise ValueError(
+                    f"{name}: expected a whole number of samples from "
+                    f"1 to {LONGEST}, not {ast.unparse(last)}"
+                )
             memory = whole + 2
         used = [self.result(each) for each in given]
         return self.operation(code, *used, *([0] * (3 - len(used))), memory=memory)
@@ -155,8 +189,8 @@ class _Builder:
 
 @compilable
 def run(program: Program, registers: Any, memory: Any, period: float) -> float:
-    """The formula's value at this tick. registers: the program's, with the inputs' values written into its first places;
-    memory: what its blocks remember. Both are changed."""
+    """The formula's value at this tick. registers: the program's, with the inputs' values written
+    into its first places; memory: what its blocks remember. Both are changed."""
     count = len(program.operations)
     first = len(registers) - count
     value = 0.0
@@ -211,7 +245,8 @@ def run(program: Program, registers: Any, memory: Any, period: float) -> float:
 
 @compilable
 def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> float:
-    """The mean of the last `length` samples, or the one that many ago. memory: where the ring stands, then the ring."""
+    """The mean of the last `length` samples, or the one that many ago. memory: where the ring
+    stands, then the ring."""
     size = length + 1
     if math.isnan(memory[at]):
         memory[at] = 0.0
@@ -229,7 +264,12 @@ def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> 
 
 @numba.njit(nogil=True)
 def _replayed(
-    program: Program, registers: np.ndarray, memory: np.ndarray, inputs: np.ndarray, period: float, out: np.ndarray
+    program: Program,
+    registers: np.ndarray,
+    memory: np.ndarray,
+    inputs: np.ndarray,
+    period: float,
+    out: np.ndarray,
 ) -> None:
     for tick in range(len(out)):
         for number in range(inputs.shape[1]):

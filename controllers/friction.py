@@ -1,9 +1,11 @@
-"""Compensation of the motor's dry friction: when it changes its sign the motor is told to push that much more or less.
+"""Compensation of the motor's dry friction: when it changes its sign the motor is told to push that
+much more or less.
 
-The thesis' own (§4.5, §4.6): a window is open while the velocity is about to cross zero; within it a force error that has risen
-for some samples is a friction spike; then the force added against friction changes its sign, at most once per buffer time. Two
-steps: twice as much at first, half of it taken back when the error has fallen. Another, which needs no velocity: an observer of
-the friction force, see `observed`.
+The thesis' own (§4.5, §4.6): a window is open while the velocity is about to cross zero; within it
+a force error that has risen for some samples is a friction spike; then the force added against
+friction changes its sign, at most once per buffer time. Two steps: twice as much at first, half of
+it taken back when the error has fallen. Another, which needs no velocity: an observer of the
+friction force, see `observed`.
 """
 
 from __future__ import annotations
@@ -81,7 +83,8 @@ def _sign(value: float) -> float:
 
 @compilable
 def _crossing(velocity: float, acceleration: float, horizon: float) -> float:
-    """Rule 1: direction after a crossing that is at most `horizon` (s) ahead at constant acceleration, else 0."""
+    """Rule 1: direction after a crossing that is at most `horizon` (s) ahead at constant
+    acceleration, else 0."""
     if velocity * acceleration >= 0.0:
         return 0.0
     return -_sign(velocity) if -velocity / acceleration < horizon else 0.0
@@ -89,19 +92,23 @@ def _crossing(velocity: float, acceleration: float, horizon: float) -> float:
 
 @compilable
 def expected(settings: Settings, velocities: Velocities, filtered: float, period: float) -> float:
-    """The direction of motion that is about to begin, of two estimates of the acceleration: a parabola through three filtered
-    velocities carried forward, which leads, and the filtered derivative, which lags and is quieter (thesis §4.5.1)."""
+    """The direction of motion that is about to begin, of two estimates of the acceleration: a
+    parabola through three filtered velocities carried forward, which leads, and the filtered
+    derivative, which lags and is quieter (thesis §4.5.1)."""
     now, before, earlier = velocities[0], velocities[SPACING], velocities[2 * SPACING]
     span = SPACING * period
     bend = (now - 2.0 * before + earlier) / span**2
-    slope = (3.0 * now - 4.0 * before + earlier) / (2.0 * span) + settings.crossing_prediction * bend
+    slope = (3.0 * now - 4.0 * before + earlier) / (
+        2.0 * span
+    ) + settings.crossing_prediction * bend
     leading = _crossing(now, slope, settings.crossing_time)
     return leading if leading != 0.0 else _crossing(now, filtered, settings.crossing_time)
 
 
 @compilable
 def risen(settings: Settings, errors: Errors, direction: float, period: float) -> bool:
-    """Rule 2: whether the error rose towards `direction` over the last samples, the first of them by anything."""
+    """Rule 2: whether the error rose towards `direction` over the last samples, the first of them
+    by anything."""
     least = settings.spike_gradient * period
     samples = int(settings.spike_samples)
     for number in range(samples):
@@ -113,7 +120,8 @@ def risen(settings: Settings, errors: Errors, direction: float, period: float) -
 
 @compilable
 def _spike(settings: Settings, window: float, errors: Errors, period: float) -> float:
-    """Direction of the friction spike that is seen now, else 0. A positive error is a force too small: friction has risen."""
+    """Direction of the friction spike that is seen now, else 0. A positive error is a force too
+    small: friction has risen."""
     kind = settings.compensator
     direction = _sign(errors[0])
     if abs(errors[0]) < settings.spike_threshold:
@@ -137,11 +145,19 @@ def stepped(
     error: float,
     period: float,
 ) -> tuple[Compensation, Velocities, Errors]:
-    """One tick of the thesis' compensator. travel: of the motor, raw, m; error: force demanded less force filtered, N."""
+    """One tick of the thesis' compensator. travel: of the motor, raw, m; error: force demanded less
+    force filtered, N."""
     velocity, acceleration = 0.0, 0.0
     if not math.isnan(state.travel):
-        velocity = low_pass(state.velocity, (travel - state.travel) / period, settings.filter_velocity, period)
-        acceleration = low_pass(state.acceleration, (velocity - state.velocity) / period, settings.filter_acceleration, period)
+        velocity = low_pass(
+            state.velocity, (travel - state.travel) / period, settings.filter_velocity, period
+        )
+        acceleration = low_pass(
+            state.acceleration,
+            (velocity - state.velocity) / period,
+            settings.filter_acceleration,
+            period,
+        )
     velocities = (velocity,) + velocities[:-1]  # noqa: RUF005, compiled code does not unpack
     errors = (error,) + errors[:-1]  # noqa: RUF005
     window, open_for = state.window, state.open_for - period
@@ -169,12 +185,13 @@ def stepped(
 
 @compilable
 def observed(settings: Settings, state: Compensation, sample: float, period: float) -> Compensation:
-    """One tick of the observer. sample: of the load cell, raw, N. Friction is what the motor's model pushes less what the load
-    cell feels, the mains' hum taken out by a narrow notch.
+    """One tick of the observer. sample: of the load cell, raw, N. Friction is what the motor's
+    model pushes less what the load cell feels, the mains' hum taken out by a narrow notch.
 
-    While friction is steady that difference is mostly noise and is filtered with `observer_lag`; but one that is off by more
-    than `observer_gate` is no noise: friction has changed its sign, and it is believed at once. What is added leads by the
-    motor's lag, so that the motor's force has changed as much one tick later.
+    While friction is steady that difference is mostly noise and is filtered with `observer_lag`;
+    but one that is off by more than `observer_gate` is no noise: friction has changed its sign, and
+    it is believed at once. What is added leads by the motor's lag, so that the motor's force has
+    changed as much one tick later.
     """
     residual = state.motor - sample
     if math.isnan(state.travel):

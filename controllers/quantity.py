@@ -11,7 +11,8 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 class Quantity:
     """What a number means: `Annotated[float, Quantity("kg", 1, 1e4, "§6.1")] = 34.0`.
 
-    unit: SI unit as text. low, high: inclusive bounds in that unit. source: where the nominal value comes from.
+    unit: SI unit as text. low, high: inclusive bounds in that unit. source: where the nominal value
+    comes from.
     """
 
     unit: str
@@ -21,7 +22,8 @@ class Quantity:
 
 
 class Choice(IntEnum):
-    """Base of the named alternatives of a setting; an integer to compiled code, a label to people."""
+    """Base of the named alternatives of a setting; an integer to compiled code, a label to
+    people."""
 
     @property
     def label(self) -> str:

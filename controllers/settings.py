@@ -1,4 +1,5 @@
-"""What the controller is told to do. The fields and labels are those of `config.controller` in a recording."""
+"""What the controller is told to do. The fields and labels are those of `config.controller` in a
+recording."""
 
 from __future__ import annotations
 
@@ -11,15 +12,17 @@ _BEAM = "thesis Table 7.4"
 
 
 class Mode(Choice):
-    """`mil`: suspension and structure models close the loop; `imposed`: force and motions are demanded from outside."""
+    """`mil`: suspension and structure models close the loop; `imposed`: force and motions are
+    demanded from outside."""
 
     MIL = 0
     IMPOSED = 1
 
 
 class Travel(Choice):
-    """What the suspension model's travel is of: plate against wheel, plate against ground (single mass tests, thesis §3.6), or
-    the structure model against the demanded ground, so that no sensor is in it (thesis Fig. 4.1)."""
+    """What the suspension model's travel is of: plate against wheel, plate against ground (single
+    mass tests, thesis §3.6), or the structure model against the demanded ground, so that no sensor
+    is in it (thesis Fig. 4.1)."""
 
     WHEEL = 0
     GROUND = 1
@@ -34,8 +37,8 @@ class Structure(Choice):
 
 
 class Compensator(Choice):
-    """The friction compensator: none; the thesis' own with one or two steps (§4.5, §4.6), and the partial ones that it is
-    compared with (Table 4.1); or an observer of the friction force."""
+    """The friction compensator: none; the thesis' own with one or two steps (§4.5, §4.6), and the
+    partial ones that it is compared with (Table 4.1); or an observer of the friction force."""
 
     NONE = 0
     ONE_STEP = 1
@@ -60,14 +63,18 @@ class Settings(NamedTuple):
     travel: Travel = Travel.WHEEL
     structure: Structure = Structure.POINT
     compensator: Compensator = Compensator.NONE
-    start: Annotated[float, Quantity("m", -0.15, 0.15, "-preload / tyre stiffness, rig start position")] = -0.004
+    start: Annotated[
+        float, Quantity("m", -0.15, 0.15, "-preload / tyre stiffness, rig start position")
+    ] = -0.004
     sprung_mass: Annotated[float, Quantity("kg", 1.0, 1e5, "thesis Table 6.2")] = 25.0
     suspension_stiffness: Annotated[float, Quantity("N/m", 0.0, 2e7, "thesis Table 6.2")] = 1000.0
     suspension_damping: Annotated[float, Quantity("Ns/m", 0.0, 2e5, "thesis Table 6.2")] = 50.0
     preload: Annotated[float, Quantity("N", 0.0, 1e6, "thesis Table 6.2")] = 200.0
     gravity: Annotated[float, Quantity("m/s^2", 0.0, 30.0, "standard")] = 9.81
     skyhook: Skyhook = Skyhook.NONE
-    skyhook_damping: Annotated[float, Quantity("Ns/m", 0.0, 1e4, "thesis Table 7.1: 200; 0 when off")] = 0.0
+    skyhook_damping: Annotated[
+        float, Quantity("Ns/m", 0.0, 1e4, "thesis Table 7.1: 200; 0 when off")
+    ] = 0.0
     damping_max: Annotated[float, Quantity("Ns/m", 0.0, 1e4, "thesis Table 7.1")] = 500.0
     damping_min: Annotated[float, Quantity("Ns/m", 0.0, 1e4, "thesis Table 7.1")] = 10.0
     filter_position: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §6.2")] = 0.01
@@ -77,9 +84,13 @@ class Settings(NamedTuple):
     kp: Annotated[float, Quantity("1", 0.0, 20.0, "assumed, the thesis does not give it")] = 0.3
     ki: Annotated[float, Quantity("1/s", 0.0, 1e3, "assumed, the thesis does not give it")] = 10.0
     voltage_limit: Annotated[float, Quantity("V", 0.0, 10.0, "amplifier input ±10 V")] = 10.0
-    friction_step: Annotated[float, Quantity("N", 0.0, 1e3, "the jump 2·F_c, 0.15 V; thesis §4.4")] = 27.9
+    friction_step: Annotated[
+        float, Quantity("N", 0.0, 1e3, "the jump 2·F_c, 0.15 V; thesis §4.4")
+    ] = 27.9
     spike_threshold: Annotated[float, Quantity("N", 0.0, 1e3, "thesis Fig. 4.7")] = 4.0
-    spike_gradient: Annotated[float, Quantity("N/s", 0.0, 1e6, "0.2 N a sample, thesis §4.5.2")] = 200.0
+    spike_gradient: Annotated[float, Quantity("N/s", 0.0, 1e6, "0.2 N a sample, thesis §4.5.2")] = (
+        200.0
+    )
     spike_samples: Annotated[float, Quantity("1", 1.0, 5.0, "five gradients, thesis §4.5.2")] = 5.0
     crossing_time: Annotated[float, Quantity("s", 0.0, 1.0, "thesis §4.5.1")] = 0.03
     crossing_prediction: Annotated[float, Quantity("s", 0.0, 0.1, _CHOSEN)] = 0.005
@@ -94,8 +105,16 @@ class Settings(NamedTuple):
     beam_length: Annotated[float, Quantity("m", 0.01, 100.0, _BEAM)] = 2.0
     beam_area: Annotated[float, Quantity("m^2", 1e-9, 10.0, _BEAM)] = 3.828e-4
     beam_density: Annotated[float, Quantity("kg/m^3", 1.0, 1e5, _BEAM)] = 2721.0
-    beam_damping: Annotated[float, Quantity("s", 0.0, 10.0, "times the stiffness; thesis Table 7.4")] = 0.01
-    beam_sag: Annotated[float, Quantity("1", 0.0, 1.0, "0: starts straight; 1: bent as the preload bends it")] = 0.0
-    gas_force: Annotated[float, Quantity("N", 0.0, 1e7, "of a real gas spring beside the motor, extended; 0: none")] = 0.0
-    gas_length: Annotated[float, Quantity("m", 0.01, 10.0, "of its gas column, thesis Eq. 3.3")] = 0.217
+    beam_damping: Annotated[
+        float, Quantity("s", 0.0, 10.0, "times the stiffness; thesis Table 7.4")
+    ] = 0.01
+    beam_sag: Annotated[
+        float, Quantity("1", 0.0, 1.0, "0: starts straight; 1: bent as the preload bends it")
+    ] = 0.0
+    gas_force: Annotated[
+        float, Quantity("N", 0.0, 1e7, "of a real gas spring beside the motor, extended; 0: none")
+    ] = 0.0
+    gas_length: Annotated[float, Quantity("m", 0.01, 10.0, "of its gas column, thesis Eq. 3.3")] = (
+        0.217
+    )
     gas_exponent: Annotated[float, Quantity("1", 1.0, 1.7, "of its gas, thesis Eq. 3.3")] = 1.4

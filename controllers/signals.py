@@ -1,4 +1,5 @@
-"""What goes into and out of the controller at each tick. Field names are the channel names of a recording."""
+"""What goes into and out of the controller at each tick. Field names are the channel names of a
+recording."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ class Measurements(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What the test asks for: ground motion (m) always; structure motion (m) and force (N) in imposed tests only."""
+    """What the test asks for: ground motion (m) always; structure motion (m) and force (N) in
+    imposed tests only."""
 
     ground: float
     structure: float
@@ -23,7 +25,8 @@ class Demand(NamedTuple):
 
 
 class Commands(NamedTuple):
-    """`/command`: cylinder positions (m), suspension force demanded (N), motor amplifier voltage (V)."""
+    """`/command`: cylinder positions (m), suspension force demanded (N), motor amplifier voltage
+    (V)."""
 
     ground: float
     structure: float

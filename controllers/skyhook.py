@@ -1,4 +1,5 @@
-"""Skyhook damping (thesis §7.1): none, an ideal active force, or a semi-active damper that can only dissipate."""
+"""Skyhook damping (thesis §7.1): none, an ideal active force, or a semi-active damper that can only
+dissipate."""
 
 from __future__ import annotations
 
@@ -7,8 +8,11 @@ from controllers.settings import Settings, Skyhook
 
 
 @compilable
-def semi_active_damping(settings: Settings, sprung_velocity: float, travel_velocity: float) -> float:
-    """Damping coefficient in Ns/m: b_sky·v_s/v within [b_min, b_max] while v_s·v > 0, else b_min."""
+def semi_active_damping(
+    settings: Settings, sprung_velocity: float, travel_velocity: float
+) -> float:
+    """Damping coefficient in Ns/m: b_sky·v_s/v within [b_min, b_max] while v_s·v > 0, else
+    b_min."""
     if sprung_velocity * travel_velocity <= 0.0:
         return settings.damping_min
     wanted = settings.skyhook_damping * sprung_velocity / travel_velocity

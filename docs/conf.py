@@ -52,7 +52,8 @@ def directive(thing: object) -> str:
 
 
 def entries(package: str) -> Iterator[tuple[str, str]]:
-    """(directive, name) of every public name. Asks for each, since rigtwin loads them when asked."""
+    """(directive, name) of every public name. Asks for each, since rigtwin loads them when
+    asked."""
     module = import_module(package)
     for name in getattr(module, "__all__", ()):
         yield directive(getattr(module, name)), f"{package}.{name}"
@@ -65,13 +66,18 @@ def fill(app: Sphinx, page: str, source: list[str]) -> None:
         source[0] = app.builder.templates.render_string(source[0], {"packages": packages})
 
 
-def skip(_app: Sphinx, _kind: str, _name: str, thing: object, skipped: bool, _options: object) -> bool:
+def skip(
+    _app: Sphinx, _kind: str, _name: str, thing: object, skipped: bool, _options: object
+) -> bool:
     """Leaves out the fields of a NamedTuple, which its signature has."""
     return skipped or type(thing).__name__ == "_tuplegetter"
 
 
-def complete(_app: Sphinx, kind: str, _name: str, thing: object, _options: object, lines: list[str]) -> None:
-    """Adds to a class what its fields mean, and takes from a value what its type's docstring says."""
+def complete(
+    _app: Sphinx, kind: str, _name: str, thing: object, _options: object, lines: list[str]
+) -> None:
+    """Adds to a class what its fields mean, and takes from a value what its type's docstring
+    says."""
     if kind == "data" and lines[:1] == (type(thing).__doc__ or "").splitlines()[:1]:
         lines.clear()
     if isinstance(thing, type) and hasattr(thing, "_fields"):
@@ -88,7 +94,13 @@ SHORTER = (
 
 
 def shorten(
-    _app: Sphinx, _kind: str, _name: str, _thing: object, _options: object, signature: str | None, returns: str
+    _app: Sphinx,
+    _kind: str,
+    _name: str,
+    _thing: object,
+    _options: object,
+    signature: str | None,
+    returns: str,
 ) -> tuple[str | None, str]:
     """Takes from a signature what nobody reads."""
     for pattern, replacement in SHORTER:

@@ -5,7 +5,9 @@ from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for module in (quarter_car, single_mass, imposed, vehicles) for experiment in module.EXPERIMENTS
+    experiment.name: experiment
+    for module in (quarter_car, single_mass, imposed, vehicles)
+    for experiment in module.EXPERIMENTS
 }
 
 
@@ -14,7 +16,9 @@ def find(name: str) -> Experiment:
     try:
         return EXPERIMENTS[name]
     except KeyError:
-        raise RigtwinError(f"unknown experiment {name!r}; there are {', '.join(EXPERIMENTS)}") from None
+        raise RigtwinError(
+            f"unknown experiment {name!r}; there are {', '.join(EXPERIMENTS)}"
+        ) from None
 
 
 __all__ = ["EXPERIMENTS", "find"]

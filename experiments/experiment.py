@@ -15,7 +15,8 @@ def time_of(configuration: Configuration) -> Array:
 
 
 def random_of(seed: int) -> np.random.Generator:
-    """The excitation's random numbers; the sensors' noise has a stream of its own from the same seed."""
+    """The excitation's random numbers; the sensors' noise has a stream of its own from the same
+    seed."""
     return np.random.default_rng([seed, 1])
 
 

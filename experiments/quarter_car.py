@@ -1,4 +1,5 @@
-"""Chapter 6 and 7: the quarter car of Tables 6.2 and 7.1, dropped and driven over roads; passive, semi-active, active."""
+"""Chapter 6 and 7: the quarter car of Tables 6.2 and 7.1, dropped and driven over roads; passive,
+semi-active, active."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ ROAD_CHAPTER_7 = Road(speed=25 / 3.6, lowest=0.2, highest=1.6, spacing=0.2)
 _LONG = Timing(duration=45.0)
 
 GAS = GasSpring(force=120.0, length=0.5, exponent=1.2)
-"""Beside the motor, which plays the damper and a soft spring; stiffer ones are unstable with the rig's delays."""
+"""Beside the motor, which plays the damper and a soft spring; stiffer ones are unstable with the
+rig's delays."""
 ON_GAS = Settings(
     start=-220.0 / 50_000.0,
     preload=100.0,
@@ -30,7 +32,13 @@ ON_GAS = Settings(
 )
 
 EXPERIMENTS = (
-    Experiment("drop", "passive quarter car dropped, ground at rest", "thesis §6.3.1", Configuration(), flat_ground),
+    Experiment(
+        "drop",
+        "passive quarter car dropped, ground at rest",
+        "thesis §6.3.1",
+        Configuration(),
+        flat_ground,
+    ),
     Experiment(
         "gas-spring",
         "quarter car on a real gas spring beside the motor, dropped",
@@ -60,16 +68,28 @@ EXPERIMENTS = (
             Configuration(controller=settings, timing=_LONG, road=ROAD_CHAPTER_7),
             road_ground,
         )
-        for name, settings in (("passive", PASSIVE), ("semi-active", SEMI_ACTIVE), ("active", ACTIVE))
+        for name, settings in (
+            ("passive", PASSIVE),
+            ("semi-active", SEMI_ACTIVE),
+            ("active", ACTIVE),
+        )
     ),
     *(
         Experiment(
             f"beam-{name}",
             f"{name} suspension under a cross of elastic beams, motorway at 25 km/h",
             "thesis §7.2",
-            Configuration(controller=settings._replace(structure=Structure.BEAM), timing=_LONG, road=ROAD_CHAPTER_7),
+            Configuration(
+                controller=settings._replace(structure=Structure.BEAM),
+                timing=_LONG,
+                road=ROAD_CHAPTER_7,
+            ),
             road_ground,
         )
-        for name, settings in (("passive", PASSIVE), ("semi-active", SEMI_ACTIVE), ("active", ACTIVE))
+        for name, settings in (
+            ("passive", PASSIVE),
+            ("semi-active", SEMI_ACTIVE),
+            ("active", ACTIVE),
+        )
     ),
 )

@@ -1,4 +1,5 @@
-"""Chapter 3 and 4: a single mass on spring and damper, whose travel is measured from the ground, not from the wheel."""
+"""Chapter 3 and 4: a single mass on spring and damper, whose travel is measured from the ground,
+not from the wheel."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ CHAPTER_3 = Settings(
 CHAPTER_4 = CHAPTER_3._replace(travel=Travel.MODEL, suspension_damping=50.0)
 
 ROOM = Safety(structure=0.3)
-"""The sag of 72 mm and long waves of the road take the plate past the lab's 0.15 m with some seeds."""
+"""The sag of 72 mm and long waves of the road take the plate past the lab's 0.15 m with some
+seeds."""
 ROAD_CHAPTER_3 = Road(speed=65 / 3.6, lowest=0.0158, highest=0.576, spacing=0.0158)
 ROAD_CHAPTER_4 = Road(speed=225 / 3.6, lowest=0.1, highest=5.0, spacing=0.1)
 
@@ -36,14 +38,18 @@ EXPERIMENTS = (
         "single-mass-road",
         "single mass dropped, motorway at 65 km/h, 0.0158-0.576 Hz",
         "thesis §3.6, Fig. 3.15",
-        Configuration(controller=CHAPTER_3, timing=Timing(duration=45.0), road=ROAD_CHAPTER_3, safety=ROOM),
+        Configuration(
+            controller=CHAPTER_3, timing=Timing(duration=45.0), road=ROAD_CHAPTER_3, safety=ROOM
+        ),
         road_ground,
     ),
     Experiment(
         "friction-road",
         "single mass, road at 225 km/h, 0.1-5 Hz: motor friction at every reversal",
         "thesis ch. 4",
-        Configuration(controller=CHAPTER_4, timing=Timing(duration=44.0), road=ROAD_CHAPTER_4, safety=ROOM),
+        Configuration(
+            controller=CHAPTER_4, timing=Timing(duration=44.0), road=ROAD_CHAPTER_4, safety=ROOM
+        ),
         road_ground,
     ),
 )

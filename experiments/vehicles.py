@@ -1,5 +1,5 @@
-"""The vehicles of thesis Table 6.1, dropped on the rig as it is. All are unstable with its delays (thesis §6.2); the heavy
-ones exceed the motor's force at once and trip."""
+"""The vehicles of thesis Table 6.1, dropped on the rig as it is. All are unstable with its delays
+(thesis §6.2); the heavy ones exceed the motor's force at once and trip."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from rigtwin.simulation.experiment import Experiment
 
 
 class Vehicle(NamedTuple):
-    """A quarter car: tyre stiffness N/m, unsprung mass kg, suspension stiffness N/m and damping Ns/m, sprung mass kg."""
+    """A quarter car: tyre stiffness N/m, unsprung mass kg, suspension stiffness N/m and damping
+    Ns/m, sprung mass kg."""
 
     tyre_stiffness: float
     unsprung_mass: float
@@ -32,7 +33,8 @@ VEHICLES = {
 
 
 def configuration(vehicle: Vehicle) -> Configuration:
-    """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so that the body drops."""
+    """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so
+    that the body drops."""
     preload = 0.9 * vehicle.sprung_mass * Settings().gravity
     return Configuration(
         plant=RigPlant(carriage=Carriage(vehicle.unsprung_mass), tyre=Tyre(vehicle.tyre_stiffness)),
@@ -48,6 +50,12 @@ def configuration(vehicle: Vehicle) -> Configuration:
 
 
 EXPERIMENTS = tuple(
-    Experiment(name, f"{name} dropped: unstable on this rig", "thesis Table 6.1", configuration(vehicle), flat_ground)
+    Experiment(
+        name,
+        f"{name} dropped: unstable on this rig",
+        "thesis Table 6.1",
+        configuration(vehicle),
+        flat_ground,
+    )
     for name, vehicle in VEHICLES.items()
 )

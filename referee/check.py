@@ -111,19 +111,17 @@ def _key(recordings: Path, number: int) -> str:
 def answer(files: Files) -> dict[str, Any]:
     """One case's answer, of its recording and the one held out. Runs where there are neither the
     key nor the other cases."""
+    from machines import DEFAULT_MACHINE
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import load
-    from machines import DEFAULT_MACHINE
 
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         names = ("recording.mcap", "held-out.mcap")
         for name, content in zip(names, files, strict=True):
             (Path(folder) / name).write_bytes(content)
         recording, held_out = (load(Path(folder) / name) for name in names)
-        found = diagnose(
-            find(DEFAULT_MACHINE), [recording], held_out=[held_out]
-        )
+        found = diagnose(find(DEFAULT_MACHINE), [recording], held_out=[held_out])
         return found.document()
 
 

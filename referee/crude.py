@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from controllers import Measurements
+from machines import DEFAULT_MACHINE
 from rigtwin.components import RigPlant, Scales, Swing, candidates
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.recording import load
-from machines import DEFAULT_MACHINE
 from rigtwin.signals.noise import white_noise
 from rigtwin.simulation.runner import simulate, without_limits
 

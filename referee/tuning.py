@@ -110,11 +110,11 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     str, str
         What the diagnosis says, and the corrected twin's file.
     """
+    from machines import DEFAULT_MACHINE
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.calibrated import toml
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import load
-    from machines import DEFAULT_MACHINE
 
     truth, _, random = draw_rig(*case)
     law, demands = draw_demands("imposed", random)

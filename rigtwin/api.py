@@ -1,4 +1,5 @@
-"""What `import rigtwin` offers: machines, runs on their twins, recordings, comparisons and diagnoses.
+"""What `import rigtwin` offers: machines, runs on their twins, recordings, comparisons and
+diagnoses.
 
 The commands of the command line call these functions and nothing else.
 """
@@ -41,10 +42,11 @@ from rigtwin.simulation.runner import record
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
 Settings = Changes | Sequence[Changes]
-"""Group → name → value, {"rail": {"coulomb": 60}, "timing": {"duration": 5}}; or the path of a TOML file that holds them; or
-several of these, one over the other."""
+"""Group → name → value, {"rail": {"coulomb": 60}, "timing": {"duration": 5}}; or the path of a TOML
+file that holds them; or several of these, one over the other."""
 Effects = Mapping[str, float | Mapping[str, float]] | Sequence[str]
-"""Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect` takes."""
+"""Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect`
+takes."""
 Demanding = Callable[[Configuration, int], Demands]
 """An experiment of one's own: what is demanded of the machine for (settings, seed)."""
 
@@ -414,7 +416,8 @@ def calibrate(recording: reader.Recording) -> Calibration:
     of = machine_of(recording)
     if of.structure is not Structure.QUARTER_CAR:
         raise RigtwinError(
-            f"{recording.path}: it is of machine {of.name!r}; expected {Structure.QUARTER_CAR.value}"
+            f"{recording.path}: it is of machine {of.name!r}; "
+            f"expected {Structure.QUARTER_CAR.value}"
         )
     configuration = of.configuration_of(recording)
     require_fit(of, recording, configuration)

@@ -1,4 +1,5 @@
-"""What all commands share: settings from the command line, outputs that are no inputs, tables, JSON."""
+"""What all commands share: settings from the command line, outputs that are no inputs, tables,
+JSON."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def apart(out: Path, *inputs: Path) -> Path:
 
 
 def writable(out: Path) -> None:
-    """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is done."""
+    """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is
+    done."""
     if out.is_dir():
         raise RigtwinError(f"cannot write {out}: it is a folder")
     if not out.parent.is_dir():
@@ -66,7 +68,8 @@ def late(figures: Mapping[str, str]) -> str:
     except ValueError:
         return "its lateness cannot be read"
     return (
-        f"late by {times[0]} in the median, {times[1]} at the 99.9th percentile, {times[2]} at most; "
+        f"late by {times[0]} in the median, {times[1]} at the "
+        f"99.9th percentile, {times[2]} at most; "
         f"{figures.get('missed')} ticks missed; {figures.get('scheduling')}"
     )
 

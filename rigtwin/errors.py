@@ -4,4 +4,5 @@ from __future__ import annotations
 
 
 class RigtwinError(Exception):
-    """Bad input of any sort. The message says in one line what is wrong, where, and what was expected."""
+    """Bad input of any sort. The message says in one line what is wrong, where, and what was
+    expected."""

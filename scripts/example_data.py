@@ -1,4 +1,5 @@
-"""Makes examples/damper.csv and damper-again.csv: what a data logger would write of a damper with friction and play."""
+"""Makes examples/damper.csv and damper-again.csv: what a data logger would write of a damper with
+friction and play."""
 
 from __future__ import annotations
 

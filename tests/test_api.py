@@ -43,7 +43,9 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
 def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, magnitude, channel):
     machine = folder_machine(tmp_path) if sort == "folder" else rigtwin.machine(sort)
     settings = {"timing": {"duration": 6.0}}
-    recording = rigtwin.run(machine, experiment, seed=1, effects={effect: magnitude}, settings=settings)
+    recording = rigtwin.run(
+        machine, experiment, seed=1, effects={effect: magnitude}, settings=settings
+    )
     assert recording[channel].shape == recording.time.shape
     assert recording.units[channel] in ("N", "m")
     answer = rigtwin.diagnose(recording)
@@ -63,7 +65,9 @@ def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, ma
 def test_the_corrected_machine_survives_its_file(tmp_path):
     machine = folder_machine(tmp_path)
     recording = rigtwin.run(machine, "shake", effects={"coulomb@guide": 6.0})
-    answer = rigtwin.diagnose(recording, held_out=rigtwin.run(machine, "shake", seed=2, effects=["coulomb@guide=6"]))
+    answer = rigtwin.diagnose(
+        recording, held_out=rigtwin.run(machine, "shake", seed=2, effects=["coulomb@guide=6"])
+    )
     twin = answer.save_twin(tmp_path / "twin.toml")
     read = rigtwin.compare(recording, settings=twin)
     assert read.gap == rigtwin.compare(recording, machine=answer.machine).gap
@@ -130,7 +134,9 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
     recording = rigtwin.run(machine, steps, controller=spring, settings=SHORT)
     asked = 500.0 * (recording["/command.goal"] - recording["/sensor.position"])
     np.testing.assert_allclose(recording["/command.force"], asked, atol=1e-9)
-    with pytest.raises(rigtwin.RigtwinError, match="no demand for /command.force; a test gives force"):
+    with pytest.raises(
+        rigtwin.RigtwinError, match="no demand for /command.force; a test gives force"
+    ):
         rigtwin.run(machine, lambda _configuration, _seed: {}, settings=SHORT)
     with pytest.raises(rigtwin.RigtwinError, match="nothing takes the demand 'torque'"):
         rigtwin.run(machine, lambda c, _: {"torque": np.zeros(c.ticks), "force": np.zeros(c.ticks)})
@@ -142,7 +148,10 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
         (lambda rig: rigtwin.run(rig, "nope"), "unknown experiment 'nope'; there are drop"),
         (lambda rig: rigtwin.run(rig, "drop", seed=-1), "seed -1: expected 0 or more"),
         (lambda rig: rigtwin.run(rig, "drop", effects={"coulomb@wing": 1}), "unknown effect"),
-        (lambda rig: rigtwin.run(rig, "drop", settings={"rail": {"coulomb": -1}}), "rail.coulomb = -1"),
+        (
+            lambda rig: rigtwin.run(rig, "drop", settings={"rail": {"coulomb": -1}}),
+            "rail.coulomb = -1",
+        ),
         (lambda rig: rigtwin.machine("lathe"), "unknown machine 'lathe'; there are"),
         (lambda rig: rigtwin.load("nowhere.mcap"), "cannot read nowhere.mcap"),
         (lambda rig: rigtwin.diagnose([]), "no recording to diagnose"),
@@ -156,7 +165,9 @@ def test_what_cannot_be_done_is_said_in_one_line(call, said):
 
 
 def test_importing_costs_nothing_and_every_name_is_there():
-    heavy = "import sys, rigtwin; print([m for m in ('numpy', 'mujoco', 'scipy') if m in sys.modules])"
+    heavy = (
+        "import sys, rigtwin; print([m for m in ('numpy', 'mujoco', 'scipy') if m in sys.modules])"
+    )
     done = subprocess.run([sys.executable, "-c", heavy], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
     for name in rigtwin.__all__:
@@ -168,8 +179,15 @@ def test_importing_costs_nothing_and_every_name_is_there():
 def test_the_notebook_runs(tmp_path):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     notebook = nbformat.read(EXAMPLES / "quickstart.ipynb", as_version=4)
-    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    nbclient.NotebookClient(
+        notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
     assert (tmp_path / "why.html").stat().st_size > 10_000
     assert (tmp_path / "drop.mp4").stat().st_size > 10_000
-    shown = [o for cell in notebook.cells for o in cell.get("outputs", []) if "text/html" in o.get("data", {})]
+    shown = [
+        o
+        for cell in notebook.cells
+        for o in cell.get("outputs", [])
+        if "text/html" in o.get("data", {})
+    ]
     assert any("viscous" in "".join(o["data"]["text/html"]) for o in shown)

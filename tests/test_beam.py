@@ -47,7 +47,9 @@ def test_heave_modes_free_and_on_a_spring():
     stiffness[2, 2] += 1000.0
     squares, shapes = eigh(stiffness, mass)
     felt = np.abs(shapes[2]) > 1e-3
-    assert np.sqrt(np.abs(squares[felt]))[:2] / (2 * math.pi) == pytest.approx([0.899, 2.953], rel=6e-4)
+    assert np.sqrt(np.abs(squares[felt]))[:2] / (2 * math.pi) == pytest.approx(
+        [0.899, 2.953], rel=6e-4
+    )
 
 
 def test_one_arm_is_an_euler_bernoulli_cantilever():
@@ -57,7 +59,11 @@ def test_one_arm_is_an_euler_bernoulli_cantilever():
     squares = eigh(stiffness[np.ix_(arm, arm)], mass[np.ix_(arm, arm)])[0]
     root = float(brentq(lambda x: math.cos(x) * math.cosh(x) + 1, 1.5, 2.2))  # type: ignore[arg-type]
     s = SETTINGS
-    exact = root**2 * math.sqrt(s.beam_modulus * s.beam_inertia / (s.beam_density * s.beam_area)) / 6.0**2
+    exact = (
+        root**2
+        * math.sqrt(s.beam_modulus * s.beam_inertia / (s.beam_density * s.beam_area))
+        / 6.0**2
+    )
     assert math.sqrt(squares[0]) == pytest.approx(exact, rel=1e-3)
 
 

@@ -66,7 +66,10 @@ CONTAINED = ("lag", "spring", "play")
 """In another of them."""
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in CONTAINED else ()) for name in SINGLE])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in CONTAINED else ()) for name in SINGLE],
+)
 def test_what_is_in_a_bench_is_named_with_its_size(name: str):
     truth, effects = SINGLE[name]
     found = answered(truth)

@@ -1,4 +1,5 @@
-"""The card: its channel table, volts both ways, the unmodified driver's client on a virtual card, and what it refuses."""
+"""The card: its channel table, volts both ways, the unmodified driver's client on a virtual card,
+and what it refuses."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ PERIOD = 1e-3
 TODAY = date(2026, 6, 1)
 
 
-def virtual(table: ChannelTable = TABLE, wiring: ChannelTable = TABLE, timing=None, seed: int = 0) -> tuple[Card, VirtualCard]:
+def virtual(
+    table: ChannelTable = TABLE, wiring: ChannelTable = TABLE, timing=None, seed: int = 0
+) -> tuple[Card, VirtualCard]:
     card = VirtualCard(Terminals(Configuration(), wiring, seed), wiring, timing or OnDemand())
     clock = (lambda: card.tick * PERIOD) if timing is None else time.monotonic
     return Card(table, PERIOD, InProcess(card), clock=clock), card
@@ -55,7 +58,10 @@ def after(card: Card, ticks: int, commands: Commands) -> Measurements:
 def test_a_table_survives_being_written(tmp_path):
     path = tmp_path / "t.toml"
     turned = replace(
-        TABLE, operator='a "b" \\ c', note="ø\n2", inputs=(TABLE.inputs[0]._replace(sign_checked=True), *TABLE.inputs[1:])
+        TABLE,
+        operator='a "b" \\ c',
+        note="ø\n2",
+        inputs=(TABLE.inputs[0]._replace(sign_checked=True), *TABLE.inputs[1:]),
     )
     path.write_text(to_toml(turned), encoding="utf-8")
     assert load_table(path) == turned
@@ -71,12 +77,20 @@ def test_a_table_survives_being_written(tmp_path):
         ("[inputs.load_cell]", "[inputs.load]", "unknown signal [inputs.load]"),
         ("scale = 250.0", "scale = nan", "inputs.load_cell.scale = nan"),
         ("scale = 250.0", "scale = -250.0", "inputs.load_cell.scale = -250.0"),
-        ("scale = 250.0", "scale = 250.0\nsign = 0.5", "inputs.load_cell.sign = 0.5: expected 1 or -1"),
+        (
+            "scale = 250.0",
+            "scale = 250.0\nsign = 0.5",
+            "inputs.load_cell.sign = 0.5: expected 1 or -1",
+        ),
         ('unit = "N"', "unit = 'kN'", "inputs.load_cell.unit = 'kN': expected 'N'"),
         ("scale = 250.0", "scale = 250.0\nrange = 100", "inputs.load_cell.range = 100"),
         ("scale = 250.0", "", "inputs.load_cell.scale is missing"),
         ("scale = 250.0", "scale = 250.0\ngain = 2", "unknown setting inputs.load_cell.gain"),
-        ("sign_checked = false", "sign_checked = 'yes'", "sign_checked = 'yes': expected true or false"),
+        (
+            "sign_checked = false",
+            "sign_checked = 'yes'",
+            "sign_checked = 'yes': expected true or false",
+        ),
         ('pressure = "port0/line0" ', 'pressure = "ao3" ', "card.pressure = 'ao3'"),
         ('timing = "hardware" ', 'timing = "fast" ', "card.timing = 'fast'"),
         ('device = "Dev1"', 'device = "Dev1/ai0"', "card.device = 'Dev1/ai0'"),
@@ -110,7 +124,10 @@ def test_every_signal_must_be_there(name):
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
-        ({"structure": 0.196}, "structure_lvdt on ai1 reads up to 0.2 m, safety.structure is 0.196 m"),
+        (
+            {"structure": 0.196},
+            "structure_lvdt on ai1 reads up to 0.2 m, safety.structure is 0.196 m",
+        ),
         ({"travel": 0.25}, "suspension_lvdt on ai2"),
         ({"force": 2400.0}, "load_cell on ai3"),
         ({"ground": 0.3}, "ground_lvdt on ai0"),
@@ -126,7 +143,9 @@ def test_a_limit_that_its_line_cannot_show(limit, said):
 def test_a_real_rig_needs_a_table_that_somebody_answers_for():
     checked = tuple(line._replace(sign_checked=True) for line in TABLE.inputs)
     outputs = tuple(line._replace(sign_checked=True) for line in TABLE.outputs)
-    good = replace(TABLE, inputs=checked, outputs=outputs, calibrated="2026-05-30", operator="A. Tester")
+    good = replace(
+        TABLE, inputs=checked, outputs=outputs, calibrated="2026-05-30", operator="A. Tester"
+    )
     require_trust(good, TODAY)
     for change, said in (
         ({"inputs": (*checked[:3], TABLE.inputs[3])}, "sign not checked: load_cell"),
@@ -146,15 +165,22 @@ def test_values_come_back_from_volts():
     for _ in range(200):
         scalings = [
             line.scaling._replace(
-                scale=10.0 ** random.uniform(-3, 3), offset=random.normal(), sign=random.choice([-1.0, 1.0]), range=10.0
+                scale=10.0 ** random.uniform(-3, 3),
+                offset=random.normal(),
+                sign=random.choice([-1.0, 1.0]),
+                range=10.0,
             )
             for line in TABLE.inputs
         ]
-        model = conversion([line._replace(scaling=s) for line, s in zip(TABLE.inputs, scalings, strict=True)])
+        model = conversion(
+            [line._replace(scaling=s) for line, s in zip(TABLE.inputs, scalings, strict=True)]
+        )
         volts, back, values = random.uniform(-10, 10, 4), np.empty(4), np.empty(4)
         to_values(model, volts, values)
         to_volts(model, values, back)
-        assert np.max(np.abs(back - volts)) < 1e-9 * 10 * max(1.0, float(np.max(np.abs(model.offset / model.factor))))
+        assert np.max(np.abs(back - volts)) < 1e-9 * 10 * max(
+            1.0, float(np.max(np.abs(model.offset / model.factor)))
+        )
         expected = [s.sign * s.scale * v + s.offset for s, v in zip(scalings, volts, strict=True)]
         assert np.allclose(values, expected, rtol=1e-12)
 
@@ -187,7 +213,9 @@ def test_card_and_twin_behind_the_same_converters_read_the_same():
         rig.start()
     for tick in range(600):
         assert card.read() == twin.read()
-        commands = Commands(0.01 * np.sin(tick / 50), -0.004 * min(tick / 300, 1.0), 0.0, min(tick / 300, 1.0))
+        commands = Commands(
+            0.01 * np.sin(tick / 50), -0.004 * min(tick / 300, 1.0), 0.0, min(tick / 300, 1.0)
+        )
         for rig in (card, twin):
             rig.pressure(tick > 20)
             rig.write(commands)
@@ -199,13 +227,19 @@ def test_no_pressure_no_motion():
     card.start()
     assert abs(after(card, 200, Commands(0.05, 0.05, 0.0, 0.0)).structure_lvdt) < 2e-3
     card.pressure(True)
-    assert after(card, 600, Commands(0.05, 0.05, 0.0, 0.0)).structure_lvdt == pytest.approx(0.05, abs=2e-3)
+    assert after(card, 600, Commands(0.05, 0.05, 0.0, 0.0)).structure_lvdt == pytest.approx(
+        0.05, abs=2e-3
+    )
     card.stop()
 
 
 def test_a_table_that_is_not_the_wiring_reads_wrong():
     wiring = replace(
-        TABLE, inputs=(*TABLE.inputs[:3], TABLE.inputs[3]._replace(scaling=TABLE.inputs[3].scaling._replace(sign=-1.0)))
+        TABLE,
+        inputs=(
+            *TABLE.inputs[:3],
+            TABLE.inputs[3]._replace(scaling=TABLE.inputs[3].scaling._replace(sign=-1.0)),
+        ),
     )
     (right, _), (wrong, _) = virtual(), virtual(wiring=wiring)
     forces = []
@@ -220,11 +254,23 @@ def test_a_table_that_is_not_the_wiring_reads_wrong():
     ("change", "said"),
     [
         (lambda t: replace(t, device="Dev7"), "no card 'Dev7'; the driver knows Dev1"),
-        (lambda t: replace(t, inputs=(t.inputs[0]._replace(line="ai40"), *t.inputs[1:])), "PCI-6229 has no line ai40"),
-        (lambda t: replace(t, pressure="port0/line77"), "PCI-6229 has no line port0/line77"),
-        (lambda t: replace(t, outputs=(t.outputs[0]._replace(line="ao7"), *t.outputs[1:])), "PCI-6229 has no line ao7"),
         (
-            lambda t: replace(t, inputs=(t.inputs[0]._replace(scaling=t.inputs[0].scaling._replace(range=2.0)), *t.inputs[1:])),
+            lambda t: replace(t, inputs=(t.inputs[0]._replace(line="ai40"), *t.inputs[1:])),
+            "PCI-6229 has no line ai40",
+        ),
+        (lambda t: replace(t, pressure="port0/line77"), "PCI-6229 has no line port0/line77"),
+        (
+            lambda t: replace(t, outputs=(t.outputs[0]._replace(line="ao7"), *t.outputs[1:])),
+            "PCI-6229 has no line ao7",
+        ),
+        (
+            lambda t: replace(
+                t,
+                inputs=(
+                    t.inputs[0]._replace(scaling=t.inputs[0].scaling._replace(range=2.0)),
+                    *t.inputs[1:],
+                ),
+            ),
             "PCI-6229 has 0.2, 1, 5, 10 V",
         ),
     ],
@@ -376,7 +422,11 @@ def test_without_the_driver_one_line_says_how_to_get_it():
 
 
 def test_a_table_that_is_no_table(tmp_path):
-    for text, said in (("x = [", "not valid TOML"), ("card = 3", "expected a table"), ("", "card.pressure")):
+    for text, said in (
+        ("x = [", "not valid TOML"),
+        ("card = 3", "expected a table"),
+        ("", "card.pressure"),
+    ):
         path = Path(tmp_path / "t.toml")
         path.write_text(text)
         with pytest.raises(RigtwinError, match=said):

@@ -1,4 +1,5 @@
-"""The command line as a user meets it: what it prints, its exit codes, and one line for every fault."""
+"""The command line as a user meets it: what it prints, its exit codes, and one line for every
+fault."""
 
 from __future__ import annotations
 
@@ -29,7 +30,21 @@ QUICK = ["--set", "timing.duration=0.5"]
 def test_run_info_compare_export_plot(tmp_path, capsys):
     path = tmp_path / "d.mcap"
     assert (
-        main(["run", "drop", "--out", str(path), "--seed", "3", "--set", "timing.duration=1", "--set", "rail.coulomb=60"]) == 0
+        main(
+            [
+                "run",
+                "drop",
+                "--out",
+                str(path),
+                "--seed",
+                "3",
+                "--set",
+                "timing.duration=1",
+                "--set",
+                "rail.coulomb=60",
+            ]
+        )
+        == 0
     )
     assert "1.000 s recorded" in capsys.readouterr().out
     recording = load(path)
@@ -37,9 +52,19 @@ def test_run_info_compare_export_plot(tmp_path, capsys):
     assert json.loads(recording.twin["parameters"])["rail"]["coulomb"] == 60.0
     assert main(["info", str(path)]) == 0
     assert "/sensor.load_cell" in capsys.readouterr().out
-    assert main(["compare", str(path), "--json", str(tmp_path / "j.json"), "--set", "rail.coulomb=60"]) == 0
+    assert (
+        main(["compare", str(path), "--json", str(tmp_path / "j.json"), "--set", "rail.coulomb=60"])
+        == 0
+    )
     replays = json.loads((tmp_path / "j.json").read_text())["replays"]
-    for name in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder", "controller"):
+    for name in (
+        "motor",
+        "carriage",
+        "mechanics",
+        "structure_cylinder",
+        "ground_cylinder",
+        "controller",
+    ):
         assert {"residual", "noise_floor", "ratio"} <= set(replays[name])
     assert main(["export", str(path), "-o", str(tmp_path / "d.csv")]) == 0
     assert main(["plot", str(path)]) == 0
@@ -73,23 +98,35 @@ def bad(tmp_path: Path) -> dict[str, tuple[list[str], str]]:
         "toml": (["run", "drop", "--config", str(toml), *out], "not valid TOML"),
         "nan": (["run", "drop", "--set", "carriage.mass=nan", *out], "carriage.mass = nan"),
         "period": (["run", "drop", "--set", "timing.timestep=0.0003", *out], "whole multiple"),
-        "step above period": (["run", "drop", "--set", "timing.timestep=0.002", *out], "whole multiple"),
+        "step above period": (
+            ["run", "drop", "--set", "timing.timestep=0.002", *out],
+            "whole multiple",
+        ),
         "seed": (["run", "drop", "--seed", "-1", *out], "--seed -1"),
         "road": (["run", "road10", "--set", "road.lowest=20", *out], "road.highest"),
-        "out": (["run", "drop", "--out", str(tmp_path / "absent" / "o.mcap"), *QUICK], "cannot write"),
+        "out": (
+            ["run", "drop", "--out", str(tmp_path / "absent" / "o.mcap"), *QUICK],
+            "cannot write",
+        ),
         "empty": (["compare", str(empty)], "is empty"),
         "foreign": (["info", str(text)], "is not an MCAP file"),
         "absent": (["plot", str(tmp_path / "absent.mcap")], "cannot read"),
         "folder": (["video", str(tmp_path)], "cannot read"),
         "ending": (["export", str(RIG), "-o", str(tmp_path / "e.xyz")], ".csv or .mat"),
-        "json": (["compare", str(RIG), "--json", str(tmp_path / "absent" / "j.json")], "cannot write"),
+        "json": (
+            ["compare", str(RIG), "--json", str(tmp_path / "absent" / "j.json")],
+            "cannot write",
+        ),
         "two and set": (["compare", str(RIG), str(RIG), "--set", "rail.coulomb=3"], "without one"),
         "study": (["reproduce", "table-9.9"], "there are chapters 3, 4, 5, 6, 7, A, B"),
         "seeds": (["reproduce", "table-3.5", "--seeds", "0"], "--seeds 0"),
         "workers": (["reproduce", "table-3.5", "--workers", "0"], "--workers 0"),
         "nothing to compute": (["reproduce", "table-2.1"], "nothing of it is of the rig"),
         "map": (["stability", "--map", "tau", "tau"], "two different parameters"),
-        "page": (["reproduce", "table-3.5", "--html", str(tmp_path / "absent" / "p.html")], "cannot write"),
+        "page": (
+            ["reproduce", "table-3.5", "--html", str(tmp_path / "absent" / "p.html")],
+            "cannot write",
+        ),
         "vehicle": (["stability", "--vehicle", "bicycle"], "there are"),
         "calibrate": (["calibrate", str(empty)], "is empty"),
     }
@@ -118,12 +155,26 @@ def test_default_name_never_overwrites(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for _ in range(3):
         assert main(["run", "drop", *QUICK]) == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["drop-0-2.mcap", "drop-0-3.mcap", "drop-0.mcap"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "drop-0-2.mcap",
+        "drop-0-3.mcap",
+        "drop-0.mcap",
+    ]
 
 
 def test_ctrl_c_leaves_a_readable_recording_and_one_line(tmp_path):
     path = tmp_path / "c.mcap"
-    command = [sys.executable, "-m", "rigtwin.cli", "run", "drop", "--out", str(path), "--set", "timing.duration=3600"]
+    command = [
+        sys.executable,
+        "-m",
+        "rigtwin.cli",
+        "run",
+        "drop",
+        "--out",
+        str(path),
+        "--set",
+        "timing.duration=3600",
+    ]
     # A shell's background job may have handed down an ignored Ctrl-C; a user's terminal does not.
     restored = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
@@ -141,7 +192,16 @@ def test_ctrl_c_leaves_a_readable_recording_and_one_line(tmp_path):
 
 
 def test_progress_is_shown_on_a_terminal_only(tmp_path):
-    command = [sys.executable, "-m", "rigtwin.cli", "run", "drop", "--out", str(tmp_path / "p.mcap"), *QUICK]
+    command = [
+        sys.executable,
+        "-m",
+        "rigtwin.cli",
+        "run",
+        "drop",
+        "--out",
+        str(tmp_path / "p.mcap"),
+        *QUICK,
+    ]
     quiet = subprocess.run(command, capture_output=True, text=True, check=True)
     assert quiet.stderr == ""
     controller, terminal = pty.openpty()
@@ -157,7 +217,8 @@ def test_help_imports_nothing_heavy():
     code = (
         "import sys\nfrom rigtwin.cli import main\n"
         "try: main(['--help'])\nexcept SystemExit: pass\n"
-        "heavy = {'numpy', 'mujoco', 'numba', 'scipy', 'matplotlib'} & set(sys.modules)\nassert not heavy, heavy"
+        "heavy = {'numpy', 'mujoco', 'numba', 'scipy', 'matplotlib'} "
+        "& set(sys.modules)\nassert not heavy, heavy"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -175,7 +236,9 @@ def test_no_command_overwrites_its_input(tmp_path, capsys, command):
     assert path.read_bytes() == RIG.read_bytes()
 
 
-@pytest.mark.parametrize("ignored", ["controller.kp=5", "timing.duration=1", "safety.force=100", "road.speed=3"])
+@pytest.mark.parametrize(
+    "ignored", ["controller.kp=5", "timing.duration=1", "safety.force=100", "road.speed=3"]
+)
 def test_compare_refuses_settings_that_it_would_ignore(capsys, ignored):
     assert main(["compare", str(RIG), "--set", ignored]) == 1
     assert "the recording's" in capsys.readouterr().err

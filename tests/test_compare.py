@@ -110,11 +110,17 @@ ALSO_EFFECTS = ("rail.coulomb=80", "carriage.mass=40", "motor.constant=196")
 
 
 @pytest.mark.parametrize(
-    "fault", [pytest.param(fault, marks=pytest.mark.slow if fault in ALSO_EFFECTS else ()) for fault in OWN_FAULTS]
+    "fault",
+    [
+        pytest.param(fault, marks=pytest.mark.slow if fault in ALSO_EFFECTS else ())
+        for fault in OWN_FAULTS
+    ],
 )
 def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, fault):
     experiment = EXPERIMENTS["imposed"]
-    faulty = from_assignments(experiment.configuration._replace(timing=Timing(duration=10.0)), [fault])
+    faulty = from_assignments(
+        experiment.configuration._replace(timing=Timing(duration=10.0)), [fault]
+    )
     path = tmp_path / "f.mcap"
     record(path, "imposed", faulty, experiment.demands(faulty, 11), 11)
     recording = load(path)
@@ -203,9 +209,7 @@ LEFT_OVER = {
 
 @pytest.mark.parametrize(
     "name",
-    once_a_sort(
-        [e.name for e in candidates(RigPlant()) if e.kind.name != "quantisation"]
-    ),
+    once_a_sort([e.name for e in candidates(RigPlant()) if e.kind.name != "quantisation"]),
 )
 def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise

@@ -101,8 +101,10 @@ def test_flattened_and_back():
 
 def test_controller_keys_are_those_of_the_recording_format():
     expected = (
-        "mode travel structure compensator start sprung_mass suspension_stiffness suspension_damping preload gravity skyhook "
-        "skyhook_damping damping_max damping_min filter_position filter_velocity filter_force kff kp ki voltage_limit"
+        "mode travel structure compensator start sprung_mass suspension_stiffness "
+        "suspension_damping preload gravity skyhook "
+        "skyhook_damping damping_max damping_min filter_position "
+        "filter_velocity filter_force kff kp ki voltage_limit"
     )
     # Those of the format come first; a recording may leave out what this controller has besides.
     assert " ".join(Settings._fields).startswith(expected)

@@ -38,7 +38,10 @@ EVERY = [
     Settings(mode=mode, travel=travel, skyhook=skyhook, skyhook_damping=200.0, voltage_limit=limit)
     for mode, travel, skyhook, limit in itertools.product(Mode, Travel, Skyhook, (10.0, 1.2))
 ]
-EVERY += [Settings(structure=structure, compensator=one) for structure, one in itertools.product(Structure, Compensator)]
+EVERY += [
+    Settings(structure=structure, compensator=one)
+    for structure, one in itertools.product(Structure, Compensator)
+]
 
 
 def stream(count: int) -> list[tuple[Measurements, Demand]]:
@@ -61,7 +64,9 @@ def compiled_update(controlling, state, measured, demand):  # type: ignore[no-un
 @pytest.mark.parametrize(
     "settings",
     EVERY,
-    ids=lambda s: "-".join(f"{v.label if hasattr(v, 'label') else v}" for v in (*s[:4], s.skyhook, s.voltage_limit)),
+    ids=lambda s: "-".join(
+        f"{v.label if hasattr(v, 'label') else v}" for v in (*s[:4], s.skyhook, s.voltage_limit)
+    ),
 )
 def test_python_and_compiled_agree(settings):
     controlling = controller(settings, PERIOD)
@@ -70,13 +75,16 @@ def test_python_and_compiled_agree(settings):
     for measured, demand in stream(500):
         plain, one = update(controlling, plain, measured, demand)
         fast, other = compiled_update(controlling, fast, measured, demand)
-        # Modal coordinates of the structure grow without bound under such forces: compared to their size.
+        # Modal coordinates of the structure grow without bound under such forces: compared to their
+        # size.
         assert np.max(np.abs(np.subtract(one, other)) / np.maximum(1.0, np.abs(one))) < 1e-12
     assert isinstance(one, Commands)
 
 
 def test_a_packed_state_unpacks_to_itself():
-    controlling = controller(Settings(structure=Structure.BEAM, compensator=Compensator.TWO_STEP), PERIOD)
+    controlling = controller(
+        Settings(structure=Structure.BEAM, compensator=Compensator.TWO_STEP), PERIOD
+    )
     state = initial_state(controlling)
     for measured, demand in stream(60):
         state, _ = update(controlling, state, measured, demand)
@@ -85,7 +93,10 @@ def test_a_packed_state_unpacks_to_itself():
 
 
 def test_controllers_know_nothing_of_the_twin():
-    code = "import controllers, sys; assert not {'mujoco', 'rigtwin'} & set(sys.modules), sorted(sys.modules)"
+    code = (
+        "import controllers, sys; assert not {'mujoco', 'rigtwin'} "
+        "& set(sys.modules), sorted(sys.modules)"
+    )
     root = Path(__file__).parents[1]
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
 
@@ -115,7 +126,9 @@ def test_semi_active_damper_only_dissipates():
 
 def test_first_sample_sets_the_filters():
     controlling = controller(Settings(), PERIOD)
-    state, commands = update(controlling, initial_state(controlling), Measurements(0, 0, -0.01, 210.0), Demand(0, 0, 0))
+    state, commands = update(
+        controlling, initial_state(controlling), Measurements(0, 0, -0.01, 210.0), Demand(0, 0, 0)
+    )
     assert (state.travel, state.velocity, state.force) == (-0.01, 0.0, 210.0)
     assert commands.force == pytest.approx(200.0 + 10.0)
     assert commands.structure == pytest.approx(-0.004 + (210.0 / 25 - 9.81) * 1e-6)
@@ -130,9 +143,14 @@ def test_commands_of_the_stand_in_rig_reproduce(name):
     controlling = controller(settings, recording.period)
     state, commands = initial_state(controlling), []
     for row in range(recording.ticks):
-        measured, demand = Measurements(*(c[row] for c in columns)), Demand(*(d[row] for d in demands))
+        measured, demand = (
+            Measurements(*(c[row] for c in columns)),
+            Demand(*(d[row] for d in demands)),
+        )
         state, command = update(controlling, state, measured, demand)
         commands.append(command)
     for number, field in enumerate(Commands._fields):
         recorded = recording.column("/command", field)
-        assert np.max(np.abs(np.array(commands)[:, number] - recorded)) <= 2e-7 * max(1.0, np.max(np.abs(recorded)))
+        assert np.max(np.abs(np.array(commands)[:, number] - recorded)) <= 2e-7 * max(
+            1.0, np.max(np.abs(recorded))
+        )

@@ -195,7 +195,7 @@ def test_settings_are_checked():
         ({"guide": 3}, "expected a table"),
     ):
         with pytest.raises(Exception, match=said):
-            override(base, changes)
+            override(base, changes)  # type: ignore[arg-type]
 
 
 def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:

@@ -169,7 +169,10 @@ SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload":
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [pytest.param(*item, marks=SLOW if item[0] in ("kff", "ki") else ()) for item in SETTINGS.items()],
+    [
+        pytest.param(*item, marks=SLOW if item[0] in ("kff", "ki") else ())
+        for item in SETTINGS.items()
+    ],
 )
 def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     recording = recorded("road1.6", (f"setting@controller={name}:{value}",), 3.0)

@@ -54,7 +54,9 @@ class TestActuatorsConform(test_utils.EnvironmentTestMixin, unittest.TestCase):
         return made("drop", actions=Actuators())
 
 
-@pytest.mark.parametrize("name", ["active", "semi-active", "friction-road", "beam-active", "imposed"])
+@pytest.mark.parametrize(
+    "name", ["active", "semi-active", "friction-road", "beam-active", "imposed"]
+)
 def test_at_rest_it_is_the_compiled_loop_to_the_bit(name):
     configuration = short(name, 1.0, computer={"missed_ticks": 0.02})
     env = Environment(configuration, find(name).demands, seed=5, interval=1)
@@ -71,7 +73,9 @@ def test_at_rest_it_is_the_compiled_loop_to_the_bit(name):
 def test_an_agent_that_commands_what_the_controller_did_meets_the_same_rig():
     configuration = short("active", 1.0)
     ran = simulate(configuration, find("active").demands(configuration, 3), 3)
-    env = Environment(configuration, find("active").demands, seed=3, actions=Actuators(), interval=1)
+    env = Environment(
+        configuration, find("active").demands, seed=3, actions=Actuators(), interval=1
+    )
     env.reset()
     for tick, commands in enumerate(ran.commands):
         step = env.step(commands[[1, 3]])
@@ -118,7 +122,9 @@ def test_a_reward_is_what_it_says():
     for tick in range(100):
         step = env.step(env.rest())
         assert step.reward == pytest.approx(-(((ran.truth[tick, 2] - sag) / 0.01) ** 2), rel=1e-12)
-    ride = Environment(short("drop"), find("drop").demands, reward=Reward(1.0, np.inf, np.inf), interval=100)
+    ride = Environment(
+        short("drop"), find("drop").demands, reward=Reward(1.0, np.inf, np.inf), interval=100
+    )
     ride.reset()
     cost = np.sum((np.diff(ran.truth[:100, 1], 2) / 1e-6) ** 2) / 100
     assert ride.step(ride.rest()).reward == pytest.approx(-cost, rel=1e-9)
@@ -128,7 +134,9 @@ def test_an_agent_can_do_something_about_it():
     """More skyhook, as preload against the body's velocity, costs less."""
 
     def total(gain: float) -> float:
-        env = Environment(short("passive", 6.0), find("passive").demands, reward=Reward(travel=np.inf))
+        env = Environment(
+            short("passive", 6.0), find("passive").demands, reward=Reward(travel=np.inf)
+        )
         step, found = env.reset(), 0.0
         while not step.last():
             velocity = step.observation["controller"][4]
@@ -151,7 +159,9 @@ def test_its_physics_is_the_rig_that_runs():
     step = env.step(env.rest())
     assert before is env.physics
     assert env.physics.time() == pytest.approx(env.control_timestep())
-    assert env.physics.named.data.qpos["structure"] == pytest.approx(step.observation["sensors"][1], abs=1e-3)
+    assert env.physics.named.data.qpos["structure"] == pytest.approx(
+        step.observation["sensors"][1], abs=1e-3
+    )
     env.reset()
     assert env.physics is not before
     assert env.physics.time() == 0.0
@@ -195,7 +205,9 @@ def test_the_viewer_runs_it_and_pauses_change_nothing(name):
     other = Environment(configuration, find(name).demands, seed=5)
     step = other.reset()
     for observation, position in seen:
-        assert all(np.array_equal(observation[kind], step.observation[kind]) for kind in observation)
+        assert all(
+            np.array_equal(observation[kind], step.observation[kind]) for kind in observation
+        )
         assert np.array_equal(position, other.physics.data.qpos)
         step = other.step(other.rest())
     assert step.last()

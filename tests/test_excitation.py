@@ -18,7 +18,8 @@ def test_road_amplitudes_follow_equation_6_3():
     assert (frequencies[0], frequencies[-1], len(frequencies)) == (0.02, pytest.approx(1.6), 80)
     wavenumber = frequencies / road.speed
     assert amplitudes == pytest.approx(np.sqrt(2 * 7e-8 / wavenumber**2.5 * 0.02 / road.speed))
-    # The same road, 0.02 and 0.2 Hz lowest: 17.7 and 3.0 mm rms as recomputed in the facts of the rig.
+    # The same road, 0.02 and 0.2 Hz lowest: 17.7 and 3.0 mm rms as recomputed in the facts of the
+    # rig.
     assert np.sqrt(0.5 * np.sum(amplitudes**2)) == pytest.approx(0.0245, abs=0.001)
 
 

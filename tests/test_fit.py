@@ -96,7 +96,14 @@ def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
 
     assert cost(small) < 40.0
     assert cost(large) > 400.0
-    assert np.max(np.abs(space.estimate_tolerances(clean - 50.0 * nominal.tolerance_responses(plant)[:, 0]))) <= BEYOND
+    assert (
+        np.max(
+            np.abs(
+                space.estimate_tolerances(clean - 50.0 * nominal.tolerance_responses(plant)[:, 0])
+            )
+        )
+        <= BEYOND
+    )
 
 
 def test_a_deviation_within_tolerance_is_no_finding(nominal):

@@ -72,7 +72,9 @@ def test_python_and_compiled_code_agree(text):
 
 
 def test_settings_are_settings_and_all_other_names_inputs():
-    compiled = formula("kp * (reference - position) - kv * derivative(position)", {"kp": 3.0, "kv": 0.5})
+    compiled = formula(
+        "kp * (reference - position) - kv * derivative(position)", {"kp": 3.0, "kv": 0.5}
+    )
     assert compiled.inputs == ("reference", "position")
     one = compiled.replayed({}, [SIGNAL, TIME], PERIOD)
     np.testing.assert_allclose(one[1:], (3.0 * (SIGNAL - TIME) - 0.5)[1:], atol=1e-9)

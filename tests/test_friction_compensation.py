@@ -53,13 +53,16 @@ def test_a_spike_must_have_risen_for_five_samples():
 
 
 def driven(settings: Settings, ticks: int, friction: float = 14.0):
-    """The compensator beside a motor that reverses at 0.1 s: travel slows and turns, the error jumps and decays."""
+    """The compensator beside a motor that reverses at 0.1 s: travel slows and turns, the error
+    jumps and decays."""
     state, velocities, errors, added = REST, NO_VELOCITIES, NO_ERRORS, []
     for tick in range(ticks):
         t = tick * PERIOD - 0.1
         travel = 0.25 * t**2
         error = 0.0 if t < 0 else 2 * friction * (1 - math.exp(-t / 0.004)) * math.exp(-t / 0.05)
-        state, velocities, errors = stepped(settings, state, velocities, errors, travel, error, PERIOD)
+        state, velocities, errors = stepped(
+            settings, state, velocities, errors, travel, error, PERIOD
+        )
         added.append(state.added)
     return np.array(added)
 
@@ -80,7 +83,8 @@ def test_the_buffer_keeps_steps_apart():
     settings = THESIS._replace(compensator=Compensator.FORCE_THRESHOLD)
     state, velocities, errors, added = REST, NO_VELOCITIES, NO_ERRORS, []
     for tick in range(400):
-        # An error that swings every 15 ms: the direction of friction seems to change far more often than steps may come.
+        # An error that swings every 15 ms: the direction of friction seems to change far more often
+        # than steps may come.
         error = 10.0 if (tick // 15) % 2 else -10.0
         state, velocities, errors = stepped(settings, state, velocities, errors, 0.0, error, PERIOD)
         added.append(state.added)
@@ -97,7 +101,9 @@ def test_the_observer_finds_the_friction_and_its_reversal(mains):
     for tick in range(4000):
         friction = 14.0 if (tick // 700) % 2 else -14.0
         hum = mains * math.sin(2 * math.pi * 50.0 * tick * PERIOD)
-        state = observed(settings, state, motor - friction + hum + 1.5 * random.standard_normal(), PERIOD)
+        state = observed(
+            settings, state, motor - friction + hum + 1.5 * random.standard_normal(), PERIOD
+        )
         found.append((state.friction, friction))
         told = 200.0 + state.added
         state = pushed(state, told, PERIOD)

@@ -24,20 +24,26 @@ SPRING = GasSpring(167_285.0, 0.673, 1.4)
 def test_isothermal_gas_keeps_pressure_times_volume():
     spring = GasSpring(400.0, 0.25, 1.0)
     for stroke in (-0.1, 0.0, 0.1, 0.2):
-        assert spring_force(spring, stroke) * (spring.length - stroke) == pytest.approx(400.0 * 0.25)
+        assert spring_force(spring, stroke) * (spring.length - stroke) == pytest.approx(
+            400.0 * 0.25
+        )
 
 
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.4])
 @pytest.mark.parametrize("stroke", [-0.05, 0.0, 0.2, 0.42, 0.6])
 def test_stiffness_is_the_derivative_of_the_force(exponent: float, stroke: float):
     spring, step = SPRING._replace(exponent=exponent), 1e-6
-    slope = (spring_force(spring, stroke + step) - spring_force(spring, stroke - step)) / (2.0 * step)
+    slope = (spring_force(spring, stroke + step) - spring_force(spring, stroke - step)) / (
+        2.0 * step
+    )
     assert stiffness(spring, stroke) == pytest.approx(slope, rel=1e-7)
 
 
 @pytest.mark.parametrize("share", [1.0, 1.5, 4.0, 30.0])
 def test_the_equilibrium_carries_the_load(share: float):
-    assert spring_force(SPRING, equilibrium(SPRING, share * SPRING.force)) == pytest.approx(share * SPRING.force)
+    assert spring_force(SPRING, equilibrium(SPRING, share * SPRING.force)) == pytest.approx(
+        share * SPRING.force
+    )
 
 
 def test_a_load_below_the_precharge_compresses_nothing():
@@ -69,7 +75,9 @@ def test_the_charge_is_that_spring_again():
     charge = find_charge(spring, area, stroke)
     left = charge.gas - charge.cylinder
     assert charge.pressure * area == pytest.approx(395.0)
-    assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(spring_force(spring, stroke))
+    assert charge.pressure * (charge.gas / left) ** 1.4 * area == pytest.approx(
+        spring_force(spring, stroke)
+    )
     assert charge.cylinder / charge.gas == pytest.approx(stroke / spring.length)
 
 
@@ -85,12 +93,21 @@ def test_compiled_code_has_the_same_force():
 
 def test_bad_input_is_one_line():
     for make, words in (
-        (lambda: design(0.0, 10.0, 0.1, 1.4), "the force fully extended of a gas spring is 0 N; it has to be positive"),
-        (lambda: design(10.0, 10.0, 0.1, 1.4), "the force compressed, 10 N, has to exceed the one fully extended, 10 N"),
+        (
+            lambda: design(0.0, 10.0, 0.1, 1.4),
+            "the force fully extended of a gas spring is 0 N; it has to be positive",
+        ),
+        (
+            lambda: design(10.0, 10.0, 0.1, 1.4),
+            "the force compressed, 10 N, has to exceed the one fully extended, 10 N",
+        ),
         (lambda: design(10.0, 40.0, math.nan, 1.4), "the stroke of a gas spring is nan m"),
         (lambda: design(10.0, 40.0, 0.1, -1.0), "the exponent of a gas spring is -1; it"),
         (lambda: find_charge(SPRING, -1e-3, 0.5), "the area of a gas spring is -0.001 m²"),
-        (lambda: find_charge(SPRING, 1e-3, 0.7), "a stroke of 0.7 m leaves no room in a gas column of 0.673 m"),
+        (
+            lambda: find_charge(SPRING, 1e-3, 0.7),
+            "a stroke of 0.7 m leaves no room in a gas column of 0.673 m",
+        ),
     ):
         with pytest.raises(RigtwinError) as raised:
             make()

@@ -107,7 +107,10 @@ def test_viscous_friction_through_a_spring_lags():
 
 def test_an_ideal_actuator_follows_half_a_tick_late():
     command = np.cumsum(np.ones(100)) * 1e-3
-    np.testing.assert_allclose(follow_command(PositionActuator(), command, 0.0, PERIOD, 4)[5:], command[5:] - 0.5e-3, atol=1e-12
+    np.testing.assert_allclose(
+        follow_command(PositionActuator(), command, 0.0, PERIOD, 4)[5:],
+        command[5:] - 0.5e-3,
+        atol=1e-12,
     )
 
 

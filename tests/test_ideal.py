@@ -61,11 +61,15 @@ def test_semi_active_quarter_car():
         force = 200 - 1000 * (s[0] - s[2]) - 50 * travel - damper
         return [s[1], force / 25 - 9.81, s[3], (50_000 * (ground_at(t) - s[2]) - force) / 34]
 
-    exact = solve_ivp(slope, (0, 10), [-0.004, 0, -0.004, 0], t_eval=TIME, max_step=2e-4, rtol=1e-6, atol=1e-9).y
+    exact = solve_ivp(
+        slope, (0, 10), [-0.004, 0, -0.004, 0], t_eval=TIME, max_step=2e-4, rtol=1e-6, atol=1e-9
+    ).y
     ours = simulate_ideal(Configuration(controller=settings), ground_at(TIME))
     assert np.max(np.abs(ours.structure - exact[0])) < 2e-4
     # It is not the passive suspension.
-    assert np.max(np.abs(simulate_ideal(Configuration(), ground_at(TIME)).structure - exact[0])) > 5e-3
+    assert (
+        np.max(np.abs(simulate_ideal(Configuration(), ground_at(TIME)).structure - exact[0])) > 5e-3
+    )
 
 
 def test_beams_on_a_quarter_car_against_all_78_freedoms():
@@ -74,19 +78,29 @@ def test_beams_on_a_quarter_car_against_all_78_freedoms():
     angular, shapes = all_modes(settings)
     upward = np.zeros(len(mass))
     upward[2::6] = 1.0
-    weight, centre, damping = shapes.T @ mass @ upward * -9.81, shapes[2], settings.beam_damping * angular**2
+    weight, centre, damping = (
+        shapes.T @ mass @ upward * -9.81,
+        shapes[2],
+        settings.beam_damping * angular**2,
+    )
 
     def slope(t, s):
         q, rate, wheel, wheel_rate = s[:78], s[78:156], s[156], s[157]
         force = 200 - 1000 * (centre @ q - wheel) - 50 * (centre @ rate - wheel_rate)
         modal = centre * force + weight - angular**2 * q - damping * rate
-        return np.concatenate([rate, modal, [wheel_rate, (50_000 * (ground_at(t) - wheel) - force) / 34]])
+        return np.concatenate(
+            [rate, modal, [wheel_rate, (50_000 * (ground_at(t) - wheel) - force) / 34]]
+        )
 
     start = np.zeros(158)
     start[:78] = shapes.T @ mass @ upward * -0.004
     start[156] = -0.004
-    exact = solve_ivp(slope, (0, 3), start, t_eval=TIME[:3000], method="LSODA", rtol=1e-7, atol=1e-10).y
-    ours = simulate_ideal(Configuration(controller=settings, timing=Timing(duration=3.0)), ground_at(TIME[:3000]))
+    exact = solve_ivp(
+        slope, (0, 3), start, t_eval=TIME[:3000], method="LSODA", rtol=1e-7, atol=1e-10
+    ).y
+    ours = simulate_ideal(
+        Configuration(controller=settings, timing=Timing(duration=3.0)), ground_at(TIME[:3000])
+    )
     assert np.max(np.abs(ours.structure - centre @ exact[:78])) < 5e-4
     tip = shapes[6 * 3 + 2] @ exact[:78]
     assert ours.wing is not None
@@ -97,8 +111,16 @@ def test_beams_on_a_quarter_car_against_all_78_freedoms():
 def test_stationary_rms_on_a_white_noise_road_by_the_lyapunov_equation():
     # Ground velocity white: ẋ = A x + B w, A P + P Aᵀ + B Bᵀ S = 0.
     k, b, m, kt, mu = 1000.0, 50.0, 25.0, 50_000.0, 34.0
-    # The ground itself wanders; travel, deflection and velocities are stationary: states z = x_s − x_u, v_s, y = x_u − u, v_u.
-    a = np.array([[0, 1, 0, -1], [-k / m, -b / m, 0, b / m], [0, 0, 0, 1], [k / mu, b / mu, -kt / mu, -b / mu]])
+    # The ground itself wanders; travel, deflection and velocities are stationary: states z = x_s −
+    # x_u, v_s, y = x_u − u, v_u.
+    a = np.array(
+        [
+            [0, 1, 0, -1],
+            [-k / m, -b / m, 0, b / m],
+            [0, 0, 0, 1],
+            [k / mu, b / mu, -kt / mu, -b / mu],
+        ]
+    )
     noise = np.array([0.0, 0.0, -1.0, 0.0])
     density = 1e-4
     covariance = solve_continuous_lyapunov(a, -density * np.outer(noise, noise))
@@ -118,15 +140,24 @@ def test_stationary_rms_on_a_white_noise_road_by_the_lyapunov_equation():
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(1000.0, 50.0), (4000.0, 300.0)])
 def test_passive_invariant_point(stiffness, damping):
-    """At ω² = k_t / m_u the forces on both masses give m_s·x_s = −m_u·u, whatever the suspension."""
+    """At ω² = k_t / m_u the forces on both masses give m_s·x_s = −m_u·u, whatever the
+    suspension."""
     frequency = math.sqrt(50_000.0 / 34.0)
     time = np.arange(40_000) * 1e-3
-    # A ground held over each tick is half a tick late and a little smaller; both are far below the tolerance.
+    # A ground held over each tick is half a tick late and a little smaller; both are far below the
+    # tolerance.
     ground = 1e-3 * np.sin(frequency * time)
-    settings = Settings(suspension_stiffness=stiffness, suspension_damping=damping, preload=25 * 9.81, start=-25 * 9.81 / 5e4)
+    settings = Settings(
+        suspension_stiffness=stiffness,
+        suspension_damping=damping,
+        preload=25 * 9.81,
+        start=-25 * 9.81 / 5e4,
+    )
     late = slice(20_000, None)
     moved = simulate_ideal(Configuration(controller=settings), ground).structure[late]
-    waves = np.column_stack([np.sin(frequency * time[late]), np.cos(frequency * time[late]), np.ones(20_000)])
+    waves = np.column_stack(
+        [np.sin(frequency * time[late]), np.cos(frequency * time[late]), np.ones(20_000)]
+    )
     along, across, _ = np.linalg.lstsq(waves, moved, rcond=None)[0]
     assert along == pytest.approx(-34 / 25 * 1e-3, rel=0.01)
     assert abs(across) < 0.03 * abs(along)

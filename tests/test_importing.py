@@ -1,4 +1,5 @@
-"""Import: files as spreadsheets, loggers and MATLAB write them; what is odd in them is said; a mistake is one line."""
+"""Import: files as spreadsheets, loggers and MATLAB write them; what is odd in them is said; a
+mistake is one line."""
 
 from __future__ import annotations
 
@@ -30,7 +31,9 @@ column = "t"
 """
 
 
-def text(separator: str = ",", decimal: str = ".", head: str = "", names: str = "t,x,f", units: str = "") -> str:
+def text(
+    separator: str = ",", decimal: str = ".", head: str = "", names: str = "t,x,f", units: str = ""
+) -> str:
     rows = [f"{t:.4f},{x:.6f},{f:.5f}" for t, x, f in zip(TIME, POSITION, FORCE, strict=True)]
     body = [row.replace(",", "|").replace(".", decimal).replace("|", separator) for row in rows]
     lines = [*([head] if head else []), *([names.replace(",", separator)] if names else [])]
@@ -47,7 +50,9 @@ def imported(folder: Path, data: str | bytes, map_text: str = MAP, name: str = "
 def assert_right(recording) -> None:
     assert recording.machine == "bench"
     assert recording.period == 0.002
-    np.testing.assert_allclose(recording.column("/sensor", "displacement"), 1e-3 * POSITION, atol=1e-8)
+    np.testing.assert_allclose(
+        recording.column("/sensor", "displacement"), 1e-3 * POSITION, atol=1e-8
+    )
     np.testing.assert_allclose(recording.column("/sensor", "force"), FORCE, atol=1e-4)
 
 
@@ -99,17 +104,30 @@ def test_time_of_day_and_milliseconds(tmp_path: Path):
     lines = text().splitlines()
     rows = [f"{s},{line.split(',', 1)[1]}" for s, line in zip(stamps, lines[1:], strict=True)]
     assert_right(imported(tmp_path, "\n".join(["t,x,f", *rows]))[0])
-    rows = [f"{1e3 * t:.1f},{line.split(',', 1)[1]}" for t, line in zip(TIME, lines[1:], strict=True)]
-    assert_right(imported(tmp_path, "\n".join(["t,x,f", *rows]), MAP.replace('column = "t"', 'column = "t"\nunit = "ms"'))[0])
+    rows = [
+        f"{1e3 * t:.1f},{line.split(',', 1)[1]}" for t, line in zip(TIME, lines[1:], strict=True)
+    ]
+    assert_right(
+        imported(
+            tmp_path,
+            "\n".join(["t,x,f", *rows]),
+            MAP.replace('column = "t"', 'column = "t"\nunit = "ms"'),
+        )[0]
+    )
 
 
 def test_matlab_files(tmp_path: Path):
-    savemat(tmp_path / "data.mat", {"t": TIME[:, None], "x": POSITION[:, None], "f": FORCE[:, None], "gain": 3.0})
+    savemat(
+        tmp_path / "data.mat",
+        {"t": TIME[:, None], "x": POSITION[:, None], "f": FORCE[:, None], "gain": 3.0},
+    )
     (tmp_path / "map.toml").write_text(MAP)
     convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
     savemat(tmp_path / "data.mat", {"log": {"t": TIME, "both": np.column_stack([POSITION, FORCE])}})
-    names = MAP.replace('"t"', '"log.t"').replace('"x"', '"log.both:1"').replace('"f"', '"log.both:2"')
+    names = (
+        MAP.replace('"t"', '"log.t"').replace('"x"', '"log.both:1"').replace('"f"', '"log.both:2"')
+    )
     (tmp_path / "map.toml").write_text(names)
     convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
@@ -131,7 +149,9 @@ def test_parquet(tmp_path: Path):
     pyarrow = pytest.importorskip("pyarrow")
     from pyarrow import parquet
 
-    parquet.write_table(pyarrow.table({"t": TIME, "x": POSITION, "f": FORCE}), tmp_path / "data.parquet")
+    parquet.write_table(
+        pyarrow.table({"t": TIME, "x": POSITION, "f": FORCE}), tmp_path / "data.parquet"
+    )
     (tmp_path / "map.toml").write_text(MAP)
     convert(tmp_path / "data.parquet", tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
@@ -140,8 +160,12 @@ def test_parquet(tmp_path: Path):
 def test_what_is_odd_is_said(tmp_path: Path):
     lines = text().splitlines()
     lines = [*lines[:100], lines[99], *lines[100:]]
-    clipped = [f"{a},{b},{min(float(c), 140.0)}" for a, b, c in (line.split(",") for line in lines[1:])]
-    recording, report = imported(tmp_path, "\n".join(["t,x,f", *clipped]) + "\n", MAP + '"/command.u" = { constant = 1.0 }\n')
+    clipped = [
+        f"{a},{b},{min(float(c), 140.0)}" for a, b, c in (line.split(",") for line in lines[1:])
+    ]
+    recording, report = imported(
+        tmp_path, "\n".join(["t,x,f", *clipped]) + "\n", MAP + '"/command.u" = { constant = 1.0 }\n'
+    )
     said = "\n".join(report)
     assert recording.ticks == TICKS
     assert "1 rows were there twice" in said
@@ -154,10 +178,14 @@ def test_resampling_only_when_asked(tmp_path: Path):
     gappy = "\n".join([*lines[:100], *lines[120:]])
     with pytest.raises(RigtwinError, match=r"1 gaps in time, the first of 0\.042 s"):
         imported(tmp_path, gappy)
-    recording, report = imported(tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nresample = 0.004'))
+    recording, report = imported(
+        tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nresample = 0.004')
+    )
     assert recording.period == 0.004
     assert any("resampled" in line for line in report)
-    recording, _ = imported(tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nuntil = 0.19'))
+    recording, _ = imported(
+        tmp_path, gappy, MAP.replace('column = "t"', 'column = "t"\nuntil = 0.19')
+    )
     assert recording.ticks == 96
 
 
@@ -205,7 +233,14 @@ BAD_MAPS = [
 def test_a_bad_map_is_one_line(tmp_path: Path, capsys, map_text: str, said: str):
     (tmp_path / "data.csv").write_text(text())
     (tmp_path / "map.toml").write_text(map_text)
-    arguments = ["import", str(tmp_path / "data.csv"), "--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "out.mcap")]
+    arguments = [
+        "import",
+        str(tmp_path / "data.csv"),
+        "--map",
+        str(tmp_path / "map.toml"),
+        "-o",
+        str(tmp_path / "out.mcap"),
+    ]
     assert main(arguments) == 1
     error = capsys.readouterr().err
     assert said in error

@@ -1,4 +1,5 @@
-"""The loop: stepwise and compiled alike, seeded, ended by trips; the force loop identified from the running twin."""
+"""The loop: stepwise and compiled alike, seeded, ended by trips; the force loop identified from the
+running twin."""
 
 from __future__ import annotations
 
@@ -62,7 +63,9 @@ def test_same_seed_same_bytes(tmp_path):
 def test_a_trip_ends_the_test_and_keeps_the_recording(tmp_path):
     experiment = EXPERIMENTS["drop"]
     configuration = from_assignments(experiment.configuration, ["safety.structure=0.05"])
-    outcome = record(tmp_path / "t.mcap", "drop", configuration, experiment.demands(configuration, 0), 0)
+    outcome = record(
+        tmp_path / "t.mcap", "drop", configuration, experiment.demands(configuration, 0), 0
+    )
     assert outcome.tripped
     assert "structure_lvdt" in outcome.reason
     recording = load(outcome.path)
@@ -105,7 +108,8 @@ def test_period_must_be_a_multiple_of_the_timestep():
 
 
 def force_response(noise_free: Configuration, frequencies: np.ndarray) -> np.ndarray:
-    """Force sensed and filtered over force demanded, plates at rest, whole hertz, from the last second of three."""
+    """Force sensed and filtered over force demanded, plates at rest, whole hertz, from the last
+    second of three."""
     timing = noise_free.timing
     time = np.arange(noise_free.ticks) * timing.period
     force = 230.0 + schroeder(time, frequencies, 1.0)
@@ -121,11 +125,20 @@ def force_response(noise_free: Configuration, frequencies: np.ndarray) -> np.nda
 
 
 def test_force_loop_follows_its_linear_model():
-    """With neither friction nor noise the loop is linear: compare with the sampled loop worked out by hand."""
+    """With neither friction nor noise the loop is linear: compare with the sampled loop worked out
+    by hand."""
     frequencies = np.arange(1.0, 41.0)
-    changes = ["rail.coulomb=500", "motor.coulomb=0", "load_cell.white=0", "load_cell.hum=0", "load_cell.resolution=0"]
+    changes = [
+        "rail.coulomb=500",
+        "motor.coulomb=0",
+        "load_cell.white=0",
+        "load_cell.hum=0",
+        "load_cell.resolution=0",
+    ]
     settings = Settings(mode=Mode.IMPOSED)
-    configuration = from_assignments(Configuration(controller=settings, timing=Timing(duration=3.0)), changes)
+    configuration = from_assignments(
+        Configuration(controller=settings, timing=Timing(duration=3.0)), changes
+    )
     found = force_response(configuration, frequencies)
     z = np.exp(2j * math.pi * frequencies * 1e-3)
     decay = math.exp(-1.0 / 1.26)

@@ -24,7 +24,9 @@ def test_table_3_5_within_a_factor_of_two():
 
 def test_table_6_3_force_limit_cycle_and_missing_wheel_hop():
     run = trial("drop", 0)
-    assert compute_tracking(run.should, run.ran.commands, run.plate, run.force).force_total == pytest.approx(12.4, rel=0.2)
+    assert compute_tracking(
+        run.should, run.ran.commands, run.plate, run.force
+    ).force_total == pytest.approx(12.4, rel=0.2)
     assert np.ptp(run.force[run.time > 10]) > 2 * 14
     assert np.std(run.wheel[run.time > 3]) < 5e-6
 
@@ -34,4 +36,6 @@ def test_of_a_recording_as_of_the_run_in_memory(tmp_path):
     demands = np.zeros((run.configuration.ticks, 3))
     record(tmp_path / "drop.mcap", "drop", run.configuration, demands, 3)
     recorded = vars(tracking_of(load(tmp_path / "drop.mcap"), run.configuration))
-    assert recorded == pytest.approx(vars(compute_tracking(run.should, run.ran.commands, run.plate, run.force)), rel=1e-9)
+    assert recorded == pytest.approx(
+        vars(compute_tracking(run.should, run.ran.commands, run.plate, run.force)), rel=1e-9
+    )

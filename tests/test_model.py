@@ -23,7 +23,9 @@ NOMINAL = RigPlant()
 SMOOTH = NOMINAL._replace(rail=Rail(0.0), motor=NOMINAL.motor._replace(coulomb=0.0))
 
 
-def simulation(plant: RigPlant = NOMINAL, step: float = STEP) -> tuple[mujoco.MjModel, mujoco.MjData]:
+def simulation(
+    plant: RigPlant = NOMINAL, step: float = STEP
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
     model = build(plant, step)
     return model, mujoco.MjData(model)
 
@@ -31,9 +33,17 @@ def simulation(plant: RigPlant = NOMINAL, step: float = STEP) -> tuple[mujoco.Mj
 @pytest.mark.parametrize("path", [MECHANICS, SCENE])
 def test_every_element_is_named(path):
     model = mujoco.MjModel.from_xml_path(str(path))
-    for kind, count in (("body", model.nbody), ("joint", model.njnt), ("geom", model.ngeom), ("site", model.nsite),
-                        ("tendon", model.ntendon), ("actuator", model.nu), ("sensor", model.nsensor), ("camera", model.ncam),
-                        ("light", model.nlight)):  # fmt: skip
+    for kind, count in (
+        ("body", model.nbody),
+        ("joint", model.njnt),
+        ("geom", model.ngeom),
+        ("site", model.nsite),
+        ("tendon", model.ntendon),
+        ("actuator", model.nu),
+        ("sensor", model.nsensor),
+        ("camera", model.ncam),
+        ("light", model.nlight),
+    ):
         assert all(getattr(model, kind)(number).name for number in range(count)), kind
     assert model.pair_dim[model.pair("tyre").id] == 1
 
@@ -51,14 +61,18 @@ def test_lights_and_cameras_change_no_digit_of_the_motion():
     assert np.array_equal(*ends)
 
 
-@pytest.mark.parametrize("plant", [NOMINAL, NOMINAL._replace(carriage=Carriage(1140.0), tyre=Tyre(8.461e6))])
+@pytest.mark.parametrize(
+    "plant", [NOMINAL, NOMINAL._replace(carriage=Carriage(1140.0), tyre=Tyre(8.461e6))]
+)
 def test_tyre_is_a_spring_that_only_pushes(plant):
     model, data = simulation(plant._replace(rail=Rail(0.0), motor=Motor(coulomb=0.0)))
     carriage = model.joint("carriage").dofadr[0]
     for deflection in np.linspace(1e-4, 0.02, 9):
         data.qpos[model.joint("carriage").qposadr[0]] = -deflection
         mujoco.mj_forward(model, data)
-        assert data.qfrc_constraint[carriage] == pytest.approx(plant.tyre.stiffness * deflection, rel=1e-3)
+        assert data.qfrc_constraint[carriage] == pytest.approx(
+            plant.tyre.stiffness * deflection, rel=1e-3
+        )
     data.qpos[model.joint("carriage").qposadr[0]] = 0.001
     mujoco.mj_forward(model, data)
     assert data.qfrc_constraint[carriage] == 0.0
@@ -132,8 +146,11 @@ def test_dry_friction_holds_below_breakaway_and_yields_above(plant, breakaway, d
     assert speed == pytest.approx(0.01 * breakaway / plant.carriage.mass * 0.75, rel=0.05)
 
 
-def quarter_car_in_mujoco(sprung: float, stiffness: float, damping: float, preload: float, ground: np.ndarray) -> np.ndarray:
-    """The plate freed and hung on the travel tendon: a quarter car by MuJoCo alone. Returns (sprung, wheel) positions."""
+def quarter_car_in_mujoco(
+    sprung: float, stiffness: float, damping: float, preload: float, ground: np.ndarray
+) -> np.ndarray:
+    """The plate freed and hung on the travel tendon: a quarter car by MuJoCo alone. Returns
+    (sprung, wheel) positions."""
     plant = SMOOTH
     model = mujoco.MjModel.from_xml_path(str(MECHANICS))
     model.body("structure_plate").mass = sprung
@@ -147,7 +164,9 @@ def quarter_car_in_mujoco(sprung: float, stiffness: float, damping: float, prelo
     model.tendon_frictionloss[:] = 0
     model.pair_solref[:] = ours.pair_solref
     model.opt.timestep = STEP
-    data.joint("carriage").qpos = data.joint("structure").qpos = ground[0] - preload / plant.tyre.stiffness
+    data.joint("carriage").qpos = data.joint("structure").qpos = (
+        ground[0] - preload / plant.tyre.stiffness
+    )
     weight = sprung * 9.81
     data.qfrc_applied[model.joint("structure").dofadr[0]] = preload - weight
     data.qfrc_applied[model.joint("carriage").dofadr[0]] = -preload
@@ -164,9 +183,9 @@ def test_quarter_car_agrees_with_solve_ivp():
     time = np.arange(0.0, 10.0, STEP)
 
     def road(t):
-        return 0.002 * np.sin(2 * np.pi * 1.3 * t) * np.minimum(t, 1.0) + 0.0005 * np.sin(2 * np.pi * 7.0 * t) * np.minimum(
-            t, 1.0
-        )
+        return 0.002 * np.sin(2 * np.pi * 1.3 * t) * np.minimum(t, 1.0) + 0.0005 * np.sin(
+            2 * np.pi * 7.0 * t
+        ) * np.minimum(t, 1.0)
 
     k, b, m, mu, kt, preload = 1000.0, 50.0, 25.0, 34.0, 50_000.0, 200.0
 
@@ -176,7 +195,9 @@ def test_quarter_car_agrees_with_solve_ivp():
         return [s[1], force / m - 9.81, s[3], (tyre - force) / mu]
 
     start = [-preload / kt, 0.0, -preload / kt, 0.0]
-    exact = solve_ivp(slope, (0, time[-1]), start, t_eval=time[:-1], rtol=1e-9, atol=1e-11, method="DOP853").y
+    exact = solve_ivp(
+        slope, (0, time[-1]), start, t_eval=time[:-1], rtol=1e-9, atol=1e-11, method="DOP853"
+    ).y
     ours = quarter_car_in_mujoco(m, k, b, preload, road(time))
     for mine, theirs in ((ours[:, 0], exact[0]), (ours[:, 1], exact[2])):
         assert np.sqrt(np.mean((mine - theirs) ** 2)) < 1e-3 * np.std(theirs)
@@ -189,7 +210,8 @@ def held(signal: np.ndarray, substeps: int) -> np.ndarray:
 
 
 def imposed_inputs(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Ground motion and suspension force of an imposed test: command through H(s) by scipy, and the force demanded."""
+    """Ground motion and suspension force of an imposed test: command through H(s) by scipy, and the
+    force demanded."""
     experiment = EXPERIMENTS["imposed"]
     demands = experiment.demands(experiment.configuration, seed)
     a, b, c = state_space(NOMINAL.ground_cylinder)
@@ -204,7 +226,9 @@ def test_carriage_with_dry_friction_agrees_with_an_exact_integration(seed):
     configuration = Configuration()
     ours = replay_carriage(configuration, ground, force, preload=200.0)
     fine = 100
-    exact = coulomb_carriage(held(ground, fine), held(force, fine), 1e-3 / fine, 34.0, 50_000.0, 50.0, -0.004, fine)
+    exact = coulomb_carriage(
+        held(ground, fine), held(force, fine), 1e-3 / fine, 34.0, 50_000.0, 50.0, -0.004, fine
+    )
     count = min(len(exact), len(ours))
     error = np.sqrt(np.mean((ours[:count] - exact[:count]) ** 2)) / np.std(exact)
     assert error < 1.5e-3

@@ -20,9 +20,9 @@ TIME = np.arange(1500) * PERIOD
 COMMAND = 20.0 * np.sin(2 * np.pi * 1.1 * TIME) + 12.0 * np.sin(2 * np.pi * 2.3 * TIME)
 MOTION = 0.1 * np.sin(2 * np.pi * 0.9 * TIME) + 0.03 * np.sin(2 * np.pi * 2.7 * TIME)
 FRICTION = {"coulomb": 4.0, "viscous": 6.0, "stiffness": 150.0}
-CARRIED = TOML.replace('moved_by = "drive"\nobserve = ["encoder"]', 'moved_by = "encoder"\nobserve = ["cell"]').replace(
-    "[[replays]]", '[components.cell]\nsensor = "cell"\n\n[[replays]]'
-)
+CARRIED = TOML.replace(
+    'moved_by = "drive"\nobserve = ["encoder"]', 'moved_by = "encoder"\nobserve = ["cell"]'
+).replace("[[replays]]", '[components.cell]\nsensor = "cell"\n\n[[replays]]')
 SIZES = {
     "coulomb": 7.0,
     "viscous": 15.0,
@@ -89,7 +89,12 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
     unmoved = reference.move(plain)[0]
     for effect in mechanical(machine):
         size = SIZES[effect.kind.name]
-        if sort == "pendulum" and effect.quantities()[effect.kind.parameters[0]].unit in ("N", "Ns/m", "N/m", "Ns^2/m^2"):
+        if sort == "pendulum" and effect.quantities()[effect.kind.parameters[0]].unit in (
+            "N",
+            "Ns/m",
+            "N/m",
+            "Ns^2/m^2",
+        ):
             size *= scale
         if sort == "pendulum" and effect.kind.name in ("saturation", "deadband", "rate_limit"):
             size *= scale
@@ -100,7 +105,9 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
         felt = rms(theirs - unmoved)
         assert felt > 1e-3 * rms(unmoved), f"{effect.name} is not felt"
         apart = rms(ours - theirs)
-        assert apart < max(0.03 * felt, 0.004 * rms(theirs)), f"{effect.name}: {apart:.3g} of {felt:.3g}"
+        assert apart < max(0.03 * felt, 0.004 * rms(theirs)), (
+            f"{effect.name}: {apart:.3g} of {felt:.3g}"
+        )
 
 
 def test_every_effect_of_a_carried_joint_takes_the_force_that_mujoco_says(tmp_path):

@@ -17,7 +17,13 @@ def noise(deviation: float, seed: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("deviation", [0.1, 1.5, 10.0])
 def test_white_noise_is_found_beneath_motion_hum_and_friction_jumps(deviation):
     jumps = 14.0 * np.sign(np.sin(2 * np.pi * 3.0 * TIME))
-    signal = 230 + 60 * np.sin(2 * np.pi * 1.0 * TIME) + 5 * np.sin(2 * np.pi * 50 * TIME) + jumps + noise(deviation)
+    signal = (
+        230
+        + 60 * np.sin(2 * np.pi * 1.0 * TIME)
+        + 5 * np.sin(2 * np.pi * 50 * TIME)
+        + jumps
+        + noise(deviation)
+    )
     hum_left = 5.0 * (2 * np.sin(np.pi * 0.05)) ** 3 / np.sqrt(2 * 20)
     assert white_noise(signal) == pytest.approx(np.hypot(deviation, hum_left), rel=0.05)
 

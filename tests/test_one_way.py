@@ -72,7 +72,7 @@ COARSE = 9e-4
 
 
 def pushed(machine: rigtwin.Machine, share: float = 1.0, **effects: float) -> rigtwin.Recording:
-    def push(_: rigtwin.Configuration, seed: int) -> dict[str, np.ndarray]:  # noqa: ARG001
+    def push(_: rigtwin.Configuration, seed: int) -> dict[str, np.ndarray]:
         return {"force": share * PUSH}
 
     given = {f"{kind}@encoder": value for kind, value in effects.items()}

@@ -1,4 +1,5 @@
-"""Recordings: written and read alike, readable by others, whole or in part; never a traceback for a bad file."""
+"""Recordings: written and read alike, readable by others, whole or in part; never a traceback for a
+bad file."""
 
 from __future__ import annotations
 
@@ -48,7 +49,11 @@ def test_every_channel_comes_back_exactly(tmp_path):
     for channel in CHANNELS:
         column = data[channel.topic[1:]][:, topic_fields(channel.topic).index(channel.name)]
         assert np.array_equal(recording.column(channel.topic, channel.name), column), channel
-    assert (recording.machine, recording.experiment, recording.period) == ("suspension-rig", "test", 1e-3)
+    assert (recording.machine, recording.experiment, recording.period) == (
+        "suspension-rig",
+        "test",
+        1e-3,
+    )
     assert recording.controller == CONTROLLER
     assert (recording.end, recording.notes, recording.ticks) == ("completed", (), 1000)
     assert np.array_equal(np.round(recording.time * 1e9), np.arange(1000) * 1e6)
@@ -62,16 +67,24 @@ def test_other_readers_read_it(tmp_path):
         assert summary is not None
         assert summary.statistics is not None
         assert summary.statistics.message_count == 3000
-        found = [message.load_cell for _, channel, _, message in reader.iter_decoded_messages(topics=["/sensor"]) if channel]
+        found = [
+            message.load_cell
+            for _, channel, _, message in reader.iter_decoded_messages(topics=["/sensor"])
+            if channel
+        ]
         assert np.array_equal(found, data["sensor"][:, 3])
-        late = [message.log_time for _, _, message in reader.iter_messages(topics=["/command"], starting_at=900_000_000)]
+        late = [
+            message.log_time
+            for _, _, message in reader.iter_messages(topics=["/command"], starting_at=900_000_000)
+        ]
         assert late == [int(tick * 1e6) for tick in range(900, 1000)]
         assert [record.name for record in reader.iter_metadata()] == ["rigtwin", "rigtwin.end"]
 
 
 @pytest.mark.parametrize("omit", [None, "load_cell"])
 def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
-    """Messages as another program writes them: JSON, extra fields and topics, a field that the rig does not have."""
+    """Messages as another program writes them: JSON, extra fields and topics, a field that the rig
+    does not have."""
     path = tmp_path / "o.mcap"
     data = values(300)
     fields = [name for name in topic_fields("/sensor") if name != omit]
@@ -82,18 +95,34 @@ def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
         sensor = writer.register_channel("/sensor", "json", schema)
         other = writer.register_channel("/weather", "json", schema)
         config = json.dumps({"controller": CONTROLLER})
-        about = {"format": "1", "machine": "suspension-rig", "experiment": "x", "period": "0.001", "config": config}
+        about = {
+            "format": "1",
+            "machine": "suspension-rig",
+            "experiment": "x",
+            "period": "0.001",
+            "config": config,
+        }
         writer.add_metadata("rigtwin", about)
         for tick in range(300):
-            row = {name: data["sensor"][tick, topic_fields("/sensor").index(name)] for name in fields}
-            writer.add_message(sensor, tick * 1_000_000, json.dumps({**row, "extra": 1}).encode(), tick * 1_000_000)
+            row = {
+                name: data["sensor"][tick, topic_fields("/sensor").index(name)] for name in fields
+            }
+            writer.add_message(
+                sensor, tick * 1_000_000, json.dumps({**row, "extra": 1}).encode(), tick * 1_000_000
+            )
             writer.add_message(other, tick * 1_000_000, b"{}", tick * 1_000_000)
         writer.finish()
     recording = load(path)
-    assert list(recording.columns["/sensor"]) == [*fields, "extra"], "the table's first, then what else there is"
-    assert np.allclose(recording.column("/sensor", "ground_lvdt"), data["sensor"][:, 0], rtol=0, atol=0)
+    assert list(recording.columns["/sensor"]) == [*fields, "extra"], (
+        "the table's first, then what else there is"
+    )
+    assert np.allclose(
+        recording.column("/sensor", "ground_lvdt"), data["sensor"][:, 0], rtol=0, atol=0
+    )
     if omit:
-        with pytest.raises(RigtwinError, match=f"channel /sensor.{omit} is missing; it has /sensor.ground_lvdt"):
+        with pytest.raises(
+            RigtwinError, match=f"channel /sensor.{omit} is missing; it has /sensor.ground_lvdt"
+        ):
             recording.column("/sensor", omit)
 
 
@@ -113,7 +142,9 @@ def test_a_truncated_recording_is_read_up_to_its_last_chunk(tmp_path, share):
     assert recording.ticks >= share * 5000 - 500
     assert "cut off" in recording.notes[0]
     assert f"{recording.time[-1]:.3f} s" in recording.notes[0]
-    assert np.array_equal(recording.column("/sensor", "load_cell"), data["sensor"][: recording.ticks, 3])
+    assert np.array_equal(
+        recording.column("/sensor", "load_cell"), data["sensor"][: recording.ticks, 3]
+    )
 
 
 def test_no_damage_gives_anything_but_an_error_or_a_note(tmp_path):
@@ -210,7 +241,9 @@ with Writer(Path(sys.argv[1]), "killed", 1e-3, {}) as writer:
 
 def test_kill_9_loses_at_most_half_a_second(tmp_path):
     path = tmp_path / "k.mcap"
-    process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True
+    )
     assert process.stdout is not None
     reached = 0
     while reached < 3170:
@@ -226,7 +259,17 @@ def test_kill_9_loses_at_most_half_a_second(tmp_path):
 
 def test_kill_9_while_the_twin_runs(tmp_path):
     path = tmp_path / "k.mcap"
-    command = [sys.executable, "-m", "rigtwin.cli", "run", "road10", "--out", str(path), "--set", "timing.duration=120"]
+    command = [
+        sys.executable,
+        "-m",
+        "rigtwin.cli",
+        "run",
+        "road10",
+        "--out",
+        str(path),
+        "--set",
+        "timing.duration=120",
+    ]
     process = subprocess.Popen(command)
     deadline = time.monotonic() + 300
     while (not path.exists() or path.stat().st_size < 300_000) and time.monotonic() < deadline:
@@ -259,7 +302,9 @@ def test_gaps_and_repeats_are_noted(tmp_path):
     with path.open("wb") as file:
         writer = OtherWriter(file)
         writer.start()
-        channel = writer.register_channel("/sensor", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        channel = writer.register_channel(
+            "/sensor", "json", writer.register_schema("s", "jsonschema", b"{}")
+        )
         writer.add_metadata("rigtwin", {"format": "1", "period": "0.001", "config": "{}"})
         for tick in [*range(100), 99, *range(140, 200)]:
             writer.add_message(channel, tick * 1_000_000, b'{"load_cell": 1}', tick * 1_000_000)
@@ -272,7 +317,11 @@ def test_gaps_and_repeats_are_noted(tmp_path):
 def test_foxglove_layout_names_channels_that_exist():
     layout = (EXAMPLE.parents[1] / "docs" / "foxglove-layout.json").read_text()
     known = {f"{channel.topic}.{channel.name}" for channel in CHANNELS}
-    paths = {word for word in layout.replace('"', " ").split() if word.startswith(("/sensor.", "/command.", "/truth."))}
+    paths = {
+        word
+        for word in layout.replace('"', " ").split()
+        if word.startswith(("/sensor.", "/command.", "/truth."))
+    }
     assert paths
     assert paths <= known, textwrap.shorten(str(paths - known), 200)
 
@@ -282,7 +331,9 @@ def other_recording(path, rows, times=None, period="0.001"):
     with path.open("wb") as file:
         writer = OtherWriter(file)
         writer.start()
-        channel = writer.register_channel("/sensor", "json", writer.register_schema("s", "jsonschema", b"{}"))
+        channel = writer.register_channel(
+            "/sensor", "json", writer.register_schema("s", "jsonschema", b"{}")
+        )
         writer.add_metadata("rigtwin", {"format": "1", "period": period, "config": "{}"})
         for tick, row in enumerate(rows):
             stamp = times[tick] if times else tick * 1_000_000

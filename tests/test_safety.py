@@ -22,10 +22,17 @@ from rigtwin.simulation.safety import (
 PERIOD = 1e-3
 REST = Measurements(0.0, -0.004, 0.0, 200.0)
 STILL = Commands(0.0, -0.004, 200.0, 1.07)
-AT = {name: column for column, name in enumerate((*Measurements._fields, *(f"command {c}" for c in Commands._fields)))}
+AT = {
+    name: column
+    for column, name in enumerate(
+        (*Measurements._fields, *(f"command {c}" for c in Commands._fields))
+    )
+}
 
 
-def verdict(measured: Measurements, commands: Commands, limits: Safety | None = None) -> tuple[Trip, int]:
+def verdict(
+    measured: Measurements, commands: Commands, limits: Safety | None = None
+) -> tuple[Trip, int]:
     """Of a tick that comes first, so that nothing can have jumped."""
     trip, column = judge_limits(limits or Safety(), PERIOD, empty_memory(), measured, commands)
     return Trip(trip), column
@@ -42,11 +49,21 @@ def verdict(measured: Measurements, commands: Commands, limits: Safety | None = 
         (REST._replace(load_cell=math.nan), STILL, Trip.NOT_A_NUMBER, "load_cell"),
         (REST._replace(ground_lvdt=math.inf), STILL, Trip.NOT_A_NUMBER, "ground_lvdt"),
         (REST, STILL._replace(voltage=math.nan), Trip.NOT_A_NUMBER, "command voltage"),
-        (REST._replace(ground_lvdt=0.249), STILL._replace(ground=0.3751), Trip.COMMAND, "command ground"),
+        (
+            REST._replace(ground_lvdt=0.249),
+            STILL._replace(ground=0.3751),
+            Trip.COMMAND,
+            "command ground",
+        ),
         (REST._replace(structure_lvdt=-0.07), STILL, Trip.FOLLOWING, "structure_lvdt"),
         (REST._replace(ground_lvdt=0.07), STILL, Trip.FOLLOWING, "ground_lvdt"),
         (REST._replace(load_cell=601.0), STILL, Trip.FOLLOWING, "load_cell"),
-        (Measurements(0.0, 0.149, 0.2, -1499.0), Commands(0.0, 0.149, -1499.0, 0.0), Trip.NONE, "ground_lvdt"),
+        (
+            Measurements(0.0, 0.149, 0.2, -1499.0),
+            Commands(0.0, 0.149, -1499.0, 0.0),
+            Trip.NONE,
+            "ground_lvdt",
+        ),
     ],
 )
 def test_each_limit(measured, commands, trip, where):
@@ -60,7 +77,12 @@ def test_each_limit(measured, commands, trip, where):
         (REST._replace(load_cell=501.0), STILL._replace(force=501.0), Trip.JUMP, "load_cell"),
         (REST, STILL._replace(structure=-0.0061), Trip.COMMAND_RATE, "command structure"),
         (REST, STILL._replace(voltage=-1.5), Trip.COMMAND_RATE, "command voltage"),
-        (REST._replace(suspension_lvdt=0.0019), STILL._replace(voltage=3.5), Trip.NONE, "ground_lvdt"),
+        (
+            REST._replace(suspension_lvdt=0.0019),
+            STILL._replace(voltage=3.5),
+            Trip.NONE,
+            "ground_lvdt",
+        ),
     ],
 )
 def test_limits_on_what_a_tick_may_change(measured, commands, trip, where):
@@ -72,7 +94,10 @@ def test_limits_on_what_a_tick_may_change(measured, commands, trip, where):
 def test_travel_that_is_too_fast():
     watch = empty_memory()
     limits = Safety(velocity=1.5)
-    trips = [judge_limits(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0] for tick in range(40)]
+    trips = [
+        judge_limits(limits, PERIOD, watch, REST._replace(suspension_lvdt=1.6e-3 * tick), STILL)[0]
+        for tick in range(40)
+    ]
     assert trips.index(Trip.VELOCITY) == 10
 
 
@@ -81,7 +106,9 @@ def test_stuck_sensor_is_seen_at_the_last_of_the_readings_allowed():
     noise = np.random.default_rng(0).normal(0.0, 1e-5, (30, 4))
     trips, last = [], REST
     for tick in range(30):
-        measured = Measurements(*(value + error for value, error in zip(REST, noise[tick], strict=True)))
+        measured = Measurements(
+            *(value + error for value, error in zip(REST, noise[tick], strict=True))
+        )
         if tick >= 11:
             measured = measured._replace(suspension_lvdt=last.suspension_lvdt)
         last = measured
@@ -102,7 +129,10 @@ def test_compiled_is_the_same():
     for _ in range(3000):
         measured = Measurements(*(random.normal(0.0, 1.0, 4) * [0.01, 0.01, 0.01, 700.0]).tolist())
         commands = Commands(*(random.normal(0.0, 1.0, 4) * [0.002, 0.002, 700.0, 3.0]).tolist())
-        verdicts = judge_limits(limits, PERIOD, one, measured, commands), _compiled(limits, other, measured, commands)
+        verdicts = (
+            judge_limits(limits, PERIOD, one, measured, commands),
+            _compiled(limits, other, measured, commands),
+        )
         assert verdicts[0] == verdicts[1]
         seen.add(verdicts[0][0])
     assert len(seen) > 3

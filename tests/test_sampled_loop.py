@@ -26,9 +26,19 @@ FREE = {name: {"white": 0.0, "hum": 0.0, "resolution": 0.0} for name in SENSORS}
 CASES = {
     "nominal": {},
     "late cylinder": {"structure_cylinder": {"delay": 0.0023, "lag": 0.001}},
-    "slow sensor and motor": {"load_cell": {"delay": 0.0045, "lag": 0.004}, "motor": {"delay": 0.0013, "lag": 0.002}},
-    "late computer": {"computer": {"delay": 0.003}, "suspension_lvdt": {"delay": 0.0037, "gain": 1.05, "lag": 0.002}},
-    "viscous": {"motor": {"viscous": 20.0}, "tyre": {"damping": 200.0, "hardening": 20.0}, "rail": {"viscous": 30.0}},
+    "slow sensor and motor": {
+        "load_cell": {"delay": 0.0045, "lag": 0.004},
+        "motor": {"delay": 0.0013, "lag": 0.002},
+    },
+    "late computer": {
+        "computer": {"delay": 0.003},
+        "suspension_lvdt": {"delay": 0.0037, "gain": 1.05, "lag": 0.002},
+    },
+    "viscous": {
+        "motor": {"viscous": 20.0},
+        "tyre": {"damping": 200.0, "hardening": 20.0},
+        "rail": {"viscous": 30.0},
+    },
     "skyhook": {"controller": {"skyhook": "active", "skyhook_damping": 100.0}},
     "stiff force loop": {"controller": {"kp": 1.0, "ki": 100.0}},
     "eager cylinder": {"structure_cylinder": {"gain": 1.1}},
@@ -45,7 +55,9 @@ def measured(configuration: Configuration) -> float:
     period = configuration.timing.period
     acceleration = np.gradient(np.gradient(ran.commands[:, 1], period), period)
     quarter = len(acceleration) // 4
-    early, late = (np.sqrt(np.mean(acceleration[at * quarter : (at + 1) * quarter] ** 2)) for at in (1, 3))
+    early, late = (
+        np.sqrt(np.mean(acceleration[at * quarter : (at + 1) * quarter] ** 2)) for at in (1, 3)
+    )
     return math.log(early / late) / (2 * quarter * period)
 
 
@@ -67,7 +79,9 @@ def test_what_is_not_in_the_loop_does_not_count():
     """In an imposed test nothing comes back from the wheel, which swings for ever on its tyre."""
     imposed = experiment("imposed").configuration
     assert decay(imposed) > 1.0
-    assert decay(override(imposed, {"tyre": {"stiffness": 10_000.0}})) == pytest.approx(decay(imposed), rel=1e-9)
+    assert decay(override(imposed, {"tyre": {"stiffness": 10_000.0}})) == pytest.approx(
+        decay(imposed), rel=1e-9
+    )
 
 
 def test_where_it_says_that_the_loop_begins_to_swing_the_twin_does():
@@ -81,7 +95,9 @@ def test_where_it_says_that_the_loop_begins_to_swing_the_twin_does():
 
 
 def test_delay_costs_margin():
-    decays = [decay(free({"computer": {"delay": delay}})) for delay in (0.0, 0.0005, 0.001, 0.004, 0.0095)]
+    decays = [
+        decay(free({"computer": {"delay": delay}})) for delay in (0.0, 0.0005, 0.001, 0.004, 0.0095)
+    ]
     assert decays == sorted(decays, reverse=True)
 
 

@@ -1,4 +1,5 @@
-"""Sessions from the command line: dry runs, arming, lists of tests, calibration, real time and its guardian."""
+"""Sessions from the command line: dry runs, arming, lists of tests, calibration, real time and its
+guardian."""
 
 from __future__ import annotations
 
@@ -59,7 +60,9 @@ def card(tmp_path):
 
 def session(*settings: str, seed: int = 0) -> Test:
     experiment = find("imposed")
-    configuration = from_assignments(experiment.configuration, ["timing.duration=1", "safety.ramp=0.3", *settings])
+    configuration = from_assignments(
+        experiment.configuration, ["timing.duration=1", "safety.ramp=0.3", *settings]
+    )
     return Test("imposed", configuration, experiment.demands(configuration, seed), seed, TABLE)
 
 
@@ -68,7 +71,23 @@ def session(*settings: str, seed: int = 0) -> Test:
 
 def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
     out = tmp_path / "d.mcap"
-    assert main(["run", "imposed", "--target", "daq", "--dry-run", "--card", str(card), "--out", str(out), *SHORT]) == 0
+    assert (
+        main(
+            [
+                "run",
+                "imposed",
+                "--target",
+                "daq",
+                "--dry-run",
+                "--card",
+                str(card),
+                "--out",
+                str(out),
+                *SHORT,
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     for quantity in ("force", "travel", "velocity of travel", "margin"):
         assert quantity in said
@@ -87,7 +106,11 @@ def test_another_setting_is_another_session(tmp_path):
         return digest(test.experiment, test.configuration, test.demands, test.table)
 
     base = session()
-    others = [session("controller.kp=0.31"), session("safety.force=1400"), session("timing.duration=1.1")]
+    others = [
+        session("controller.kp=0.31"),
+        session("safety.force=1400"),
+        session("timing.duration=1.1"),
+    ]
     others.append(replace(base, experiment="drop"))
     others.append(replace(base, demands=base.demands * 1.0001))
     others.append(replace(base, table=replace(TABLE, device="Dev2")))
@@ -118,16 +141,33 @@ def test_another_setting_is_another_session(tmp_path):
         (["--card", "CARD", "--live"], "--live goes with a session in real time"),
         (["--target", "daq", "--card", "CARD"], "the NI-DAQmx driver is missing"),
         (["--target", "daq", "--card", "UNSIGNED"], "sign not checked: ground_lvdt"),
-        (["--target", "daq", "--card", "CARD", "--effect", "coulomb@rail=80"], "--effect is the twin's"),
-        (["--target", "daq", "--card", "CARD", "--set", "safety.structure=0.3"], "range too small for the limit"),
-        (["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.structure=0.3"], "range too small for the limit"),
-        (["--target", "daq", "--dry-run", "--card", "CARD", "--out", "/nowhere/x.mcap"], "its folder does not exist"),
-        (["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.stuck=2"], "safety.stuck = 2"),
+        (
+            ["--target", "daq", "--card", "CARD", "--effect", "coulomb@rail=80"],
+            "--effect is the twin's",
+        ),
+        (
+            ["--target", "daq", "--card", "CARD", "--set", "safety.structure=0.3"],
+            "range too small for the limit",
+        ),
+        (
+            ["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.structure=0.3"],
+            "range too small for the limit",
+        ),
+        (
+            ["--target", "daq", "--dry-run", "--card", "CARD", "--out", "/nowhere/x.mcap"],
+            "its folder does not exist",
+        ),
+        (
+            ["--target", "daq", "--dry-run", "--card", "CARD", "--set", "safety.stuck=2"],
+            "safety.stuck = 2",
+        ),
         (["--card", "CARD", "--out", "CARD"], "is the input; name another output"),
         (["--real-time", "--live", "70000"], "--live 70000: expected a port"),
     ],
 )
-def test_mistakes_are_said_before_anything_moves(card, capsys, arguments, said, tmp_path, monkeypatch):
+def test_mistakes_are_said_before_anything_moves(
+    card, capsys, arguments, said, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     names = {"CARD": str(card), "UNSIGNED": str(CARD)}
     assert main(["run", "imposed", *(names.get(text) or text for text in arguments)]) == 1
@@ -156,7 +196,9 @@ def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_pa
 
 
 @pytest.mark.parametrize("missing", ["nidaqmx", "grpc"])
-def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, monkeypatch, missing, tmp_path):
+def test_without_the_drivers_client_one_line_says_how_to_get_it(
+    card, capsys, monkeypatch, missing, tmp_path
+):
     import sys
 
     monkeypatch.setitem(sys.modules, missing, None)
@@ -165,7 +207,18 @@ def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, mo
         ["run", "imposed", "--target", "daq", "--card", str(card), "--dry-run"],
         ["run", "imposed", "--target", "daq", "--card", str(card)],
         ["card", "serve", str(card)],
-        ["card", "check", str(card), "-o", "new.toml", "--operator", "a", "--zero", "--virtual", str(card)],
+        [
+            "card",
+            "check",
+            str(card),
+            "-o",
+            "new.toml",
+            "--operator",
+            "a",
+            "--zero",
+            "--virtual",
+            str(card),
+        ],
         ["faults", "--each", "1"],
     ):
         assert main(command) == 1
@@ -189,7 +242,10 @@ def test_without_the_drivers_client_one_line_says_how_to_get_it(card, capsys, mo
         ({"test": [{"experiment": "drop", "wait": 1}]}, "unknown 'wait'"),
         ({"test": [{"experiment": "drop", "set": 3}]}, "set = 3"),
         ({"test": [{"experiment": "drop", "name": "../a"}]}, "expected what a file can be called"),
-        ({"test": [{"experiment": "drop", "name": "a"}, {"experiment": "drop", "name": "a"}]}, "another test's"),
+        (
+            {"test": [{"experiment": "drop", "name": "a"}, {"experiment": "drop", "name": "a"}]},
+            "another test's",
+        ),
     ],
 )
 def test_mistakes_in_a_list(tables, said):
@@ -201,7 +257,8 @@ def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):
     plan, folder = tmp_path / "list.toml", tmp_path / "out"
     plan.write_text(
         '[[test]]\nexperiment = "imposed"\nname = "one"\n'
-        '[[test]]\nexperiment = "drop"\nname = "two"\nseed = 2\nset = {safety = {structure = 0.01}}\n'
+        '[[test]]\nexperiment = "drop"\nname = "two"\nseed = 2\n'
+        "set = {safety = {structure = 0.01}}\n"
         '[[test]]\nexperiment = "imposed"\nname = "three"\n'
     )
     base = ["session", str(plan), "--card", str(CARD), "--folder", str(folder), *SHORT]
@@ -228,7 +285,11 @@ EACH_LINE_BOTH_WAYS = WIRINGS[::25]
 
 
 @pytest.mark.parametrize(
-    "signs", [*EACH_LINE_BOTH_WAYS, *(pytest.param(signs, marks=pytest.mark.slow) for signs in WIRINGS[4::9])]
+    "signs",
+    [
+        *EACH_LINE_BOTH_WAYS,
+        *(pytest.param(signs, marks=pytest.mark.slow) for signs in WIRINGS[4::9]),
+    ],
 )
 def test_every_wrong_sign_is_found(signs):
     from rigtwin.hardware.daq.card import Card
@@ -239,7 +300,8 @@ def test_every_wrong_sign_is_found(signs):
     from rigtwin.hardware.supervisor import COMPLETED
 
     turned = [
-        line._replace(scaling=line.scaling._replace(sign=float(sign))) for line, sign in zip(TABLE.lines, signs, strict=True)
+        line._replace(scaling=line.scaling._replace(sign=float(sign)))
+        for line, sign in zip(TABLE.lines, signs, strict=True)
     ]
     wiring = replace(TABLE, inputs=tuple(turned[:4]), outputs=tuple(turned[4:]))
     configuration, demands = plan_bumps(0.005, FORCE, 1e-3)
@@ -275,7 +337,9 @@ def test_a_dead_signal_is_no_sign():
     demands = plan_bumps(0.005, FORCE, 1e-3)[1]
     noise = np.random.default_rng(0).normal(0.0, 1e-4, (len(demands), 4))
     with pytest.raises(RigtwinError, match="hardly answers"):
-        correct_signs(TABLE, fit_responses(noise, demands), {"ground": 1, "structure": 1, "voltage": 1})
+        correct_signs(
+            TABLE, fit_responses(noise, demands), {"ground": 1, "structure": 1, "voltage": 1}
+        )
 
 
 class Standing:
@@ -312,7 +376,17 @@ def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
         scaling=TABLE.inputs[3].scaling._replace(sign=-1.0, offset=12.5))))  # fmt: skip
     (tmp_path / "wiring.toml").write_text(to_toml(wiring))
     out = tmp_path / "checked.toml"
-    check = ["card", "check", str(CARD), "--operator", "A. Tester", "--note", "first", "--signs", "--zero"]
+    check = [
+        "card",
+        "check",
+        str(CARD),
+        "--operator",
+        "A. Tester",
+        "--note",
+        "first",
+        "--signs",
+        "--zero",
+    ]
     assert main([*check, "--virtual", str(tmp_path / "wiring.toml"), "-o", str(out)]) == 0
     assert "load_cell: reads the wrong way" in capsys.readouterr().out
     checked = load_table(out)
@@ -322,7 +396,9 @@ def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
     assert cell.offset == pytest.approx(12.5, abs=0.5)
     assert (checked.operator, checked.note) == ("A. Tester", "first")
     assert main([*check, "--virtual", str(tmp_path / "wiring.toml"), "-o", str(CARD)]) == 1
-    assert main(["card", "check", str(CARD), "-o", str(out), "--operator", "a", "--span", "x=1"]) == 1
+    assert (
+        main(["card", "check", str(CARD), "-o", str(out), "--operator", "a", "--span", "x=1"]) == 1
+    )
     signs = ["--operator", "a", "--signs"]
     mistakes = (
         ["--operator", " ", "--zero"],
@@ -396,7 +472,8 @@ def test_a_session_in_real_time_is_kept_by_the_guardian(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("number", "said"), [(signal.SIGKILL, "guardian process is gone"), (signal.SIGSTOP, "does not answer any more")]
+    ("number", "said"),
+    [(signal.SIGKILL, "guardian process is gone"), (signal.SIGSTOP, "does not answer any more")],
 )
 def test_without_its_guardian_the_session_stops(tmp_path, number, said):
     import multiprocessing
@@ -435,7 +512,10 @@ def test_the_live_view_is_served_on_this_computer_only():
         pass
     with pytest.raises(RigtwinError, match="no live view on port"):
         open_live_view(port)
-    others = {str(address[4][0]) for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
+    others = {
+        str(address[4][0])
+        for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
+    } - {"127.0.0.1"}
     for address in others:
         with pytest.raises(OSError, match=r".*"), socket.create_connection((address, port), 1.0):
             pass

@@ -1,4 +1,5 @@
-"""Dynamic similitude: groups without a unit, scalings that keep them, a landing that is the same at any size and pace."""
+"""Dynamic similitude: groups without a unit, scalings that keep them, a landing that is the same at
+any size and pace."""
 
 from __future__ import annotations
 
@@ -22,19 +23,30 @@ from rigtwin.studies.similitude import (
 )
 
 BASES = ("kg", "m", "s")
-QUARTER_CAR = {"mass": "kg", "stiffness": "N/m", "damping": "Ns/m", "stroke": "m", "gravity": "m/s^2", "time": "s"}
+QUARTER_CAR = {
+    "mass": "kg",
+    "stiffness": "N/m",
+    "damping": "Ns/m",
+    "stroke": "m",
+    "gravity": "m/s^2",
+    "time": "s",
+}
 
 
 def drawn(seed: int, count: int = 9) -> tuple[dict[str, str], dict[str, float]]:
-    """Quantities of random dimensions, the first three independent; and their values, of either sign."""
+    """Quantities of random dimensions, the first three independent; and their values, of either
+    sign."""
     draw = np.random.default_rng(seed)
     powers = draw.integers(-2, 3, (count, 3))
     while abs(round(np.linalg.det(powers[:3]))) == 0:
         powers[:3] = draw.integers(-2, 3, (3, 3))
     units = {
-        f"q{i}": " ".join(f"{base}^{power}" for base, power in zip(BASES, row, strict=True)) for i, row in enumerate(powers)
+        f"q{i}": " ".join(f"{base}^{power}" for base, power in zip(BASES, row, strict=True))
+        for i, row in enumerate(powers)
     }
-    values = 10.0 ** draw.uniform(-2, 2, count) * np.where(np.arange(count) < 3, 1.0, draw.choice([-1.0, 1.0], count))
+    values = 10.0 ** draw.uniform(-2, 2, count) * np.where(
+        np.arange(count) < 3, 1.0, draw.choice([-1.0, 1.0], count)
+    )
     return units, dict(zip(units, values.tolist(), strict=True))
 
 
@@ -65,7 +77,9 @@ def test_dimensions(unit: str, powers: tuple[int, int, int]):
     assert dimension(unit) == Dimension(*powers)
 
 
-@pytest.mark.parametrize("unit", ["kN", "mm", "ms", "mN", "V", "N/V", "", "N/", "m^", "m^0.5", "furlong", "N/m/"])
+@pytest.mark.parametrize(
+    "unit", ["kN", "mm", "ms", "mN", "V", "N/V", "", "N/", "m^", "m^0.5", "furlong", "N/m/"]
+)
 def test_an_unknown_unit_is_one_line(unit: str):
     with pytest.raises(RigtwinError, match=r"^unknown unit .*; there are kg, m, s, N, [^\n]*$"):
         dimension(unit)
@@ -99,14 +113,20 @@ def test_groups_are_dimensionless_independent_and_complete(seed: int):
     powers = np.array([dimension(unit) for unit in units.values()])
     exponents = np.array([[group.exponents.get(name, 0) for name in units] for group in groups])
     assert np.all(exponents @ powers == 0)
-    assert len(groups) == len(units) - np.linalg.matrix_rank(powers) == np.linalg.matrix_rank(exponents)
+    assert (
+        len(groups)
+        == len(units) - np.linalg.matrix_rank(powers)
+        == np.linalg.matrix_rank(exponents)
+    )
     assert all(math.gcd(*group.exponents.values()) == 1 for group in groups)
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_a_scaled_system_keeps_its_groups(seed: int):
     units, values = drawn(seed)
-    chosen = dict(zip(units, (10.0 ** np.random.default_rng(seed).uniform(-1, 1, 3)).tolist(), strict=False))
+    chosen = dict(
+        zip(units, (10.0 ** np.random.default_rng(seed).uniform(-1, 1, 3)).tolist(), strict=False)
+    )
     rig = scale_values(values, units, scaling(units, chosen))
     for name, factor in chosen.items():
         assert rig[name] == pytest.approx(factor * values[name], rel=1e-12)
@@ -124,7 +144,9 @@ def test_a_system_that_is_not_similar_is_found_out(seed: int):
 
 def test_a_zero_stays_zero():
     values = dict.fromkeys(QUARTER_CAR, 2.0) | {"damping": 0.0}
-    rig = scale_values(values, QUARTER_CAR, scaling(QUARTER_CAR, {"mass": 0.1, "stroke": 0.3, "time": 2.0}))
+    rig = scale_values(
+        values, QUARTER_CAR, scaling(QUARTER_CAR, {"mass": 0.1, "stroke": 0.3, "time": 2.0})
+    )
     assert largest_change(QUARTER_CAR, values, rig) < 1e-12
     assert largest_change(QUARTER_CAR, values, rig | {"damping": 1.0}) == math.inf
     assert largest_change(QUARTER_CAR, values, rig | {"mass": -rig["mass"]}) == math.inf
@@ -132,19 +154,31 @@ def test_a_zero_stays_zero():
 
 def test_any_three_independent_scales_give_the_same():
     by_time = scaling(QUARTER_CAR, {"mass": 0.01, "stroke": 0.25, "time": 2.0})
-    others = scaling(QUARTER_CAR, {name: by_time.factor(QUARTER_CAR[name]) for name in ("stiffness", "damping", "gravity")})
+    others = scaling(
+        QUARTER_CAR,
+        {name: by_time.factor(QUARTER_CAR[name]) for name in ("stiffness", "damping", "gravity")},
+    )
     assert others == pytest.approx(by_time, rel=1e-12)
 
 
 def test_parameters_of_the_rig_can_be_scaled():
     """Every setting with a unit but volts, by the units that stand beside them."""
-    units = {name: meaning.unit for name, meaning in fields(Settings).items() if isinstance(meaning, Quantity)}
+    units = {
+        name: meaning.unit
+        for name, meaning in fields(Settings).items()
+        if isinstance(meaning, Quantity)
+    }
     units = {name: unit for name, unit in units.items() if "V" not in unit}
     values = {name: getattr(Settings(), name) for name in units}
-    other = scale_values(values, units, scaling(units, {"sprung_mass": 4.0, "start": 2.0, "filter_force": 3.0}))
-    assert other["suspension_stiffness"] == pytest.approx(4.0 / 9.0 * values["suspension_stiffness"])
+    other = scale_values(
+        values, units, scaling(units, {"sprung_mass": 4.0, "start": 2.0, "filter_force": 3.0})
+    )
+    assert other["suspension_stiffness"] == pytest.approx(
+        4.0 / 9.0 * values["suspension_stiffness"]
+    )
     ratio = [
-        each["suspension_damping"] / math.sqrt(each["suspension_stiffness"] * each["sprung_mass"]) for each in (values, other)
+        each["suspension_damping"] / math.sqrt(each["suspension_stiffness"] * each["sprung_mass"])
+        for each in (values, other)
     ]
     assert ratio[1] == pytest.approx(ratio[0])
     assert other["kp"] == values["kp"]
@@ -152,12 +186,24 @@ def test_parameters_of_the_rig_can_be_scaled():
 
 def test_bad_scales_are_one_line():
     for scales, words in (
-        ({"mass": 0.1, "stiffness": 1.0, "time": 1.0}, "dimensionally dependent: time^2 · stiffness / mass has no unit"),
-        ({"mass": 0.1, "stroke": 1.0}, "three quantities have to be given a scale, not 2: mass, stroke"),
+        (
+            {"mass": 0.1, "stiffness": 1.0, "time": 1.0},
+            "dimensionally dependent: time^2 · stiffness / mass has no unit",
+        ),
+        (
+            {"mass": 0.1, "stroke": 1.0},
+            "three quantities have to be given a scale, not 2: mass, stroke",
+        ),
         ({}, "three quantities have to be given a scale, not 0: none"),
-        ({"mass": 0.1, "stroke": 0.0, "time": 1.0}, "the scale of stroke is 0; it has to be positive"),
+        (
+            {"mass": 0.1, "stroke": 0.0, "time": 1.0},
+            "the scale of stroke is 0; it has to be positive",
+        ),
         ({"mass": math.nan, "stroke": 1.0, "time": 1.0}, "the scale of mass is nan"),
-        ({"mass": 0.1, "length": 1.0, "time": 1.0}, "there is no quantity 'length'; there are mass, stiffness"),
+        (
+            {"mass": 0.1, "length": 1.0, "time": 1.0},
+            "there is no quantity 'length'; there are mass, stiffness",
+        ),
     ):
         with pytest.raises(RigtwinError) as raised:
             scaling(QUARTER_CAR, scales)
@@ -166,7 +212,9 @@ def test_bad_scales_are_one_line():
     with pytest.raises(RigtwinError, match="cannot all repeat: only 2 of them"):
         pi_groups(QUARTER_CAR, ("gravity", "stroke", "time"))
     with pytest.raises(RigtwinError, match="damping is 0 and stands below the line"):
-        pi_groups(QUARTER_CAR, ("damping", "stroke", "time"))[0].value(dict.fromkeys(QUARTER_CAR, 1.0) | {"damping": 0.0})
+        pi_groups(QUARTER_CAR, ("damping", "stroke", "time"))[0].value(
+            dict.fromkeys(QUARTER_CAR, 1.0) | {"damping": 0.0}
+        )
 
 
 def test_time_is_stretched_until_the_velocity_fits():
@@ -195,19 +243,26 @@ def test_the_landing_comes_to_rest_under_its_weight():
     damped = study.BOEING._replace(damping=20 * study.BOEING.damping, lift=0.0, velocity=0.5)
     travel, velocity, force = study.touch_down(damped, np.linspace(0.0, 12.0, 13))[:, -1]
     assert force == pytest.approx(damped.sprung_mass * damped.gravity, rel=1e-4)
-    assert travel == pytest.approx(0.673 * (1.0 - (damped.gas_force / force) ** (1.0 / 1.4)), rel=1e-4)
+    assert travel == pytest.approx(
+        0.673 * (1.0 - (damped.gas_force / force) ** (1.0 / 1.4)), rel=1e-4
+    )
     assert abs(velocity) < 1e-4
 
 
 def test_what_the_study_finds_of_the_tables():
-    """Table 3.3 does not follow from Table 3.2; it does from 500 kg and 0.559 m, but for one figure that was cut off."""
+    """Table 3.3 does not follow from Table 3.2; it does from 500 kg and 0.559 m, but for one figure
+    that was cut off."""
     found = study.conclude({})
     table = [entry for entry in found.entries if entry.where == "Table 3.3"]
-    assert [entry.agrees for entry in table if entry.what.endswith("200 kg and 0.589 m")] == [False] * 5
+    assert [entry.agrees for entry in table if entry.what.endswith("200 kg and 0.589 m")] == [
+        False
+    ] * 5
     assert [entry.what for entry in table if "500 kg" in entry.what and not entry.agrees] == [
         "damping coefficient, 500 kg and 0.559 m"
     ]
     assert all(entry.agrees for entry in found.entries if entry.where == "Table 3.1")
-    assert all(entry.agrees for entry in found.entries if entry.what.startswith("simulated landing"))
+    assert all(
+        entry.agrees for entry in found.entries if entry.what.startswith("simulated landing")
+    )
     assert {entry.where for entry in found.entries} - {"§3.5"} == set(study.STUDY.covers)
     assert all(entry.note for entry in found.entries if not entry.agrees)

@@ -22,7 +22,13 @@ from rigtwin.studies.friction_spikes import BOUNDS, filter_lag, find_compensator
 def recording(tmp_path_factory):
     experiment = find("friction-road")
     path = tmp_path_factory.mktemp("friction") / "friction.mcap"
-    record(path, "friction-road", experiment.configuration, experiment.demands(experiment.configuration, 21), 21)
+    record(
+        path,
+        "friction-road",
+        experiment.configuration,
+        experiment.demands(experiment.configuration, 21),
+        21,
+    )
     return load(path)
 
 
@@ -54,8 +60,11 @@ def test_finds_the_friction_and_every_reversal(calibration):
 
 
 def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
-    """The thesis' goals on another road: 37 % less e1 + e2, half the spike; and the observer beats it."""
-    found = {name: float(getattr(calibration.settings, name)) for name in (*BOUNDS, "friction_step")}
+    """The thesis' goals on another road: 37 % less e1 + e2, half the spike; and the observer beats
+    it."""
+    found = {
+        name: float(getattr(calibration.settings, name)) for name in (*BOUNDS, "friction_step")
+    }
     none, thesis, own = (
         errors(compensated(5, compensator=kind, **found))
         for kind in (Compensator.NONE, Compensator.TWO_STEP, Compensator.OBSERVER)
@@ -78,11 +87,16 @@ def test_refuses_what_it_cannot_use(recording, example):
         find_compensator(recording, settings._replace(compensator=Compensator.OBSERVER))
     with pytest.raises(RigtwinError, match="reverses"):
         find_compensator(dataclasses.replace(example, columns=_still(example)), settings)
-    columns = {topic: {name: values.copy() for name, values in channels.items()} for topic, channels in example.columns.items()}
+    columns = {
+        topic: {name: values.copy() for name, values in channels.items()}
+        for topic, channels in example.columns.items()
+    }
     columns["/sensor"]["load_cell"][7] = np.nan
     with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are no numbers"):
         find_compensator(dataclasses.replace(example, columns=columns), settings)
-    columns["/sensor"]["load_cell"] = filter_lag(186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period)
+    columns["/sensor"]["load_cell"] = filter_lag(
+        186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period
+    )
     with pytest.raises(RigtwinError, match="no dry friction"):
         find_compensator(dataclasses.replace(example, columns=columns), settings)
 
@@ -97,6 +111,15 @@ def test_the_command_writes_settings_that_run(recording, tmp_path, capsys):
     out = tmp_path / "compensator.toml"
     assert main(["calibrate", str(recording.path), "-o", str(out)]) == 0
     assert "Coulomb friction of the motor 1" in capsys.readouterr().out
-    run = ["run", "friction-road", "--config", str(out), "--set", "timing.duration=2", "--out", str(tmp_path / "r.mcap")]
+    run = [
+        "run",
+        "friction-road",
+        "--config",
+        str(out),
+        "--set",
+        "timing.duration=2",
+        "--out",
+        str(tmp_path / "r.mcap"),
+    ]
     assert main(run) == 0
     assert load(tmp_path / "r.mcap").controller["compensator"] == "two-step"

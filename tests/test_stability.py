@@ -1,4 +1,5 @@
-"""Poles, critical lags and delays against exact arithmetic, simulation and the argument principle."""
+"""Poles, critical lags and delays against exact arithmetic, simulation and the argument
+principle."""
 
 from __future__ import annotations
 
@@ -42,21 +43,32 @@ from rigtwin.studies.stability.vehicle import QuarterCar, SingleMass
 
 CHOSEN = QuarterCar(500.0, 0.0, 50.0, 500.0, 100.0, 50.0)
 TABLE_6_2 = QuarterCar(50_000.0, 0.0, 34.0, 1000.0, 50.0, 25.0)
-LAGS_OF_EACH = {"single-mass": (1, 0), "suspension": (1, 0), "structure": (0, 1), "combined": (1, 1), "rig": (2, 1)}
+LAGS_OF_EACH = {
+    "single-mass": (1, 0),
+    "suspension": (1, 0),
+    "structure": (0, 1),
+    "combined": (1, 1),
+    "rig": (2, 1),
+}
 """Model → how many lags the force and the sprung mass's motion come through."""
 
 
 def drawn(count, seed=0, spread=1.0, tyre_damping=True):
     random = np.random.default_rng(seed)
     middle = np.array([500.0, 10.0, 50.0, 500.0, 100.0, 50.0])
-    cars = [QuarterCar(*map(float, np.exp(random.normal(0.0, spread, 6)) * middle)) for _ in range(count)]
+    cars = [
+        QuarterCar(*map(float, np.exp(random.normal(0.0, spread, 6)) * middle))
+        for _ in range(count)
+    ]
     return cars if tyre_damping else [car._replace(tyre_damping=0.0) for car in cars]
 
 
 class TestModels:
     def test_known_poles(self):
         found = poles(MODELS["suspension"](CHOSEN, 0.2))
-        assert sorted(found.imag) == pytest.approx([-5.1167, -1.9544, 0.0, 1.9544, 5.1167], abs=5e-5)
+        assert sorted(found.imag) == pytest.approx(
+            [-5.1167, -1.9544, 0.0, 1.9544, 5.1167], abs=5e-5
+        )
         assert found.real == pytest.approx([-5.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
 
     @pytest.mark.parametrize(
@@ -64,7 +76,12 @@ class TestModels:
         [("boeing-707", 18.90 + 109.5j), ("truck", 14.33 + 107.9j), ("motorcycle", 0.595 + 93.5j)],
     )
     def test_vehicles_of_table_6_1_on_the_rig(self, name, expected):
-        found = rightmost(rig(QuarterCar(tyre_damping=0.0, **VEHICLES[name]._asdict()), Lags(0.01, 0.01, 0.01, 0.01)))
+        found = rightmost(
+            rig(
+                QuarterCar(tyre_damping=0.0, **VEHICLES[name]._asdict()),
+                Lags(0.01, 0.01, 0.01, 0.01),
+            )
+        )
         assert found.real == pytest.approx(expected.real, abs=0.006)
         assert found.imag == pytest.approx(expected.imag, abs=0.06)
 
@@ -76,7 +93,9 @@ class TestModels:
         for car, lag in zip(drawn(20), np.logspace(-3, 0, 20), strict=True):
             expected = lag_roots(LOOPS[model](car), lag)
             found = poles(MODELS[model](car, lag))
-            if len(found) > len(expected):  # The two filters of position and velocity share a pole that no output sees.
+            if len(found) > len(
+                expected
+            ):  # The two filters of position and velocity share a pole that no output sees.
                 expected = np.append(expected, -1.0 / lag)
             assert len(found) == len(expected)
             nearest = np.abs(found[:, None] - expected[None, :])
@@ -87,14 +106,19 @@ class TestModels:
         for car in drawn(5):
             ideal = poles(ideal_quarter_car(car))
             near = poles(MODELS["combined"](car, 1e-7))
-            assert np.abs(ideal[:, None] - near[None, :]).min(axis=1) == pytest.approx(0.0, abs=1e-3)
+            assert np.abs(ideal[:, None] - near[None, :]).min(axis=1) == pytest.approx(
+                0.0, abs=1e-3
+            )
             assert np.sum(near.real < -1e5) == 3
 
     def test_different_lags_of_the_rig(self):
         lags = Lags(0.004, 0.02, 0.01, 0.0064)
         s = rightmost(rig(TABLE_6_2, lags))
         z = {name: 1.0 / (1.0 + s * lag) for name, lag in lags._asdict().items()}
-        force = z["force"] * (TABLE_6_2.suspension_stiffness * z["travel"] + TABLE_6_2.suspension_damping * s * z["velocity"])
+        force = z["force"] * (
+            TABLE_6_2.suspension_stiffness * z["travel"]
+            + TABLE_6_2.suspension_damping * s * z["velocity"]
+        )
         wheel = TABLE_6_2.unsprung_mass * s**2 + TABLE_6_2.tyre_stiffness
         sprung = TABLE_6_2.sprung_mass * s**2
         terms = (sprung * wheel, force * z["plate"] * wheel, force * sprung)
@@ -102,17 +126,23 @@ class TestModels:
 
     def test_ground_moves_the_mass_as_equation_5_17(self):
         mass, lag, s = SingleMass(50.0, 500.0, 100.0), 0.1, 1j * np.array([0.3, 3.0, 30.0])
-        expected = 1.0 / (mass.mass * lag * s**3 + mass.mass * s**2 + mass.damping * s + mass.stiffness)
+        expected = 1.0 / (
+            mass.mass * lag * s**3 + mass.mass * s**2 + mass.damping * s + mass.stiffness
+        )
         force, structure = single_mass_suspension(mass, lag), single_mass_structure(mass, lag)
         assert np.squeeze(force(s)) == pytest.approx(expected, rel=1e-9)
-        assert structure(s, squeeze=False)[structure.output_labels.index("plate"), 0] == pytest.approx(expected, rel=1e-9)
+        assert structure(s, squeeze=False)[
+            structure.output_labels.index("plate"), 0
+        ] == pytest.approx(expected, rel=1e-9)
 
     def test_at_rest_all_moves_with_the_ground(self):
         force = 1.0 / CHOSEN.tyre_stiffness
         assert np.squeeze(ideal_quarter_car(CHOSEN)(0.0)).real == pytest.approx([force, force])
         for model in ("suspension", "structure", "combined", "rig"):
             assert np.squeeze(MODELS[model](CHOSEN, 0.01)(0.0)).real == pytest.approx(force)
-        assert np.squeeze(ideal_single_mass(CHOSEN.sprung)(0.0)).real == pytest.approx(1.0 / CHOSEN.suspension_stiffness)
+        assert np.squeeze(ideal_single_mass(CHOSEN.sprung)(0.0)).real == pytest.approx(
+            1.0 / CHOSEN.suspension_stiffness
+        )
 
 
 class TestCriticalLag:
@@ -120,14 +150,18 @@ class TestCriticalLag:
         for car in drawn(30, spread=2.0):
             found = critical_lag(single_mass(car.sprung))
             assert found is not None
-            assert found.time == pytest.approx(car.suspension_damping / car.suspension_stiffness, rel=1e-9)
+            assert found.time == pytest.approx(
+                car.suspension_damping / car.suspension_stiffness, rel=1e-9
+            )
             assert found.frequency == pytest.approx(car.sprung.natural_frequency, rel=1e-9)
 
     def test_suspension_is_b_over_k_without_tyre_damping_alone(self):
         for car in drawn(30, tyre_damping=False):
             found = critical_lag(LOOPS["suspension"](car))
             assert found is not None
-            assert found.time == pytest.approx(car.suspension_damping / car.suspension_stiffness, rel=1e-6)
+            assert found.time == pytest.approx(
+                car.suspension_damping / car.suspension_stiffness, rel=1e-6
+            )
         damped = critical_lag(LOOPS["suspension"](CHOSEN._replace(tyre_damping=10.0)))
         assert damped is not None
         assert damped.time == pytest.approx(0.2170, abs=1e-4)
@@ -143,7 +177,11 @@ class TestCriticalLag:
 
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_routh_and_hurwitz_in_exact_fractions(self, model):
-        cars = [*drawn(10, seed=1), *drawn(10, seed=2, spread=3.0), *drawn(5, seed=3, tyre_damping=False)]
+        cars = [
+            *drawn(10, seed=1),
+            *drawn(10, seed=2, spread=3.0),
+            *drawn(5, seed=3, tyre_damping=False),
+        ]
         cars += [car._replace(suspension_damping=0.0) for car in drawn(3, seed=4)]
         cars += [CHOSEN._replace(suspension_damping=1e9), CHOSEN._replace(tyre_damping=1e9)]
         outcomes = set()
@@ -154,7 +192,10 @@ class TestCriticalLag:
             elif found.time == 0.0:
                 assert not hurwitz(exact(model, car, 0.0))
             else:
-                assert all(hurwitz(exact(model, car, found.time * part)) for part in (1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.999))
+                assert all(
+                    hurwitz(exact(model, car, found.time * part))
+                    for part in (1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.999)
+                )
                 assert not hurwitz(exact(model, car, found.time * 1.001))
             outcomes.add(found is None or found.time > 0.0)
         assert True in outcomes
@@ -168,9 +209,15 @@ class TestCriticalLag:
             assert rightmost(MODELS[model](car, high)).real > 0.0
             for _ in range(60):
                 middle = 0.5 * (low + high)
-                low, high = (low, middle) if rightmost(MODELS[model](car, middle)).real > 0.0 else (middle, high)
+                low, high = (
+                    (low, middle)
+                    if rightmost(MODELS[model](car, middle)).real > 0.0
+                    else (middle, high)
+                )
             assert high == pytest.approx(found.time, rel=1e-6)
-            assert rightmost(MODELS[model](car, found.time)).imag == pytest.approx(found.frequency, rel=1e-6)
+            assert rightmost(MODELS[model](car, found.time)).imag == pytest.approx(
+                found.frequency, rel=1e-6
+            )
 
     def test_without_damping_there_is_no_time_to_lose(self):
         for model, loop in LOOPS.items():
@@ -199,7 +246,12 @@ class TestCriticalDelay:
 
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_a_simulation_of_the_delay_differential_equation(self, model):
-        cars = [CHOSEN, TABLE_6_2, QuarterCar(tyre_damping=0.0, **VEHICLES["car"]._asdict()), *drawn(1, seed=6)]
+        cars = [
+            CHOSEN,
+            TABLE_6_2,
+            QuarterCar(tyre_damping=0.0, **VEHICLES["car"]._asdict()),
+            *drawn(1, seed=6),
+        ]
         for car in cars:
             critical = critical_delay(LOOPS[model](car))
             assert critical is not None
@@ -225,7 +277,10 @@ class TestCriticalDelay:
 
     def test_a_lag_promises_more_than_a_delay_allows(self):
         truck = QuarterCar(tyre_damping=0.0, **VEHICLES["truck"]._asdict())
-        lag, delay = critical_lag(LOOPS["suspension"](truck)), critical_delay(LOOPS["suspension"](truck))
+        lag, delay = (
+            critical_lag(LOOPS["suspension"](truck)),
+            critical_delay(LOOPS["suspension"](truck)),
+        )
         assert lag is not None
         assert delay is not None
         assert lag.time > 8.0 * delay.time
@@ -245,7 +300,9 @@ class TestLocus:
     def test_both_modes_cross_together_with_suspension_mil(self):
         found = Locus("suspension", np.logspace(-3, 0, 60), lambda lag: Setting(CHOSEN, lag))
         assert {crossing.mode for crossing in found.crossings} == {BODY, WHEEL}
-        assert [crossing.value for crossing in found.crossings] == pytest.approx([0.2, 0.2], rel=1e-6)
+        assert [crossing.value for crossing in found.crossings] == pytest.approx(
+            [0.2, 0.2], rel=1e-6
+        )
         assert found.unstable_modes(0.1) == ()
         assert found.unstable_modes(0.3) == (BODY, WHEEL)
 
@@ -271,17 +328,24 @@ class TestMapping:
             assert critical <= first <= critical * 1.1
 
     def test_any_two_parameters_and_the_drawing(self, tmp_path):
-        across, up = around("suspension_stiffness", TABLE_6_2, 0.01, 12), around("tyre_damping", TABLE_6_2, 0.01, 10)
+        across, up = (
+            around("suspension_stiffness", TABLE_6_2, 0.01, 12),
+            around("tyre_damping", TABLE_6_2, 0.01, 10),
+        )
         assert up.values[0] == 0.0
         found = stability_map("rig", TABLE_6_2, 0.01, across, up)
-        car = TABLE_6_2._replace(suspension_stiffness=float(across.values[3]), tyre_damping=float(up.values[4]))
+        car = TABLE_6_2._replace(
+            suspension_stiffness=float(across.values[3]), tyre_damping=float(up.values[4])
+        )
         assert found.rightmost[4, 3] == pytest.approx(rightmost(MODELS["rig"](car, 0.01)).real)
         draw(found, tmp_path / "map.png")
         assert (tmp_path / "map.png").stat().st_size > 10_000
 
     def test_bad_input(self, tmp_path):
         axis = around("tau", CHOSEN, 0.01, 4)
-        with pytest.raises(RigtwinError, match="unknown parameter 'mass'; there are tyre_stiffness"):
+        with pytest.raises(
+            RigtwinError, match="unknown parameter 'mass'; there are tyre_stiffness"
+        ):
             around("mass", CHOSEN, 0.01)
         with pytest.raises(RigtwinError, match="two different parameters"):
             stability_map("rig", CHOSEN, 0.01, axis, axis)
@@ -337,13 +401,27 @@ class TestCommand:
     def test_settings_delay_and_map(self, capsys, tmp_path):
         out = tmp_path / "map.png"
         words = ("--set", "suspension_damping=100", "--tau", "0.02")
-        assert self.run(*words, "--model", "suspension", "--map", "sprung_mass", "suspension_stiffness", "-o", str(out)) == 0
+        assert (
+            self.run(
+                *words,
+                "--model",
+                "suspension",
+                "--map",
+                "sprung_mass",
+                "suspension_stiffness",
+                "-o",
+                str(out),
+            )
+            == 0
+        )
         assert "drawn in" in capsys.readouterr().out
         assert self.run(*words, "--delay") == 0
         printed = capsys.readouterr().out
         assert "suspension damping 100," in printed
         assert "delays of 20 ms" in printed
-        expected = rightmost_delay_root(LOOPS["suspension"](TABLE_6_2._replace(suspension_damping=100.0)), 0.02)
+        expected = rightmost_delay_root(
+            LOOPS["suspension"](TABLE_6_2._replace(suspension_damping=100.0)), 0.02
+        )
         assert f"{expected.real:+.4g} ± {expected.imag:.4g}j" in printed
         assert out.exists()
 
@@ -371,9 +449,15 @@ class TestCommand:
 
 
 def exact(model, car, lag):
-    """The characteristic polynomial in fractions, ascending, written anew from the equations of motion."""
+    """The characteristic polynomial in fractions, ascending, written anew from the equations of
+    motion."""
     kt, bt, mu, ks, bs, ms = map(Fraction, car)
-    factor, sprung, suspension, wheel = [Fraction(1), Fraction(float(lag))], [0, 0, ms], [ks, bs], [kt, bt, mu]
+    factor, sprung, suspension, wheel = (
+        [Fraction(1), Fraction(float(lag))],
+        [0, 0, ms],
+        [ks, bs],
+        [kt, bt, mu],
+    )
     forces, structures = LAGS_OF_EACH[model]
     force = power(factor, forces)
     structure = power(factor, structures)
@@ -415,7 +499,9 @@ def hurwitz(ascending):
         if below[0] <= 0:
             return False
         padded = below + [Fraction(0)] * (len(above) - len(below))
-        following = [above[i + 1] - above[0] / below[0] * padded[i + 1] for i in range(len(above) - 1)]
+        following = [
+            above[i + 1] - above[0] / below[0] * padded[i + 1] for i in range(len(above) - 1)
+        ]
         above, below = below, following
     return True
 
@@ -426,13 +512,16 @@ def roots_right_of(loop, delay, edge):
     turn = np.linspace(-np.pi / 2, np.pi / 2, 4001)
     height = np.concatenate([np.logspace(0, -7, 8000), -np.logspace(-7, 0, 8000)])
     path = np.concatenate([edge + radius * np.exp(1j * turn), edge + 1j * radius * height])
-    values = np.sum([polynomial(path) * np.exp(-each * delay * path) for each, polynomial in loop.items()], axis=0)
+    values = np.sum(
+        [polynomial(path) * np.exp(-each * delay * path) for each, polynomial in loop.items()],
+        axis=0,
+    )
     return round(float(np.sum(np.angle(values[1:] / values[:-1]))) / (2.0 * np.pi))
 
 
 def growth(model, car, delay, steps=40, cycles=700):
-    """1/s, of the delay differential equation stepped in time: exact between samples for delayed forces that are straight
-    lines over a step."""
+    """1/s, of the delay differential equation stepped in time: exact between samples for delayed
+    forces that are straight lines over a step."""
     forces, structures = LAGS_OF_EACH[model]
     kt, bt, mu, ks, bs, ms = car
     # States: wheel, body, and their velocities. The force is a row of coefficients of past states.
@@ -449,12 +538,21 @@ def growth(model, car, delay, steps=40, cycles=700):
     block[:4, :4], block[:4, 4], block[4, 5] = dynamics * step, pulls * step, 1.0
     whole = expm(block)
     past = max(rows) * steps
-    states = np.zeros((past + 1 + int(cycles * 2.0 * np.pi / (critical_frequency(model, car) * step)), 4))
+    states = np.zeros(
+        (past + 1 + int(cycles * 2.0 * np.pi / (critical_frequency(model, car) * step)), 4)
+    )
     states[: past + 1] = [0.0, 1.0, 0.0, 0.0]
-    stepped(states, past, whole, np.array([each * steps for each in rows]), np.array(list(rows.values())))
+    stepped(
+        states,
+        past,
+        whole,
+        np.array([each * steps for each in rows]),
+        np.array(list(rows.values())),
+    )
     tenth = len(states) // 10
     middle, late = (
-        np.sqrt(np.mean(states[first : first + tenth, :2] ** 2)) for first in (len(states) // 2, len(states) - tenth)
+        np.sqrt(np.mean(states[first : first + tenth, :2] ** 2))
+        for first in (len(states) // 2, len(states) - tenth)
     )
     return float(np.log(late / middle) / (step * (len(states) - tenth - len(states) // 2)))
 
@@ -483,4 +581,6 @@ def critical_frequency(model, car):
 def test_the_polynomial_in_fractions_is_that_of_the_loop():
     for model, loop in LOOPS.items():
         ours = lag_polynomial(loop(TABLE_6_2), 0.01).coef
-        assert ours == pytest.approx([float(each) for each in exact(model, TABLE_6_2, 0.01)], rel=1e-12)
+        assert ours == pytest.approx(
+            [float(each) for each in exact(model, TABLE_6_2, 0.01)], rel=1e-12
+        )

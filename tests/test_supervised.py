@@ -1,4 +1,5 @@
-"""Sessions: the states and the ways between them, ramps, stops; the same on the twin and on the virtual card; faults."""
+"""Sessions: the states and the ways between them, ramps, stops; the same on the twin and on the
+virtual card; faults."""
 
 from __future__ import annotations
 
@@ -64,10 +65,16 @@ def test_only_the_ways_that_there_are(before, after):
 
 
 def test_motion_is_reached_and_left_through_every_state_between():
-    """Every walk from idle to running passes armed and ramping; every walk out of motion passes stopping."""
+    """Every walk from idle to running passes armed and ramping; every walk out of motion passes
+    stopping."""
     ways = [[Phase.IDLE]]
     for _ in range(8):
-        ways += [[*way, after] for way in ways if way[-1] != Phase.IDLE or len(way) == 1 for after in NEXT[way[-1]]]
+        ways += [
+            [*way, after]
+            for way in ways
+            if way[-1] != Phase.IDLE or len(way) == 1
+            for after in NEXT[way[-1]]
+        ]
     to_running = [way for way in ways if way[-1] == Phase.RUNNING]
     assert to_running
     assert all(way[:3] == [Phase.IDLE, Phase.ARMED, Phase.RAMPING] for way in to_running)
@@ -80,7 +87,8 @@ def test_motion_is_reached_and_left_through_every_state_between():
 
 
 @pytest.mark.parametrize(
-    ("name", "seconds"), [("road1.6", 4), ("imposed", 4), pytest.param("road1.6", 45, marks=pytest.mark.slow)]
+    ("name", "seconds"),
+    [("road1.6", 4), ("imposed", 4), pytest.param("road1.6", 45, marks=pytest.mark.slow)],
 )
 def test_card_and_twin_give_the_same_recording(tmp_path, name, seconds):
     test = session(name, f"timing.duration={seconds}", seed=2)
@@ -114,8 +122,12 @@ def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
     card, device = open_virtual_card(test)
     record_at_leisure(card, test, tmp_path / "r.mcap")
     with (tmp_path / "r.mcap").open("rb") as file:
-        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics=["/session"])
-        rows = np.array([(m.time, m.phase, m.structure, m.voltage, m.pressure) for *_, m in messages])
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+            topics=["/session"]
+        )
+        rows = np.array(
+            [(m.time, m.phase, m.structure, m.voltage, m.pressure) for *_, m in messages]
+        )
     assert np.allclose(np.diff(rows[:, 0]), 1e-3)
     assert sorted(set(rows[:, 1])) == [0.0, 1.0, 2.0, 3.0, 4.0]
     ramping = rows[rows[:, 1] == Phase.RAMPING]
@@ -187,9 +199,13 @@ def test_any_key_stops():
         " while asked() is None: time.sleep(0.01)\n print(asked.__name__, 'stopped', flush=True)\n"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", code], stdin=other, stdout=subprocess.PIPE, text=True, start_new_session=True,
+        [sys.executable, "-c", code],
+        stdin=other,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
         preexec_fn=lambda: __import__("fcntl").ioctl(0, __import__("termios").TIOCSCTTY, 0),
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     assert "ready" in process.stdout.readline()
     os.write(main, b"x")
@@ -287,7 +303,14 @@ def test_limits_closer_than_the_tables_are_kept():
 
 
 def test_every_cause_of_a_kind_is_one_that_can_be_said():
-    said = {trip.name.lower() for trip in Trip} | {"card", "controller", "late", "operator", "process", "recording"}
+    said = {trip.name.lower() for trip in Trip} | {
+        "card",
+        "controller",
+        "late",
+        "operator",
+        "process",
+        "recording",
+    }
     assert all(set(kind.causes) <= said for kind in KINDS)
 
 

@@ -63,7 +63,9 @@ def test_results_of_other_sources_are_not_taken_for_these(tmp_path):
 
 
 def test_mistakes_of_a_store_are_one_line(tmp_path):
-    (tmp_path / "text.sqlite").write_text("this is no database, and long enough to be read as one" * 10)
+    (tmp_path / "text.sqlite").write_text(
+        "this is no database, and long enough to be read as one" * 10
+    )
     with pytest.raises(RigtwinError, match="is not a file of results, or damaged"):
         Store(tmp_path / "text.sqlite")
     with Store(tmp_path / "s.sqlite") as store:
@@ -83,7 +85,10 @@ def test_a_damaged_result_is_one_line(tmp_path):
     with closing(sqlite3.connect(tmp_path / "s.sqlite")) as base:
         base.execute("UPDATE results SET result = substr(result, 1, 20)")
         base.commit()
-    with Store(tmp_path / "s.sqlite", "one") as store, pytest.raises(RigtwinError, match="or damaged; remove it"):
+    with (
+        Store(tmp_path / "s.sqlite", "one") as store,
+        pytest.raises(RigtwinError, match="or damaged; remove it"),
+    ):
         store["a"]
 
 
@@ -112,7 +117,10 @@ def test_the_answers_do_not_depend_on_the_number_of_workers(count, tmp_path):
 
 def test_several_processes_work():
     with open_workers(2) as workers:
-        found = {result for _, result in iterate_results(workers, process, ((str(n), n) for n in range(30)))}
+        found = {
+            result
+            for _, result in iterate_results(workers, process, ((str(n), n) for n in range(30)))
+        }
     assert len(found) == 2
     assert os.getpid() not in found
 
@@ -120,15 +128,19 @@ def test_several_processes_work():
 def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     mark = tmp_path / "mark"
     with open_workers(2) as workers:
-        found = dict(iterate_results(workers, deadly, ((str(n), (str(mark), n)) for n in range(12))))
+        found = dict(
+            iterate_results(workers, deadly, ((str(n), (str(mark), n)) for n in range(12)))
+        )
     assert mark.exists()
     assert found == {str(n): 10 * n for n in range(12)}
 
 
 def test_a_job_that_always_kills_its_worker_is_named_in_the_end():
-    with pytest.raises(RigtwinError, match="a worker died 3 times over"), open_workers(2) as workers:
+    with (
+        pytest.raises(RigtwinError, match="a worker died 3 times over"),
+        open_workers(2) as workers,
+    ):
         list(iterate_results(workers, always_deadly, ((str(n), n) for n in range(4))))
-
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -176,7 +188,9 @@ from tests.helpers.jobs import slow
 
 if __name__ == "__main__":
     with open_workers(2) as workers, Store(Path(sys.argv[1])) as store:
-        run_jobs(store, workers, slow, ((str(n), n) for n in range(40)), lambda _: print("done", flush=True))
+        jobs = ((str(n), n) for n in range(40))
+        said = lambda _: print("done", flush=True)  # noqa: E731
+        run_jobs(store, workers, slow, jobs, said)
 """
 
 
@@ -186,7 +200,9 @@ def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
     script.write_text(SWEEP)
     root = Path(__file__).parents[1]
     environment = {**os.environ, "PYTHONPATH": str(root)}
-    with subprocess.Popen([sys.executable, str(script), str(path)], stdout=subprocess.PIPE, text=True, env=environment) as run:
+    with subprocess.Popen(
+        [sys.executable, str(script), str(path)], stdout=subprocess.PIPE, text=True, env=environment
+    ) as run:
         assert run.stdout is not None
         for _ in range(6):
             assert run.stdout.readline() == "done\n"
@@ -208,7 +224,9 @@ def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
 
 
 def children(process: int) -> list[int]:
-    return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    return [
+        int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    ]
 
 
 def alive(process: int) -> bool:
@@ -225,12 +243,26 @@ def cluster(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cluster")
     file = folder / "scheduler.json"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder, "env": environment}
+    quiet = {
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+        "cwd": folder,
+        "env": environment,
+    }
     common = ["--scheduler-file", str(file), "--no-dashboard"]
     local = ["--host", "127.0.0.1"]
     begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", *common, *local]
     scheduler = subprocess.Popen(begin, **quiet)
-    begin = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", *common, *local]
+    begin = [
+        sys.executable,
+        "-m",
+        "distributed.cli.dask_worker",
+        "--nthreads",
+        "1",
+        "--no-nanny",
+        *common,
+        *local,
+    ]
     workers = [subprocess.Popen(begin, **quiet) for _ in range(2)]
     try:
         deadline = time.monotonic() + 60.0
@@ -292,7 +324,10 @@ def test_tune_says_the_same_on_a_cluster(cluster, tmp_path, capsys):
     address, _ = cluster
     (tmp_path / "study.toml").write_text(STUDY)
     for name, workers in (("here", ["--workers", "1"]), ("there", ["--cluster", address])):
-        assert main(["tune", str(tmp_path / "study.toml"), "--out", str(tmp_path / name), *workers]) == 0
+        assert (
+            main(["tune", str(tmp_path / "study.toml"), "--out", str(tmp_path / name), *workers])
+            == 0
+        )
     capsys.readouterr()
     for file in ("tuned.toml", "candidates.csv", "held-out.csv", "index.html", "best.mcap"):
         assert (tmp_path / "here" / file).read_bytes() == (tmp_path / "there" / file).read_bytes()
@@ -300,7 +335,10 @@ def test_tune_says_the_same_on_a_cluster(cluster, tmp_path, capsys):
 
 def test_a_failing_job_on_a_cluster_is_one_line(cluster):
     address, _ = cluster
-    with pytest.raises(RigtwinError, match="3 cannot be done"), open_workers(None, address) as workers:
+    with (
+        pytest.raises(RigtwinError, match="3 cannot be done"),
+        open_workers(None, address) as workers,
+    ):
         list(iterate_results(workers, faulty, ((str(n), n) for n in range(10))))
 
 

@@ -1,4 +1,5 @@
-"""How figures of the thesis are compared, which of them are covered, and that finished work is never lost or done twice."""
+"""How figures of the thesis are compared, which of them are covered, and that finished work is
+never lost or done twice."""
 
 from __future__ import annotations
 
@@ -50,12 +51,17 @@ def test_factor_and_band():
     assert not factor("T", "x", "0.7", values, "m", 1.4).agrees
     assert "in 5-95 %" in band("T", "x", "1.25", values, "m", 2.0).rule
     assert "outside 5-95 %" in band("T", "x", "1.40", values, "m", 2.0).rule
-    assert share([statement("T", "x", "says", True, ""), statement("T", "x", "says", False, "")]) == "1 of 2"
+    assert (
+        share([statement("T", "x", "says", True, ""), statement("T", "x", "says", False, "")])
+        == "1 of 2"
+    )
 
 
 def test_every_numbered_table_is_covered():
     covered = {place for study in STUDIES.values() for place in study.covers}
-    assert [table for table in TABLES if table not in covered and table not in NOTHING_TO_COMPUTE] == []
+    assert [
+        table for table in TABLES if table not in covered and table not in NOTHING_TO_COMPUTE
+    ] == []
     assert len(TABLES) == 51
 
 
@@ -97,7 +103,9 @@ def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, l
         figure, _ = sheet(1, 1)
         drawing = Drawing("d", "Figure 1.1", "a caption", figure)
         total = sum(result["value"] for result in results.values())
-        return Conclusion([digits("Table 3.1", "total", "15", total, "m", "a note")], [drawing], ["a remark"])
+        return Conclusion(
+            [digits("Table 3.1", "total", "15", total, "m", "a note")], [drawing], ["a remark"]
+        )
 
     jobs = lambda seeds: {f"job/{n}": job(f"job/{n}") for n in range(seeds)}  # noqa: E731
     study = Study("counted", "Counted", "9", ("Table 3.1",), conclude, jobs)
@@ -155,15 +163,36 @@ def test_a_transfer_function_is_found_again():
 
 def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    out = ["--html", str(tmp_path / "p.html"), "--json", str(tmp_path / "p.json"), "--draw", str(tmp_path / "figures")]
-    assert main(["reproduce", "table-3.5", "--seeds", "1", "--folder", str(tmp_path / "kept"), *out]) == 0
+    out = [
+        "--html",
+        str(tmp_path / "p.html"),
+        "--json",
+        str(tmp_path / "p.json"),
+        "--draw",
+        str(tmp_path / "figures"),
+    ]
+    assert (
+        main(["reproduce", "table-3.5", "--seeds", "1", "--folder", str(tmp_path / "kept"), *out])
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "Table 3.5" in printed
     assert "12 of 12" in printed
     assert "Table 3.4" not in printed
     assert json.loads((tmp_path / "p.json").read_text())["tables"][0]["agree"] == "12 of 12"
     assert (
-        main(["reproduce", "figure-3.18", "--seeds", "1", "--folder", str(tmp_path / "kept"), "--draw", str(tmp_path / "f")])
+        main(
+            [
+                "reproduce",
+                "figure-3.18",
+                "--seeds",
+                "1",
+                "--folder",
+                str(tmp_path / "kept"),
+                "--draw",
+                str(tmp_path / "f"),
+            ]
+        )
         == 0
     )
     (picture,) = (tmp_path / "f").iterdir()
@@ -173,7 +202,9 @@ def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
 def test_what_the_thesis_sees_in_the_drop():
     """Statements of section 6.3 that the twin shows, of one run each."""
     results = {key: job() for key, job in quarter_car_tests.jobs(1).items()}
-    entries = {(entry.where, entry.what): entry for entry in quarter_car_tests.conclude(results).entries}
+    entries = {
+        (entry.where, entry.what): entry for entry in quarter_car_tests.conclude(results).entries
+    }
     for where, what in (
         ("Figure 6.25", "first swing of the sprung mass"),
         ("Figure 6.25", "body frequency"),
@@ -186,5 +217,8 @@ def test_what_the_thesis_sees_in_the_drop():
     ):
         assert entries[where, what].agrees, (where, what, entries[where, what].ours)
     assert entries["Table 6.3", "force e1 + e2"].agrees
-    assert not entries["Table 6.3", "position e1 + e2"].agrees or "offset" in entries["Table 6.3", "position e1 + e2"].note
+    assert (
+        not entries["Table 6.3", "position e1 + e2"].agrees
+        or "offset" in entries["Table 6.3", "position e1 + e2"].note
+    )
     assert validation.WITHIN == 2.0

@@ -1,4 +1,5 @@
-"""Chapter 5, §6.2 and appendix A beside ours: what agrees, and that nothing disagrees but what is known to."""
+"""Chapter 5, §6.2 and appendix A beside ours: what agrees, and that nothing disagrees but what is
+known to."""
 
 from __future__ import annotations
 
@@ -92,7 +93,10 @@ def test_the_quarter_car_disagrees_where_the_thesis_contradicts_itself_alone(qua
         "§5.4": 1,  # high and low exchanged
         "§5.6": 2,  # first with tyre damping, high and low exchanged
     }
-    assert [ours for where, _, ours in disagreeing(quarter) if where == "Table 5.6"] == ["-0.02765", "-0.07235"]
+    assert [ours for where, _, ours in disagreeing(quarter) if where == "Table 5.6"] == [
+        "-0.02765",
+        "-0.07235",
+    ]
     assert all(entry.note for entry in quarter if not entry.agrees)
 
 
@@ -106,7 +110,11 @@ def test_root_loci_disagree_where_a_lag_is_misprinted(loci):
         ("Figure A3.4", "further poles, case 2, ζ = 1.5, τ = 0.2 s"),
     ]
     wrong = [(where, what) for where, what, _ in disagreeing(loci)]
-    assert [(where, what) for where, what in wrong if MISPRINTED_LAG not in what and what != "lag of case 1"] == known
+    assert [
+        (where, what)
+        for where, what in wrong
+        if MISPRINTED_LAG not in what and what != "lag of case 1"
+    ] == known
     assert Counter(where for where, what in wrong if what == "lag of case 1") == {
         f"Table A{appendix}.{table}": 1 for appendix in (1, 2, 3) for table in (4, 5)
     }
@@ -116,7 +124,9 @@ def test_root_loci_disagree_where_a_lag_is_misprinted(loci):
 def test_with_the_lag_that_was_meant_every_statement_of_those_sections_holds(loci):
     meant = [entry for entry in loci if entry.what.endswith("τ = 0.0333 s")]
     assert len(meant) > 12
-    assert [entry.what for entry in meant if not entry.agrees] == ["larger lag, case 1, τ = 0.0333 s"]
+    assert [entry.what for entry in meant if not entry.agrees] == [
+        "larger lag, case 1, τ = 0.0333 s"
+    ]
 
 
 def test_crossings_found(loci):
@@ -145,7 +155,11 @@ def test_table_6_1():
 
 
 def test_every_table_and_figure_is_covered(single, quarter, loci):
-    for module, entries in ((single_mass_stability, single), (quarter_car_stability, quarter), (root_loci, loci)):
+    for module, entries in (
+        (single_mass_stability, single),
+        (quarter_car_stability, quarter),
+        (root_loci, loci),
+    ):
         there = {entry.where for entry in entries}
         assert set(module.STUDY.covers) <= there, set(module.STUDY.covers) - there
     vehicles = {entry.where for entry in vehicles_stability.conclude({}).entries}
@@ -156,7 +170,9 @@ def test_a_drawing_shows_every_figure_of_its_table():
     cases = root_loci.CASES["A1.1"]()
     found = drawing("loci", "Figure A1.1 to A1.5", "", cases)
     titles = [axis.get_title() for axis in found.figure.axes if axis.get_visible()]
-    assert [title.partition(":")[0] for title in titles] == [f"Figure A1.{number}" for number in range(1, 6)]
+    assert [title.partition(":")[0] for title in titles] == [
+        f"Figure A1.{number}" for number in range(1, 6)
+    ]
 
 
 def test_sweeps_are_those_of_the_tables():

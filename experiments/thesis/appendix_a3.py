@@ -1,4 +1,5 @@
-"""Appendix A3 as data: both MIL loops, every case of Tables A3.1 to A3.5, its figures and what the thesis says of them."""
+"""Appendix A3 as data: both MIL loops, every case of Tables A3.1 to A3.5, its figures and what the
+thesis says of them."""
 
 from __future__ import annotations
 
@@ -33,8 +34,24 @@ def _a3_1() -> tuple[Case, ...]:
             says(name, "stability", "body hop unstable before the wheel hop", judges.body_first),
         ]
         if number == 2:
-            claims.append(says(name, "large lags", "a conjugate pair breaks off from the real axis", shapes.breaks_away))
-        cases.append(case("combined", number, f"ζ = {ratio:g}", LAGS[ratio], {name: (-16.0, 2.0, 8.0)}, *claims))
+            claims.append(
+                says(
+                    name,
+                    "large lags",
+                    "a conjugate pair breaks off from the real axis",
+                    shapes.breaks_away,
+                )
+            )
+        cases.append(
+            case(
+                "combined",
+                number,
+                f"ζ = {ratio:g}",
+                LAGS[ratio],
+                {name: (-16.0, 2.0, 8.0)},
+                *claims,
+            )
+        )
     return tuple(cases)
 
 
@@ -42,15 +59,37 @@ def _a3_2() -> tuple[Case, ...]:
     cases = []
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A3.{figure}", SLOW if lag == 0.2 else QUICK
-        note = "the caption of Figure A3.8 says ζ = 1.5, Table A3.2 0.5: the table is right" if figure == 8 else ""
+        note = (
+            "the caption of Figure A3.8 says ζ = 1.5, Table A3.2 0.5: the table is right"
+            if figure == 8
+            else ""
+        )
         earlier = judges.earlier_than(locus("suspension", variations[ratio]), "suspension MIL")
         claims = [
-            says(name, "stability", "body hop unstable before the wheel hop", judges.body_first, note),
+            says(
+                name, "stability", "body hop unstable before the wheel hop", judges.body_first, note
+            ),
             says(name, "stability", "less stable than suspension MIL alone", earlier),
         ]
         if lag == 0.2:
-            claims.append(says(name, "further poles", "leave the real axis and come back to it", shapes.breaks_in))
-        cases.append(case("combined", number, f"ζ = {ratio:g}, τ = {lag:g} s", variations[ratio], {name: None}, *claims))
+            claims.append(
+                says(
+                    name,
+                    "further poles",
+                    "leave the real axis and come back to it",
+                    shapes.breaks_in,
+                )
+            )
+        cases.append(
+            case(
+                "combined",
+                number,
+                f"ζ = {ratio:g}, τ = {lag:g} s",
+                variations[ratio],
+                {name: None},
+                *claims,
+            )
+        )
     return tuple(cases)
 
 
@@ -63,7 +102,12 @@ def _a3_3() -> tuple[Case, ...]:
             "τ = 0.2 s",
             RATIOS[0.2],
             {"A3.9": None, "A3.10": (-6.0, 5.0, 16.0), "A3.11": (-0.6, 0.2, 4.0)},
-            says("A3.9", "resemblance", "body hop as in the other two loops: unstable at low ratios", judges.body_first),
+            says(
+                "A3.9",
+                "resemblance",
+                "body hop as in the other two loops: unstable at low ratios",
+                judges.body_first,
+            ),
             says("A3.10", "wheel hop", "unstable at high and at low damping ratios", ends),
             says("A3.11", "body hop", "unstable at low and at high damping ratios", ends),
         ),
@@ -73,9 +117,21 @@ def _a3_3() -> tuple[Case, ...]:
             "τ = 0.01 s",
             RATIOS[0.01],
             {"A3.12": None},
-            says("A3.12", "low ratios", "both modes move towards instability", judges.becomes_unstable(BODY, WHEEL)),
-            says("A3.12", "high ratios", "instability could occur as well", judges.unstable_before_start(WHEEL)),
-            says("A3.12", "low ratios", "body hop unstable before the wheel hop", judges.body_first),
+            says(
+                "A3.12",
+                "low ratios",
+                "both modes move towards instability",
+                judges.becomes_unstable(BODY, WHEEL),
+            ),
+            says(
+                "A3.12",
+                "high ratios",
+                "instability could occur as well",
+                judges.unstable_before_start(WHEEL),
+            ),
+            says(
+                "A3.12", "low ratios", "body hop unstable before the wheel hop", judges.body_first
+            ),
         ),
         case(
             "combined",
@@ -83,8 +139,18 @@ def _a3_3() -> tuple[Case, ...]:
             "τ = 0.001 s",
             RATIOS[0.001],
             {"A3.13": (-10.0, 1.0, 50.0)},
-            says("A3.13", "high ratios", "no further dynamics of the filter poles", shapes.pairs_at_start(1, 1)),
-            says("A3.13", "low ratios", "both modes move towards instability", judges.becomes_unstable(BODY, WHEEL)),
+            says(
+                "A3.13",
+                "high ratios",
+                "no further dynamics of the filter poles",
+                shapes.pairs_at_start(1, 1),
+            ),
+            says(
+                "A3.13",
+                "low ratios",
+                "both modes move towards instability",
+                judges.becomes_unstable(BODY, WHEEL),
+            ),
         ),
     )
 
@@ -95,10 +161,24 @@ def _a3_4() -> tuple[Case, ...]:
         name, shown = f"A3.{figure}", f"A3.{figure}" + instead(lag)
         soft = judges.both(judges.unstable_at_start(BODY), judges.unstable_at_end())
         claims = [
-            says(name, "soft tyre", "body hop unstable at low tyre stiffness, stable at high", soft, misprint(lag)),
-            says(name, "stiff tyre", "wheel hop approaches zero real part", shapes.asymptote_at_zero, misprint(lag)),
+            says(
+                name,
+                "soft tyre",
+                "body hop unstable at low tyre stiffness, stable at high",
+                soft,
+                misprint(lag),
+            ),
+            says(
+                name,
+                "stiff tyre",
+                "wheel hop approaches zero real part",
+                shapes.asymptote_at_zero,
+                misprint(lag),
+            ),
         ]
-        cases.append(case("combined", number, f"τ = {lag:g} s", TYRES[lag], {shown: STIFF}, *claims))
+        cases.append(
+            case("combined", number, f"τ = {lag:g} s", TYRES[lag], {shown: STIFF}, *claims)
+        )
     return tuple(cases)
 
 
@@ -106,12 +186,22 @@ def _a3_5() -> tuple[Case, ...]:
     cases = []
     for number, lag, figure in ((1, 0.333, 16), (1, 0.0333, 16), (2, 0.01, 17)):
         name, shown = f"A3.{figure}", f"A3.{figure}" + instead(lag)
-        note = misprint(lag) or ("the caption of Figure A3.17 says 0.001 s, Table A3.5 0.01 s" if number == 2 else "")
+        note = misprint(lag) or (
+            "the caption of Figure A3.17 says 0.001 s, Table A3.5 0.01 s" if number == 2 else ""
+        )
         claims = [
             says(name, "light wheel", "stable vertical asymptote", shapes.asymptote("start"), note),
-            says(name, "heavy wheel", "body hop unstable at high wheel mass only", judges.becomes_unstable(BODY), note),
+            says(
+                name,
+                "heavy wheel",
+                "body hop unstable at high wheel mass only",
+                judges.becomes_unstable(BODY),
+                note,
+            ),
         ]
-        cases.append(case("combined", number, f"τ = {lag:g} s", WHEELS[lag], {shown: LIGHT}, *claims))
+        cases.append(
+            case("combined", number, f"τ = {lag:g} s", WHEELS[lag], {shown: LIGHT}, *claims)
+        )
     return tuple(cases)
 
 

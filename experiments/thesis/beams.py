@@ -1,4 +1,5 @@
-"""§7.2 and appendix B3 to B5: the cross of elastic beams as the vehicle's body in the loop: Tables 7.4 and 7.5."""
+"""§7.2 and appendix B3 to B5: the cross of elastic beams as the vehicle's body in the loop: Tables
+7.4 and 7.5."""
 
 from __future__ import annotations
 
@@ -25,10 +26,13 @@ from rigtwin.simulation.safety import Trip
 
 WITHIN = 1.5
 TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}
-"""rms sprung mass acceleration, m/s². The passive rig with straight beams runs away on the twin, see RUNS_AWAY."""
+"""rms sprung mass acceleration, m/s². The passive rig with straight beams runs away on the twin,
+see RUNS_AWAY."""
 RUNS_AWAY = (
-    "with beams that start straight, as in Fig. 7.15, the centre's first swing asks 0.72 m/s of a cylinder that gives 0.3, and "
-    "the passive twin runs away; these are of beams that start bent by the preload, whose drop is smaller"
+    "with beams that start straight, as in Fig. 7.15, the centre's first "
+    "swing asks 0.72 m/s of a cylinder that gives 0.3, and "
+    "the passive twin runs away; these are of beams that start "
+    "bent by the preload, whose drop is smaller"
 )
 ON_A_SPRING = 1000.0
 
@@ -50,12 +54,20 @@ def _run(name: str, seed: int) -> Result:
         "tripped": float(ran.trip != Trip.NONE),
         "lasted": len(ran.commands) * experiment.configuration.timing.period,
         "asked speed": float(np.max(np.abs(should.velocity))),
-        "ideal everything": float(np.std(should.acceleration(experiment.configuration.timing.period))),
+        "ideal everything": float(
+            np.std(should.acceleration(experiment.configuration.timing.period))
+        ),
     }
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
-    return seeded({name: lambda seed, name=name: _run(name, seed) for name in (*TABLE_7_5, "straight passive")}, seeds)
+    return seeded(
+        {
+            name: lambda seed, name=name: _run(name, seed)
+            for name in (*TABLE_7_5, "straight passive")
+        },
+        seeds,
+    )
 
 
 def _on_spring(settings: Settings) -> np.ndarray:
@@ -76,7 +88,9 @@ def _structure(settings: Settings) -> list[Entry]:
     angular, shapes = all_modes(settings)
     for frequency in np.linspace(0.05, 5.0, 200):
         s = 2j * math.pi * frequency
-        whole = np.sum(shapes[HEAVE] ** 2 / (s**2 + settings.beam_damping * angular**2 * s + angular**2))
+        whole = np.sum(
+            shapes[HEAVE] ** 2 / (s**2 + settings.beam_damping * angular**2 * s + angular**2)
+        )
         kept = 2 * math.pi * model.frequencies
         reduced = np.sum(model.centre**2 / (s**2 + settings.beam_damping * kept**2 * s + kept**2))
         worst = max(worst, abs(reduced - whole) / abs(whole))
@@ -105,7 +119,8 @@ def _structure(settings: Settings) -> list[Entry]:
             "body frequency",
             "falls",
             bool(sprung[0] < math.sqrt(ON_A_SPRING / weight) / (2 * math.pi)),
-            f"{sprung[0]:.3f} Hz on {ON_A_SPRING:g} N/m, point mass {math.sqrt(ON_A_SPRING / weight) / (2 * math.pi):.3f} Hz",
+            f"{sprung[0]:.3f} Hz on {ON_A_SPRING:g} N/m, point mass "
+            f"{math.sqrt(ON_A_SPRING / weight) / (2 * math.pi):.3f} Hz",
         ),
     ]
     return entries
@@ -115,7 +130,17 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     entries = _structure(find("beam-passive").configuration.controller)
     for name, text in TABLE_7_5.items():
         note = RUNS_AWAY if name == "bent passive" else MEASURED
-        entries.append(band("Table 7.5", name, text, over_seeds(results, name, "acceleration"), "m/s²", WITHIN, note))
+        entries.append(
+            band(
+                "Table 7.5",
+                name,
+                text,
+                over_seeds(results, name, "acceleration"),
+                "m/s²",
+                WITHIN,
+                note,
+            )
+        )
     exact = over_seeds(results, "straight passive", "ideal everything")
     note = "of the ideal system with straight beams, everything counted"
     entries.append(band("Table 7.5", "passive, ideal system", "0.679", exact, "m/s²", WITHIN, note))
@@ -133,7 +158,16 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     lasted = float(np.median(over_seeds(results, "straight passive", "lasted")))
     text = f"{int(np.sum(tripped))} of {len(tripped)} trip, after {lasted:.2f} s; "
     text += f"the ideal centre moves at up to {speed:.2f} m/s, the cylinder at 0.3"
-    entries.append(statement("§7.2.2", "passive test with straight beams", "runs", not np.any(tripped), text, RUNS_AWAY))
+    entries.append(
+        statement(
+            "§7.2.2",
+            "passive test with straight beams",
+            "runs",
+            not np.any(tripped),
+            text,
+            RUNS_AWAY,
+        )
+    )
     return entries + _statements(results)
 
 
@@ -145,7 +179,13 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     text = " < ".join(f"{swing:.0f} mm" for swing in swings[1:])
     correlation = np.corrcoef(heights[10:100, 1:].T).min()
     entries += [
-        statement("Figure 7.20", "points further out", "swing further", bool(np.all(np.diff(swings) > 0)), text),
+        statement(
+            "Figure 7.20",
+            "points further out",
+            "swing further",
+            bool(np.all(np.diff(swings) > 0)),
+            text,
+        ),
         statement(
             "Figure 7.15",
             "points along the wing",
@@ -154,7 +194,10 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
             f"correlation {correlation:.3f} or more",
         ),
     ]
-    better = [over_seeds(results, name, "travel rms") for name in ("bent passive", "semi-active", "active")]
+    better = [
+        over_seeds(results, name, "travel rms")
+        for name in ("bent passive", "semi-active", "active")
+    ]
     alike = np.median(np.abs(better[1] / better[2] - 1))
     entries.append(
         statement(
@@ -166,8 +209,15 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
         )
     )
     less = bool(np.all(better[1] < better[0]) and np.all(better[2] < better[0]))
-    text = ", ".join(f"{1e3 * np.median(one):.1f}" for one in better) + " mm rms: passive, semi-active, active"
-    entries.append(statement("Figure 7.26", "travel", "less than passive", less, text, "" if less else RUNS_AWAY))
+    text = (
+        ", ".join(f"{1e3 * np.median(one):.1f}" for one in better)
+        + " mm rms: passive, semi-active, active"
+    )
+    entries.append(
+        statement(
+            "Figure 7.26", "travel", "less than passive", less, text, "" if less else RUNS_AWAY
+        )
+    )
     return entries
 
 
@@ -179,8 +229,14 @@ def _modes_drawing(settings: Settings) -> Drawing:
         shape = model.wing[number] / np.abs(model.wing[number]).max()
         label = f"{model.frequencies[number]:.2f} Hz"
         both = np.concatenate([shape[::-1], shape[1:]])
-        axes[0][0].plot(np.concatenate([-distance[::-1], distance[1:]]), both, marker=".", label=label)
-    axes[0][0].set(xlabel="m from the centre", ylabel="shape", title="the modes that the centre feels, of two arms")
+        axes[0][0].plot(
+            np.concatenate([-distance[::-1], distance[1:]]), both, marker=".", label=label
+        )
+    axes[0][0].set(
+        xlabel="m from the centre",
+        ylabel="shape",
+        title="the modes that the centre feels, of two arms",
+    )
     axes[0][0].legend(fontsize=8)
     frequencies = np.geomspace(0.2, 20.0, 500)
     s = 2j * math.pi * frequencies
@@ -194,32 +250,55 @@ def _modes_drawing(settings: Settings) -> Drawing:
             centre = shapes[HEAVE]
         else:
             angular, centre = 2 * math.pi * model.frequencies[:kept], model.centre[:kept]
-        parts = centre[:, None] ** 2 / (s**2 + settings.beam_damping * angular[:, None] ** 2 * s + angular[:, None] ** 2)
+        parts = centre[:, None] ** 2 / (
+            s**2 + settings.beam_damping * angular[:, None] ** 2 * s + angular[:, None] ** 2
+        )
         axes[0][1].loglog(
-            frequencies, np.abs(np.sum(parts, axis=0)), color=colour, label=label, linestyle="--" if kept == 6 else "-"
+            frequencies,
+            np.abs(np.sum(parts, axis=0)),
+            color=colour,
+            label=label,
+            linestyle="--" if kept == 6 else "-",
         )
     axes[0][1].set(xlabel="Hz", ylabel="m/N", title="compliance at the centre")
     axes[0][1].legend(fontsize=8)
-    return Drawing("figure-7.10", "Figure 7.10 and 7.11", "Four arms of three beams, modal reduction.", figure)
+    return Drawing(
+        "figure-7.10", "Figure 7.10 and 7.11", "Four arms of three beams, modal reduction.", figure
+    )
 
 
 def _wing_drawing(results: dict[str, Result]) -> Drawing:
     figure, axes = sheet(3, 1, height=2.3)
     for row, (name, label) in zip(
-        axes, (("bent passive", "passive, bent start"), ("semi-active", "semi-active"), ("active", "active")), strict=True
+        axes,
+        (
+            ("bent passive", "passive, bent start"),
+            ("semi-active", "semi-active"),
+            ("active", "active"),
+        ),
+        strict=True,
     ):
         result = results[f"{name}/{SHOWN_SEED}"]
         for point in range(1, BEAMS + 1):
             row[0].plot(
-                result["time"], np.asarray(result["wing"])[:, point], linewidth=0.9, label=f"{2 * point} m from the centre"
+                result["time"],
+                np.asarray(result["wing"])[:, point],
+                linewidth=0.9,
+                label=f"{2 * point} m from the centre",
             )
         row[0].plot(
-            result["time"], np.asarray(result["ideal wing"])[:, BEAMS], color="black", linewidth=0.5, label="tip, ideal"
+            result["time"],
+            np.asarray(result["ideal wing"])[:, BEAMS],
+            color="black",
+            linewidth=0.5,
+            label="tip, ideal",
         )
         row[0].set(ylabel=f"{label}, mm", xlim=(0, 12))
     axes[0][0].legend(fontsize=8, ncols=4)
     axes[2][0].set(xlabel="time, s")
-    caption = "Height of points along an arm above the centre; they settle at the sag under the weight."
+    caption = (
+        "Height of points along an arm above the centre; they settle at the sag under the weight."
+    )
     return Drawing("figure-7.15", "Figure 7.15, 7.20, 7.24, B3.7, B4.7 and B5.7", caption, figure)
 
 
@@ -230,22 +309,39 @@ def _spectrum(results: dict[str, Result]) -> Drawing:
         result = results[f"{name}/{SHOWN_SEED}"]
         step = float(np.asarray(result["time"])[1])
         for kind, style in (("plate", "-"), ("ideal plate", ":")):
-            frequencies, power = welch(np.asarray(result[kind]), fs=1 / step, nperseg=512, detrend="linear")
+            frequencies, power = welch(
+                np.asarray(result[kind]), fs=1 / step, nperseg=512, detrend="linear"
+            )
             inside = (frequencies > 0) & (frequencies < 6)
             label = f"{name}, {'twin' if kind == 'plate' else 'ideal'}"
-            axis.semilogy(frequencies[inside], np.sqrt(power[inside]), style, color=colour, label=label)
+            axis.semilogy(
+                frequencies[inside], np.sqrt(power[inside]), style, color=colour, label=label
+            )
     axis.set(xlabel="Hz", ylabel="mm/√Hz", title="sprung mass: a second resonance at 3 Hz")
     axis.legend(fontsize=8)
-    return Drawing("figure-7.16", "Figure 7.16", "The beams add a resonance that a point mass does not have.", figure)
+    return Drawing(
+        "figure-7.16",
+        "Figure 7.16",
+        "The beams add a resonance that a point mass does not have.",
+        figure,
+    )
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
     found = dict(results)
-    shown = {"passive, bent start" if name == "bent passive" else name: found[f"{name}/{SHOWN_SEED}"] for name in TABLE_7_5}
+    shown = {
+        "passive, bent start" if name == "bent passive" else name: found[f"{name}/{SHOWN_SEED}"]
+        for name in TABLE_7_5
+    }
     covers = "Figure 7.12 to 7.14, 7.17 to 7.19, 7.21 to 7.23, 7.25 to 7.27, B3.1 to B5.6"
     drawings = [
         _modes_drawing(find("beam-passive").configuration.controller),
-        ride.histories("figure-7.25", covers, "The beams under passive, semi-active and active suspension.", shown),
+        ride.histories(
+            "figure-7.25",
+            covers,
+            "The beams under passive, semi-active and active suspension.",
+            shown,
+        ),
         _wing_drawing(found),
         _spectrum(found),
     ]

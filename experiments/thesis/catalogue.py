@@ -47,19 +47,23 @@ TABLES = (
     *(f"Table B{part}.1" for part in range(1, 6)),
 )
 """Every numbered table of the thesis."""
-NOTHING_TO_COMPUTE = {"Table 2.1": "compares fluids of dampers from the literature; nothing of it is of the rig"}
+NOTHING_TO_COMPUTE = {
+    "Table 2.1": "compares fluids of dampers from the literature; nothing of it is of the rig"
+}
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What of the thesis to reproduce. where: the tables or figures asked for alone, or None for all of the studies."""
+    """What of the thesis to reproduce. where: the tables or figures asked for alone, or None for
+    all of the studies."""
 
     studies: tuple[Study, ...]
     where: str | None
 
 
 def asked(name: str | None) -> Asked:
-    """Of a study's name, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`, `figure 6.26`), or None for all.
+    """Of a study's name, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`, `figure
+    6.26`), or None for all.
 
     Raises RigtwinError listing what there is.
     """
@@ -81,7 +85,8 @@ def asked(name: str | None) -> Asked:
             raise RigtwinError(f"{table} {reason}")
     chapters = sorted({part for study in STUDIES.values() for part in study.chapter.split()})
     raise RigtwinError(
-        f"nothing to reproduce under {name!r}; there are chapters {', '.join(chapters)}, studies {', '.join(STUDIES)}, "
+        f"nothing to reproduce under {name!r}; there are chapters "
+        f"{', '.join(chapters)}, studies {', '.join(STUDIES)}, "
         "and tables, figures and equations such as table-5.1, figure-6.26, equation-6.1"
     )
 
@@ -101,7 +106,13 @@ def matching(drawn: str, where: str) -> bool:
 
 
 def _between(number: str, first: str, last: str) -> bool:
-    (group, _, place), (start_group, _, start), (_, _, end) = (text.rpartition(".") for text in (number, first, last))
+    (group, _, place), (start_group, _, start), (_, _, end) = (
+        text.rpartition(".") for text in (number, first, last)
+    )
     return (
-        group == start_group and place.isdigit() and start.isdigit() and end.isdigit() and int(start) <= int(place) <= int(end)
+        group == start_group
+        and place.isdigit()
+        and start.isdigit()
+        and end.isdigit()
+        and int(start) <= int(place) <= int(end)
     )

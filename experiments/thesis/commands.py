@@ -1,4 +1,5 @@
-"""`rigtwin reproduce`: does the jobs of what was asked for, then prints and draws what was concluded."""
+"""`rigtwin reproduce`: does the jobs of what was asked for, then prints and draws what was
+concluded."""
 
 from __future__ import annotations
 

@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 SLACK = 0.51
-"""Of the last printed digit: a half, and a little for a printed value that was itself rounded twice."""
+"""Of the last printed digit: a half, and a little for a printed value that was itself rounded
+twice."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """A figure as printed beside the one computed here.
 
-    where: `Table 5.1`, `§6.1.3`, `Figure 4.17`; what: which of its figures; thesis: as printed; ours: as computed, low and
-    high: of 5 and 95 % of the seeds where there are several; rule: how the two were compared; note: why they differ, or
-    which of two printed figures is right.
+    where: `Table 5.1`, `§6.1.3`, `Figure 4.17`; what: which of its figures; thesis: as printed;
+    ours: as computed, low and high: of 5 and 95 % of the seeds where there are several; rule: how
+    the two were compared; note: why they differ, or which of two printed figures is right.
     """
 
     where: str
@@ -43,27 +44,55 @@ def last_digit(printed: str) -> float:
     return 10.0 ** (int(exponent or 0) - decimals)
 
 
-def digits(where: str, what: str, printed: str, ours: float, unit: str = "1", note: str = "") -> Entry:
+def digits(
+    where: str, what: str, printed: str, ours: float, unit: str = "1", note: str = ""
+) -> Entry:
     """Agrees if ours rounds to the printed digits."""
     difference = ours - number(printed)
     agrees = abs(difference) <= SLACK * last_digit(printed)
-    return Entry(where, what, printed, _like(printed, ours), f"{difference:+.2g}", unit, "printed digits", bool(agrees), note)
+    return Entry(
+        where,
+        what,
+        printed,
+        _like(printed, ours),
+        f"{difference:+.2g}",
+        unit,
+        "printed digits",
+        bool(agrees),
+        note,
+    )
 
 
 def factor(
-    where: str, what: str, printed: str, ours: Sequence[float] | np.ndarray, unit: str, within: float, note: str = ""
+    where: str,
+    what: str,
+    printed: str,
+    ours: Sequence[float] | np.ndarray,
+    unit: str,
+    within: float,
+    note: str = "",
 ) -> Entry:
-    """Agrees if the median of ours is within a factor of the printed value. ours: over the seeds."""
+    """Agrees if the median of ours is within a factor of the printed value. ours: over the
+    seeds."""
     middle, text = _spread(ours)
     ratio = middle / number(printed)
     agrees = 1.0 / within <= ratio <= within
-    return Entry(where, what, printed, text, f"x {ratio:.2f}", unit, f"factor {within:g}", bool(agrees), note)
+    return Entry(
+        where, what, printed, text, f"x {ratio:.2f}", unit, f"factor {within:g}", bool(agrees), note
+    )
 
 
 def band(
-    where: str, what: str, printed: str, ours: Sequence[float] | np.ndarray, unit: str, within: float, note: str = ""
+    where: str,
+    what: str,
+    printed: str,
+    ours: Sequence[float] | np.ndarray,
+    unit: str,
+    within: float,
+    note: str = "",
 ) -> Entry:
-    """As `factor`; the rule also says whether the printed value lies within the 5 to 95 % band of ours over the seeds."""
+    """As `factor`; the rule also says whether the printed value lies within the 5 to 95 % band of
+    ours over the seeds."""
     entry = factor(where, what, printed, ours, unit, within, note)
     low, high = np.percentile(ours, [5.0, 95.0])
     value, slack = number(printed), SLACK * last_digit(printed)

@@ -1,4 +1,5 @@
-"""Chapter 4: the friction compensator against no compensation, its partial forms, and an observer: Tables 4.1 and 4.2."""
+"""Chapter 4: the friction compensator against no compensation, its partial forms, and an observer:
+Tables 4.1 and 4.2."""
 
 from __future__ import annotations
 
@@ -43,8 +44,8 @@ TABLE_4_1 = {
     ("force-threshold", 10): ("3.622", "0.255", "3.877"),
     ("force-threshold", 12): ("3.854", "0.318", "4.172"),
 }
-"""Thesis Table 4.1, rms N: (algorithm, force threshold N) → tracking, numerical, total. `A1.184` is a misprint of 5.404, the
-sum of the other two in its row."""
+"""Thesis Table 4.1, rms N: (algorithm, force threshold N) → tracking, numerical, total. `A1.184` is
+a misprint of 5.404, the sum of the other two in its row."""
 TABLE_4_2 = {
     "none": ("3.955", "0.281", "4.236"),
     "one-step": ("2.663", "0.212", "2.875"),
@@ -52,7 +53,8 @@ TABLE_4_2 = {
 }
 """Thesis Table 4.2; it calls the tracking error e1 and the numerical one e2."""
 NOISE = (
-    "the thesis' spikes rise in 20 ms and its filtered noise is 1 N; the nominal rig's friction turns within a tick and its "
+    "the thesis' spikes rise in 20 ms and its filtered noise is 1 N; the "
+    "nominal rig's friction turns within a tick and its "
     "hum is 3.1 N after the filter, as high as these thresholds"
 )
 SINES = {"1 Hz": (1.0, 0.02), "5 Hz": (5.0, 0.001)}
@@ -66,7 +68,10 @@ def _variants() -> dict[str, dict[str, object]]:
     found: dict[str, dict[str, object]] = {"none": {}}
     for name, threshold in TABLE_4_1:
         if threshold:
-            found[f"{name} {threshold}"] = {"compensator": Compensator.parse(name), "spike_threshold": float(threshold)}
+            found[f"{name} {threshold}"] = {
+                "compensator": Compensator.parse(name),
+                "spike_threshold": float(threshold),
+            }
     found["two-step 4"] = {"compensator": Compensator.TWO_STEP, "spike_threshold": 4.0}
     found["observer"] = {"compensator": Compensator.OBSERVER}
     return found
@@ -74,12 +79,15 @@ def _variants() -> dict[str, dict[str, object]]:
 
 def _few() -> dict[str, dict[str, object]]:
     return {
-        name: settings for name, settings in _variants().items() if name in ("none", "one-step 4", "two-step 4", "observer")
+        name: settings
+        for name, settings in _variants().items()
+        if name in ("none", "one-step 4", "two-step 4", "observer")
     }
 
 
 def _section(settings: Mapping[str, object]) -> Result:
-    """A stretch of the test without, with the calibrated compensators and with the observer (Fig. 4.10 to 4.17)."""
+    """A stretch of the test without, with the calibrated compensators and with the observer (Fig.
+    4.10 to 4.17)."""
     found: dict[str, Array | float] = {}
     for name in ("none", "one-step", "two-step", "observer"):
         test = compensated(0, **LOOPS["nominal"], **settings, compensator=Compensator.parse(name))
@@ -94,28 +102,38 @@ def _section(settings: Mapping[str, object]) -> Result:
 
 
 def _calibrated(loop: str, count: int) -> Result:
-    """All that needs the calibration: its rows, the stretch that is drawn, and what it detects of sine motions."""
+    """All that needs the calibration: its rows, the stretch that is drawn, and what it detects of
+    sine motions."""
     found, settings = calibration(loop)
     result = dict(calibrated_rows(loop, found, settings, count))
     result |= _section(settings)
     for label, (frequency, amplitude) in SINES.items():
-        result |= {f"{label} {key}": value for key, value in detected(frequency, amplitude, 25.0, 0, **settings).items()}
+        result |= {
+            f"{label} {key}": value
+            for key, value in detected(frequency, amplitude, 25.0, 0, **settings).items()
+        }
     return result
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     count = min(seeds, MOST_SEEDS)
-    found: dict[str, Job] = {f"calibrated-{loop}": (lambda loop=loop: _calibrated(loop, count)) for loop in LOOPS}
+    found: dict[str, Job] = {
+        f"calibrated-{loop}": (lambda loop=loop: _calibrated(loop, count)) for loop in LOOPS
+    }
     for seed in range(count):
         found[f"fitted/{seed}"] = lambda seed=seed: rows("fitted", _variants(), seed)
         found[f"nominal/{seed}"] = lambda seed=seed: rows("nominal", _few(), seed)
     found |= {f"timing/{offset}": (lambda offset=offset: timed(offset)) for offset in OFFSETS}
     for label, (frequency, amplitude) in SINES.items():
-        found[f"detection/{label}"] = lambda f=frequency, a=amplitude: detected(f, a, 25.0, 0, spike_threshold=2.0)
+        found[f"detection/{label}"] = lambda f=frequency, a=amplitude: detected(
+            f, a, 25.0, 0, spike_threshold=2.0
+        )
     return found
 
 
-def _reduction(results: Mapping[str, Result], loop: str, row: str, error: str, base: str = "none") -> Array:
+def _reduction(
+    results: Mapping[str, Result], loop: str, row: str, error: str, base: str = "none"
+) -> Array:
     """In %, of each seed."""
     return 100 * (1 - errors_of(results, loop, row)[error] / errors_of(results, loop, base)[error])
 
@@ -136,7 +154,13 @@ def _tables(results: Mapping[str, Result]) -> list[Entry]:
             entry = factor("Table 4.2", f"{name}: {error}", text, found[error], "N", WITHIN)
             entries.append(entry if entry.agrees else _noted(entry, NOISE))
     entries.append(
-        digits("Table 4.2", "total of two steps against none, from the table itself", "37", 100 * (1 - 2.670 / 4.236), "%")
+        digits(
+            "Table 4.2",
+            "total of two steps against none, from the table itself",
+            "37",
+            100 * (1 - 2.670 / 4.236),
+            "%",
+        )
     )
     return entries
 
@@ -156,37 +180,89 @@ def _goals(results: Mapping[str, Result]) -> list[Entry]:
         for row in ("calibrated one-step", "calibrated two-step"):
             found = _reduction(results, loop, row, "total")
             holds = bool(np.median(found) >= 37.0)
-            note = "" if holds else f"{NOISE}; the sample in which friction turns, before any loop can act, is 2.0 N of it"
+            note = (
+                ""
+                if holds
+                else f"{NOISE}; the sample in which friction turns, "
+                "before any loop can act, is 2.0 N of it"
+            )
             says = "37 % less e1 + e2"
-            entries.append(statement("§4.6", f"{row}, {loop} force loop", says, holds, f"{_interval(found)} less", note))
+            entries.append(
+                statement(
+                    "§4.6",
+                    f"{row}, {loop} force loop",
+                    says,
+                    holds,
+                    f"{_interval(found)} less",
+                    note,
+                )
+            )
     spike = _reduction(results, "nominal", "calibrated two-step", "spike")
     before = errors_of(results, "nominal", "none")["spike"]
     text = f"{_interval(spike)} less, from {np.median(before):.0f} N"
     holds = bool(np.median(spike) >= 50)
-    entries.append(statement("Figure 4.17", "spike, two steps, nominal loop", "50 % less, from 20 N to 10 N", holds, text))
+    entries.append(
+        statement(
+            "Figure 4.17",
+            "spike, two steps, nominal loop",
+            "50 % less, from 20 N to 10 N",
+            holds,
+            text,
+        )
+    )
     own = errors_of(results, "nominal", "observer")["total"]
     best = np.minimum(
-        np.minimum(*(errors_of(results, "nominal", f"calibrated {kind}")["total"] for kind in ("one-step", "two-step"))),
-        np.minimum(*(errors_of(results, "fitted", f"calibrated {kind}")["total"] for kind in ("one-step", "two-step"))),
+        np.minimum(
+            *(
+                errors_of(results, "nominal", f"calibrated {kind}")["total"]
+                for kind in ("one-step", "two-step")
+            )
+        ),
+        np.minimum(
+            *(
+                errors_of(results, "fitted", f"calibrated {kind}")["total"]
+                for kind in ("one-step", "two-step")
+            )
+        ),
     )
-    text = f"{np.median(own):.2f} N against {np.median(best):.2f} N, {_interval(100 * (1 - own / best))} less, in every seed"
+    text = (
+        f"{np.median(own):.2f} N against {np.median(best):.2f} N, "
+        f"{_interval(100 * (1 - own / best))} less, in every seed"
+    )
     beats = bool(np.all(own < best))
-    entries.append(statement("beyond", "observer against the thesis' best, same seeds", "less e1 + e2", beats, text))
+    entries.append(
+        statement(
+            "beyond", "observer against the thesis' best, same seeds", "less e1 + e2", beats, text
+        )
+    )
     return entries
 
 
 def _timing(results: Mapping[str, Result]) -> list[Entry]:
     found = {offset: float(results[f"timing/{offset}"]["rms"]) for offset in OFFSETS}
     none = found[None]
-    text = ", ".join(f"{1e3 * o:+.0f} ms {v:.2f} N" for o, v in found.items() if o is not None) + f"; none {none:.2f} N"
+    text = (
+        ", ".join(f"{1e3 * o:+.0f} ms {v:.2f} N" for o, v in found.items() if o is not None)
+        + f"; none {none:.2f} N"
+    )
     good = all(found[o] < 0.85 * none for o in (-0.005, 0.0, 0.005))
     bad = all(found[o] > 0.95 * none for o in (-0.015, 0.015))
     entries = [
-        statement("Figure 4.6", "steps within 5 ms of the reversal", "reduce the error", good, text, "" if good else NOISE),
+        statement(
+            "Figure 4.6",
+            "steps within 5 ms of the reversal",
+            "reduce the error",
+            good,
+            text,
+            "" if good else NOISE,
+        ),
         statement("Figure 4.6", "steps 15 ms early or late", "no improvement", bad, text),
     ]
     for figure, label in (("Figure 4.8", "1 Hz"), ("Figure 4.9", "5 Hz")):
-        tuned = {key: results["calibrated-fitted"][f"{label} {key}"] for key in ("reversals", "seen", "false", "delay")}
+        tuned = {
+            key: results["calibrated-fitted"][f"{label} {key}"]
+            for key in ("reversals", "seen", "false", "delay")
+        }
         for words, one in (("threshold 2 N", results[f"detection/{label}"]), ("calibrated", tuned)):
             delay = float(one["delay"])
             late = "none in time" if math.isnan(delay) else f"{1e3 * delay:.0f} ms late"
@@ -194,7 +270,14 @@ def _timing(results: Mapping[str, Result]) -> list[Entry]:
             all_seen = one["seen"] == one["reversals"] and one["false"] == 0
             note = "" if all_seen else NOISE
             entries.append(
-                statement(figure, f"{label}, {words}: spikes of 25 s detected", "all, none false", all_seen, text, note)
+                statement(
+                    figure,
+                    f"{label}, {words}: spikes of 25 s detected",
+                    "all, none false",
+                    all_seen,
+                    text,
+                    note,
+                )
             )
     return entries
 
@@ -208,23 +291,38 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
         *_tables(results),
         *_goals(results),
         *_timing(results),
-        statement("Figure 4.14", "second step late", "overshoots", overshoot[1] > 1.5 * overshoot[0], text),
+        statement(
+            "Figure 4.14", "second step late", "overshoots", overshoot[1] > 1.5 * overshoot[0], text
+        ),
     ]
     remarks = []
     for loop in ("nominal", "fitted"):
         found = results[f"calibrated-{loop}"]
         remarks.append(
-            f"calibrated with the {loop} loop (K_p {LOOPS[loop]['kp']:g}, K_i {LOOPS[loop]['ki']:g} 1/s): "
+            f"calibrated with the {loop} loop (K_p {LOOPS[loop]['kp']:g}, "
+            f"K_i {LOOPS[loop]['ki']:g} 1/s): "
             f"F_c {found['friction']:.1f} N, threshold {found['setting spike_threshold']:.1f} N, "
             f"gradient {1e-3 * float(found['setting spike_gradient']):.2f} N a tick "
             f"over {found['setting spike_samples']:.0f} samples, "
             f"window {1e3 * float(found['setting crossing_time']):.0f} ms; "
-            f"{found['detected']:.0f} of {found['reversals']:.0f} reversals detected, {found['false']:.0f} false, "
+            f"{found['detected']:.0f} of {found['reversals']:.0f} "
+            f"reversals detected, {found['false']:.0f} false, "
             f"{1e3 * float(found['delay']):.0f} ms late"
         )
-        for row in ("one-step 4", "two-step 4", "calibrated one-step", "calibrated two-step", "observer"):
-            text = f"{loop} loop, {row}: e1 + e2 {np.median(errors_of(results, loop, row)['total']):.2f} N, "
-            remarks.append(text + f"{_interval(_reduction(results, loop, row, 'total'))} less than without")
+        for row in (
+            "one-step 4",
+            "two-step 4",
+            "calibrated one-step",
+            "calibrated two-step",
+            "observer",
+        ):
+            text = (
+                f"{loop} loop, {row}: e1 + e2 "
+                f"{np.median(errors_of(results, loop, row)['total']):.2f} N, "
+            )
+            remarks.append(
+                text + f"{_interval(_reduction(results, loop, row, 'total'))} less than without"
+            )
     return Conclusion(entries, drawings(results), remarks)
 
 

@@ -1,4 +1,5 @@
-"""The figures of chapter 4: timing of the step, spikes, a stretch of the test, two-step compensation."""
+"""The figures of chapter 4: timing of the step, spikes, a stretch of the test, two-step
+compensation."""
 
 from __future__ import annotations
 
@@ -12,16 +13,24 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, COLOURS, SENSED
 
 IN_TIME, LATE = 0.9e-3, 15e-3
-"""s from the first step to the second: when the error has gone, and when the loop has turned it round."""
+"""s from the first step to the second: when the error has gone, and when the loop has turned it
+round."""
 
 
 def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, Array]:
-    """rms errors of a row over the seeds, and the spike; row: `one-step 4`, or `calibrated one-step`."""
+    """rms errors of a row over the seeds, and the spike; row: `one-step 4`, or `calibrated
+    one-step`."""
     kind, _, name = row.partition("calibrated ")
     if name:
-        found = {key: np.asarray(results[f"calibrated-{loop}"][f"{name}/{key}"]) for key in ("tracking", "numerical", "spike")}
+        found = {
+            key: np.asarray(results[f"calibrated-{loop}"][f"{name}/{key}"])
+            for key in ("tracking", "numerical", "spike")
+        }
     else:
-        seeds = sorted((key for key in results if key.startswith(f"{loop}/")), key=lambda key: int(key.partition("/")[2]))
+        seeds = sorted(
+            (key for key in results if key.startswith(f"{loop}/")),
+            key=lambda key: int(key.partition("/")[2]),
+        )
         found = {
             key: np.array([float(results[seed][f"{kind}/{key}"]) for seed in seeds])
             for key in ("tracking", "numerical", "spike")
@@ -43,15 +52,26 @@ def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(1, 3, height=3.0)
     none = results["timing/None"]
     for axis, offsets in zip(axes[0], ((0.0, 0.005), (-0.015, -0.005), (0.015,)), strict=True):
-        axis.plot(none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step")
+        axis.plot(
+            none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step"
+        )
         for offset, colour in zip(offsets, (SENSED, ASKED), strict=False):
             one = results[f"timing/{offset}"]
             axis.plot(
-                one["time"], one["error"], color=colour, linewidth=0.8, label=f"step {1e3 * offset:+.0f} ms from reversal"
+                one["time"],
+                one["error"],
+                color=colour,
+                linewidth=0.8,
+                label=f"step {1e3 * offset:+.0f} ms from reversal",
             )
         axis.set(xlim=(2.0, 3.2), xlabel="time, s", ylabel="force error, N")
         axis.legend(fontsize=7)
-    return Drawing("figure-4.6", "Figure 4.6", "Reversals known in advance, motion of 1 Hz and 20 mm, constant force.", figure)
+    return Drawing(
+        "figure-4.6",
+        "Figure 4.6",
+        "Reversals known in advance, motion of 1 Hz and 20 mm, constant force.",
+        figure,
+    )
 
 
 def _envelope_drawing(results: Mapping[str, Result]) -> Drawing:
@@ -59,17 +79,32 @@ def _envelope_drawing(results: Mapping[str, Result]) -> Drawing:
     for loop, colour in (("nominal", SENSED), ("fitted", ASKED)):
         found = results[f"calibrated-{loop}"]
         envelope = np.asarray(found["envelope"])
-        axes[0][0].plot(np.arange(len(envelope)), envelope, color=colour, marker=".", label=f"{loop} force loop")
-        axes[0][0].axhline(float(found["setting spike_threshold"]), color=colour, linestyle=":", linewidth=1)
-    axes[0][0].set(xlabel="ms after the reversal", ylabel="force error, N", title="mean spike and the threshold found (dotted)")
+        axes[0][0].plot(
+            np.arange(len(envelope)), envelope, color=colour, marker=".", label=f"{loop} force loop"
+        )
+        axes[0][0].axhline(
+            float(found["setting spike_threshold"]), color=colour, linestyle=":", linewidth=1
+        )
+    axes[0][0].set(
+        xlabel="ms after the reversal",
+        ylabel="force error, N",
+        title="mean spike and the threshold found (dotted)",
+    )
     axes[0][0].legend(fontsize=8)
     section = results["calibrated-nominal"]
     for name, colour in (("none", COLOURS["other"]), ("two-step", SENSED), ("observer", "#2f9e44")):
         error = np.asarray(section[f"{name} asked"]) - np.asarray(section[f"{name} force"])
         axes[0][1].plot(section[f"{name} velocity"], error, color=colour, linewidth=0.5, label=name)
-    axes[0][1].set(xlabel="motor velocity, m/s", ylabel="force error, N", title="error against velocity")
+    axes[0][1].set(
+        xlabel="motor velocity, m/s", ylabel="force error, N", title="error against velocity"
+    )
     axes[0][1].legend(fontsize=8)
-    return Drawing("figure-4.7", "Figure 4.4, 4.7 and 4.17", "Left: what the calibration reads off a recording.", figure)
+    return Drawing(
+        "figure-4.7",
+        "Figure 4.4, 4.7 and 4.17",
+        "Left: what the calibration reads off a recording.",
+        figure,
+    )
 
 
 def _section_drawing(results: Mapping[str, Result]) -> Drawing:
@@ -96,8 +131,9 @@ def _section_drawing(results: Mapping[str, Result]) -> Drawing:
 
 
 def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
-    """Time (s), force error and motor force (N) after friction turns at 0, with an integral force loop alone (Fig. 4.14): step
-    one of `first` times the jump at 4 ms, step two back to the jump `wait` s later, or never."""
+    """Time (s), force error and motor force (N) after friction turns at 0, with an integral force
+    loop alone (Fig. 4.14): step one of `first` times the jump at 4 ms, step two back to the jump
+    `wait` s later, or never."""
     period, gain, jump = 1e-4, 40.0, 28.0
     motor, integral = 0.0, 0.0
     time = (np.arange(900) - 50) * period
@@ -105,7 +141,9 @@ def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
     for tick, now in enumerate(time):
         felt = motor - (jump if now >= 0 else 0.0)
         error[tick], force[tick] = -felt, motor
-        added = 0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
+        added = (
+            0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
+        )
         integral -= gain * felt * period
         motor += (integral + added - motor) * period / MOTOR_LAG
     return time, error, force
@@ -130,20 +168,48 @@ def _two_step_drawing() -> Drawing:
     axes[0][2].set(xlabel="ms", ylabel="force error, N")
     axes[0][0].legend(fontsize=7)
     axes[0][2].legend(fontsize=7)
-    caption = "Simulated with an integral loop alone: a late second step overshoots, larger steps settle sooner."
+    caption = (
+        "Simulated with an integral loop alone: a late second "
+        "step overshoots, larger steps settle sooner."
+    )
     return Drawing("figure-4.14", "Figure 4.13 to 4.15", caption, figure)
 
 
 def _bars(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(1, 2, height=3.4)
-    names = ("none", "one-step 4", "two-step 4", "calibrated one-step", "calibrated two-step", "observer")
+    names = (
+        "none",
+        "one-step 4",
+        "two-step 4",
+        "calibrated one-step",
+        "calibrated two-step",
+        "observer",
+    )
     for axis, loop in zip(axes[0], ("nominal", "fitted"), strict=True):
         for number, name in enumerate(names):
             found = errors_of(results, loop, name)
-            tracking, numerical = (float(np.median(found[key])) for key in ("tracking", "numerical"))
+            tracking, numerical = (
+                float(np.median(found[key])) for key in ("tracking", "numerical")
+            )
             axis.barh(number, tracking, color=SENSED, label="tracking e2" if number == 0 else None)
-            axis.barh(number, numerical, left=tracking, color=ASKED, label="numerical e1" if number == 0 else None)
-        axis.set(title=f"{loop} force loop", xlabel="rms error, N", yticks=range(len(names)), yticklabels=names)
+            axis.barh(
+                number,
+                numerical,
+                left=tracking,
+                color=ASKED,
+                label="numerical e1" if number == 0 else None,
+            )
+        axis.set(
+            title=f"{loop} force loop",
+            xlabel="rms error, N",
+            yticks=range(len(names)),
+            yticklabels=names,
+        )
         axis.invert_yaxis()
         axis.legend(fontsize=8)
-    return Drawing("table-4.2", "Table 4.1 and 4.2", "Median over the seeds; `4`: with the thesis' parameters.", figure)
+    return Drawing(
+        "table-4.2",
+        "Table 4.1 and 4.2",
+        "Median over the seeds; `4`: with the thesis' parameters.",
+        figure,
+    )

@@ -1,4 +1,5 @@
-"""The tests of chapter 4 on the twin: what a compensator leaves of the force errors, and steps made at known times."""
+"""The tests of chapter 4 on the twin: what a compensator leaves of the force errors, and steps made
+at known times."""
 
 from __future__ import annotations
 
@@ -41,9 +42,13 @@ from rigtwin.studies.friction_spikes import (
     find_compensator,
 )
 
-LOOPS: dict[str, dict[str, float]] = {"fitted": {"kp": 1.0, "ki": 190.0}, "nominal": {"kp": 0.3, "ki": 10.0}}
-"""Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows Table 3.5, `fitted` those with
-which it shows the first row of Table 4.1; the rows below are then predictions."""
+LOOPS: dict[str, dict[str, float]] = {
+    "fitted": {"kp": 1.0, "ki": 190.0},
+    "nominal": {"kp": 0.3, "ki": 10.0},
+}
+"""Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows
+Table 3.5, `fitted` those with which it shows the first row of Table 4.1; the rows below are then
+predictions."""
 CALIBRATION_SEED = 1000
 """Of the recording that the compensator is calibrated on; no other test uses it."""
 AFTER = 0.04
@@ -52,12 +57,14 @@ AFTER = 0.04
 
 def compensated(seed: int, **settings: object) -> Trial:
     """The road test of chapter 4 with some controller settings changed."""
-    return trial("friction-road", seed, lambda c: c._replace(controller=c.controller._replace(**settings)))
+    return trial(
+        "friction-road", seed, lambda c: c._replace(controller=c.controller._replace(**settings))
+    )
 
 
 def errors(test: Trial) -> dict[str, float]:
-    """rms tracking and numerical error (N) of the force that is felt, and the mean size of the friction spikes (N) in the force
-    as the controller sees it, through its filter."""
+    """rms tracking and numerical error (N) of the force that is felt, and the mean size of the
+    friction spikes (N) in the force as the controller sees it, through its filter."""
     asked = test.ran.commands[:, 2]
     return {
         "tracking": rms(asked - test.force),
@@ -67,19 +74,27 @@ def errors(test: Trial) -> dict[str, float]:
 
 
 def spikes(test: Trial) -> Array:
-    """How far the filtered force error shoots at every reversal that stands alone, N: its peak after it, towards the new
-    direction, less what it was before."""
+    """How far the filtered force error shoots at every reversal that stands alone, N: its peak
+    after it, towards the new direction, less what it was before."""
     settings, period = test.configuration.controller, test.configuration.timing.period
     velocity = np.gradient(gaussian_filter1d(test.travel, 2), period)
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     wide = round(AFTER / period)
-    turns = turns[(np.diff(turns, prepend=-wide) > wide) & (np.diff(turns, append=len(velocity) + wide) > wide)]
+    turns = turns[
+        (np.diff(turns, prepend=-wide) > wide)
+        & (np.diff(turns, append=len(velocity) + wide) > wide)
+    ]
     turns = turns[(turns > 1000) & (turns < len(velocity) - wide)]
     felt = filter_lag(np.ascontiguousarray(test.force), settings.filter_force, period)
     error = test.ran.commands[:, 2] - felt
     directions = np.sign(velocity[turns + 3])
     before = np.array([np.mean(error[turn - 15 : turn - 3]) for turn in turns])
-    peaks = np.array([np.max(way * error[turn - 3 : turn + wide]) for turn, way in zip(turns, directions, strict=True)])
+    peaks = np.array(
+        [
+            np.max(way * error[turn - 3 : turn + wide])
+            for turn, way in zip(turns, directions, strict=True)
+        ]
+    )
     return peaks - directions * before
 
 
@@ -87,41 +102,67 @@ def calibration(loop: str) -> tuple[Calibration, dict[str, float]]:
     """The compensator calibrated on a recording without compensation, and its settings by name."""
     experiment = find("friction-road")
     configuration = experiment.configuration
-    configuration = configuration._replace(controller=configuration.controller._replace(**LOOPS[loop]))
+    configuration = configuration._replace(
+        controller=configuration.controller._replace(**LOOPS[loop])
+    )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "friction-road.mcap"
         demands = experiment.demands(configuration, CALIBRATION_SEED)
         record(path, "friction-road", configuration, demands, CALIBRATION_SEED)
         found = find_compensator(load(path), configuration.controller)
-    return found, {name: float(getattr(found.settings, name)) for name in (*BOUNDS, "friction_step")}
+    return found, {
+        name: float(getattr(found.settings, name)) for name in (*BOUNDS, "friction_step")
+    }
 
 
 def rows(loop: str, variants: Mapping[str, Mapping[str, object]], seed: int) -> dict[str, float]:
     """Errors of every variant of the settings, `variant/error`."""
     found: dict[str, float] = {}
     for name, settings in variants.items():
-        found |= {f"{name}/{key}": value for key, value in errors(compensated(seed, **LOOPS[loop], **settings)).items()}
+        found |= {
+            f"{name}/{key}": value
+            for key, value in errors(compensated(seed, **LOOPS[loop], **settings)).items()
+        }
     return found
 
 
-def calibrated_rows(loop: str, found: Calibration, settings: Mapping[str, float], seeds: int) -> Result:
-    """What the calibration found, and the errors with it for every seed: arrays of shape (seeds,)."""
+def calibrated_rows(
+    loop: str, found: Calibration, settings: Mapping[str, float], seeds: int
+) -> Result:
+    """What the calibration found, and the errors with it for every seed: arrays of shape
+    (seeds,)."""
     variants = {
         kind.label: {"compensator": kind, **settings}
-        for kind in (Compensator.ONE_STEP, Compensator.TWO_STEP, Compensator.FORCE_PROFILE, Compensator.FORCE_THRESHOLD)
+        for kind in (
+            Compensator.ONE_STEP,
+            Compensator.TWO_STEP,
+            Compensator.FORCE_PROFILE,
+            Compensator.FORCE_THRESHOLD,
+        )
     }
     table = [rows(loop, variants, seed) for seed in range(seeds)]
-    result: dict[str, Array | float] = {name: np.array([row[name] for row in table]) for name in table[0]}
+    result: dict[str, Array | float] = {
+        name: np.array([row[name] for row in table]) for name in table[0]
+    }
     result |= {f"setting {name}": value for name, value in settings.items()}
-    result |= {"envelope": found.envelope, "friction": found.friction, "reversals": float(found.reversals)}
-    return result | {"detected": float(found.detected), "false": float(found.false), "delay": found.delay}
+    result |= {
+        "envelope": found.envelope,
+        "friction": found.friction,
+        "reversals": float(found.reversals),
+    }
+    return result | {
+        "detected": float(found.detected),
+        "false": float(found.false),
+        "delay": found.delay,
+    }
 
 
 def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Configuration, Array]:
-    """Constant force while the plate moves by a sine (Hz, m of the plate itself): configuration and demands."""
-    settings = Settings(mode=Mode.IMPOSED, filter_force=0.004, filter_velocity=0.0064, filter_position=0.004)._replace(
-        **LOOPS["fitted"]
-    )
+    """Constant force while the plate moves by a sine (Hz, m of the plate itself): configuration and
+    demands."""
+    settings = Settings(
+        mode=Mode.IMPOSED, filter_force=0.004, filter_velocity=0.0064, filter_position=0.004
+    )._replace(**LOOPS["fitted"])
     configuration = Configuration(controller=settings, timing=Timing(duration=seconds))
     time = time_of(configuration)
     command = amplitude / abs(hydraulic(np.array([frequency]))[0])
@@ -130,23 +171,33 @@ def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Confi
     return configuration, np.column_stack([np.zeros_like(time), moved, np.full_like(time, 220.0)])
 
 
-def detected(frequency: float, amplitude: float, seconds: float, seed: int, **settings: float) -> Result:
+def detected(
+    frequency: float, amplitude: float, seconds: float, seed: int, **settings: float
+) -> Result:
     """How many reversals of a sine motion the detector sees, no step being made (Fig. 4.8, 4.9)."""
     configuration, demands = sine_test(frequency, amplitude, seconds)
     ran = simulate(configuration, demands, seed)
     period = configuration.timing.period
     tuned = configuration.controller._replace(compensator=Compensator.ONE_STEP, **settings)
-    steps = detections(tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period)
+    steps = detections(
+        tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period
+    )
     velocity = np.gradient(gaussian_filter1d(ran.truth[:, 2], 2), period)
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     turns = turns[turns > 1000]
     directions = np.sign(velocity[turns + 3])
     made = np.flatnonzero(steps)
-    seen = [bool(np.any(steps[t - 2 : t + 40] == way)) for t, way in zip(turns, directions, strict=True)]
-    delays = [
-        np.flatnonzero(steps[t - 2 : t + 40] == way)[0] - 2 for t, way, s in zip(turns, directions, seen, strict=True) if s
+    seen = [
+        bool(np.any(steps[t - 2 : t + 40] == way)) for t, way in zip(turns, directions, strict=True)
     ]
-    near = np.array([np.min(np.abs(turns - tick)) if len(turns) else 10**9 for tick in made[made > 1000]])
+    delays = [
+        np.flatnonzero(steps[t - 2 : t + 40] == way)[0] - 2
+        for t, way, s in zip(turns, directions, seen, strict=True)
+        if s
+    ]
+    near = np.array(
+        [np.min(np.abs(turns - tick)) if len(turns) else 10**9 for tick in made[made > 1000]]
+    )
     return {
         "reversals": float(len(turns)),
         "seen": float(np.sum(seen)),
@@ -156,8 +207,8 @@ def detected(frequency: float, amplitude: float, seconds: float, seed: int, **se
 
 
 def timed(offset: float | None, seed: int = 0) -> Result:
-    """Constant force on a 1 Hz motion with a step of twice the Coulomb force `offset` s after every reversal, known in advance;
-    None for no step (Fig. 4.6)."""
+    """Constant force on a 1 Hz motion with a step of twice the Coulomb force `offset` s after every
+    reversal, known in advance; None for no step (Fig. 4.6)."""
     configuration, demands = sine_test(1.0, 0.02, 4.0)
     period = configuration.timing.period
     free = simulate(configuration, demands, seed)
@@ -177,6 +228,17 @@ def timed(offset: float | None, seed: int = 0) -> Result:
         state, commands = update(controlling, state, twin.read(), Demand(*demand.tolist()))
         error[tick] = commands.force - twin.truth.load_cell
         added = 0.0 if offset is None else 14.0 * levels[tick]
-        twin.write(Commands(commands.ground, commands.structure, commands.force, commands.voltage + added / MOTOR_CONSTANT))
+        twin.write(
+            Commands(
+                commands.ground,
+                commands.structure,
+                commands.force,
+                commands.voltage + added / MOTOR_CONSTANT,
+            )
+        )
     late = slice(1500, None)
-    return {"time": np.arange(len(error))[late] * period, "error": error[late], "rms": rms(error[late])}
+    return {
+        "time": np.arange(len(error))[late] * period,
+        "error": error[late],
+        "rms": rms(error[late]),
+    }

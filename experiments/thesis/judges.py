@@ -1,4 +1,5 @@
-"""What can be asked of a root locus's stability: each judge says whether it holds, and what was found."""
+"""What can be asked of a root locus's stability: each judge says whether it holds, and what was
+found."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ def both(*judges: Judge) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         found = [each(locus) for each in judges]
-        return all(holds for holds, _ in found), "; ".join(dict.fromkeys(words for _, words in found))
+        return all(holds for holds, _ in found), "; ".join(
+            dict.fromkeys(words for _, words in found)
+        )
 
     return judge
 
@@ -56,7 +59,9 @@ def not_unstable_at(value: float) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         rightmost = locus.poles_at(value).real.max()
-        return bool(rightmost <= TOGETHER), f"real part {rightmost:.2g} 1/s at {value:g}; {story(locus)}"
+        return bool(
+            rightmost <= TOGETHER
+        ), f"real part {rightmost:.2g} 1/s at {value:g}; {story(locus)}"
 
     return judge
 
@@ -66,7 +71,9 @@ def unstable_before_start(*modes: str) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         found = locus.unstable_modes(float(locus.values[0]) / BEYOND)
-        return set(modes) <= set(found), f"{' and '.join(found) or 'nothing'} unstable {BEYOND:g} times before the start"
+        return set(modes) <= set(
+            found
+        ), f"{' and '.join(found) or 'nothing'} unstable {BEYOND:g} times before the start"
 
     return judge
 
@@ -75,7 +82,9 @@ def never(mode: str) -> Judge:
     """No pole of that mode to the right of the imaginary axis at any value."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
-        holds = mode not in (*ends(locus)[0], *ends(locus)[1]) and all(each.mode != mode for each in locus.crossings)
+        holds = mode not in (*ends(locus)[0], *ends(locus)[1]) and all(
+            each.mode != mode for each in locus.crossings
+        )
         return holds, story(locus)
 
     return judge
@@ -91,8 +100,13 @@ def together(locus: Locus) -> tuple[bool, str]:
 
 def body_first(locus: Locus) -> tuple[bool, str]:
     """The body hop becomes unstable before the wheel hop does, and both do."""
-    first = {mode: [each.value for each in locus.crossings if each.mode == mode and each.unstable] for mode in (BODY, WHEEL)}
-    holds = bool(first[BODY] and first[WHEEL]) and min(first[BODY]) < min(first[WHEEL]) * (1.0 - TOGETHER)
+    first = {
+        mode: [each.value for each in locus.crossings if each.mode == mode and each.unstable]
+        for mode in (BODY, WHEEL)
+    }
+    holds = bool(first[BODY] and first[WHEEL]) and min(first[BODY]) < min(first[WHEEL]) * (
+        1.0 - TOGETHER
+    )
     return holds, story(locus)
 
 
@@ -127,7 +141,9 @@ def _at(crossing: Crossing | None) -> str:
 
 
 def ends(locus: Locus) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return locus.unstable_modes(float(locus.values[0])), locus.unstable_modes(float(locus.values[-1]))
+    return locus.unstable_modes(float(locus.values[0])), locus.unstable_modes(
+        float(locus.values[-1])
+    )
 
 
 def story(locus: Locus) -> str:
@@ -135,7 +151,9 @@ def story(locus: Locus) -> str:
     words = [f"{' and '.join(start)} unstable at the start" if start else "stable at the start"]
     for crossing in locus.crossings:
         verb = "unstable" if crossing.unstable else "stable again"
-        words.append(f"{crossing.mode} {verb} at {crossing.value:.4g} ({crossing.frequency:.4g} rad/s)")
+        words.append(
+            f"{crossing.mode} {verb} at {crossing.value:.4g} ({crossing.frequency:.4g} rad/s)"
+        )
     if not locus.crossings:
         words.append("and throughout")
     return ", ".join(words)

@@ -1,4 +1,5 @@
-"""The sweeps of the thesis' root loci (§5.2, appendix A), what it says of them, and how they are drawn."""
+"""The sweeps of the thesis' root loci (§5.2, appendix A), what it says of them, and how they are
+drawn."""
 
 from __future__ import annotations
 
@@ -17,13 +18,15 @@ from rigtwin.studies.stability.locus import Locus, Setting
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 ARBITRARY = QuarterCar(500.0, 0.0, 50.0, 500.0, 100.0, 50.0)
-"""The values that the thesis keeps while others are varied, `chosen arbitrarily` (Tables 5.3, 5.7, A1.1 to A3.5)."""
+"""The values that the thesis keeps while others are varied, `chosen arbitrarily` (Tables 5.3, 5.7,
+A1.1 to A3.5)."""
 POINTS = 500
 
 
 @dataclass(frozen=True)
 class Variation:
-    """One parameter swept from start to end. symbol, unit: of it, for labels; at: what each of its values means."""
+    """One parameter swept from start to end. symbol, unit: of it, for labels; at: what each of its
+    values means."""
 
     symbol: str
     unit: str
@@ -42,14 +45,17 @@ def of_natural_frequency(ratio: float, lag: float, end: float) -> Variation:
     """The suspension's stiffness from 1 N/m, mass and damping ratio kept."""
 
     def at(stiffness: float) -> Setting:
-        car = ARBITRARY._replace(suspension_stiffness=stiffness, suspension_damping=damping(ratio, stiffness))
+        car = ARBITRARY._replace(
+            suspension_stiffness=stiffness, suspension_damping=damping(ratio, stiffness)
+        )
         return Setting(car, lag)
 
     return Variation("k_s", "N/m", 1.0, end, at)
 
 
 def of_damping_ratio(lag: float) -> Variation:
-    """Stiffness N/m and mass kg of the suspension from 1 to 100 000 together: the damping ratio falls from 50 to 0.0005."""
+    """Stiffness N/m and mass kg of the suspension from 1 to 100 000 together: the damping ratio
+    falls from 50 to 0.0005."""
     return Variation(
         "k_s = m_s",
         "N/m, kg",
@@ -60,11 +66,19 @@ def of_damping_ratio(lag: float) -> Variation:
 
 
 def of_tyre_stiffness(lag: float) -> Variation:
-    return Variation("k_t", "N/m", 0.01, 1e5, lambda stiffness: Setting(ARBITRARY._replace(tyre_stiffness=stiffness), lag))
+    return Variation(
+        "k_t",
+        "N/m",
+        0.01,
+        1e5,
+        lambda stiffness: Setting(ARBITRARY._replace(tyre_stiffness=stiffness), lag),
+    )
 
 
 def of_wheel_mass(lag: float) -> Variation:
-    return Variation("m_u", "kg", 0.01, 1e5, lambda mass: Setting(ARBITRARY._replace(unsprung_mass=mass), lag))
+    return Variation(
+        "m_u", "kg", 0.01, 1e5, lambda mass: Setting(ARBITRARY._replace(unsprung_mass=mass), lag)
+    )
 
 
 def damping(ratio: float, stiffness: float) -> float:
@@ -74,8 +88,9 @@ def damping(ratio: float, stiffness: float) -> float:
 
 @dataclass(frozen=True)
 class Claim:
-    """What the thesis says of a locus. where: `Figure A1.3`; says: its words, shortened; judge: of the locus, whether it holds
-    and what was found; note: which of two contradicting passages is right."""
+    """What the thesis says of a locus. where: `Figure A1.3`; says: its words, shortened; judge: of
+    the locus, whether it holds and what was found; note: which of two contradicting passages is
+    right."""
 
     where: str
     what: str
@@ -86,7 +101,8 @@ class Claim:
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure of the thesis. name: `A1.3`; view: the part of the plane shown, 1/s and rad/s, as (left, right, height)."""
+    """A figure of the thesis. name: `A1.3`; view: the part of the plane shown, 1/s and rad/s, as
+    (left, right, height)."""
 
     name: str
     view: tuple[float, float, float] | None = None
@@ -111,13 +127,18 @@ class Case:
         found = []
         for claim in self.claims:
             holds, words = claim.judge(self.locus)
-            found.append(statement(claim.where, f"{claim.what}, {self.title}", claim.says, holds, words, claim.note))
+            found.append(
+                statement(
+                    claim.where, f"{claim.what}, {self.title}", claim.says, holds, words, claim.note
+                )
+            )
         return found
 
 
 @cache
 def locus(model: str, variation: Variation) -> Locus:
-    """The root locus of a model over a variation, in equal ratios. Kept, since others are compared with it."""
+    """The root locus of a model over a variation, in equal ratios. Kept, since others are compared
+    with it."""
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), POINTS)
     return Locus(model, values, variation.at)
 
@@ -142,14 +163,32 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
     axis.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     axis.axvline(0.0, color="0.3", linewidth=0.8, zorder=0)
     ideal = found.ideal
-    # A lag does not move the ideal poles: there they are points among the others, and are drawn as such.
+    # A lag does not move the ideal poles: there they are points among the others, and are drawn as
+    # such.
     if np.allclose(ideal, ideal[0]):
-        axis.plot(ideal[0].real, ideal[0].imag, "+", color="0.35", markersize=10, label="ideal", zorder=5)
+        axis.plot(
+            ideal[0].real, ideal[0].imag, "+", color="0.35", markersize=10, label="ideal", zorder=5
+        )
     else:
-        axis.plot(ideal.real.ravel(), ideal.imag.ravel(), ".", color="0.65", markersize=4, label="ideal", zorder=1)
+        axis.plot(
+            ideal.real.ravel(),
+            ideal.imag.ravel(),
+            ".",
+            color="0.65",
+            markersize=4,
+            label="ideal",
+            zorder=1,
+        )
     colours = np.repeat(share, found.poles.shape[1])
     axis.scatter(
-        found.poles.real.ravel(), found.poles.imag.ravel(), s=2.0, c=colours, cmap="viridis", vmax=1.1, label="MIL", zorder=2
+        found.poles.real.ravel(),
+        found.poles.imag.ravel(),
+        s=2.0,
+        c=colours,
+        cmap="viridis",
+        vmax=1.1,
+        label="MIL",
+        zorder=2,
     )
     for row, marker, label in ((0, "o", "start of the sweep"), (-1, "s", "its end")):
         axis.plot(
@@ -164,7 +203,15 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
             zorder=3,
         )
     heights = [sign * crossing.frequency for crossing in found.crossings for sign in (1.0, -1.0)]
-    axis.plot([0.0] * len(heights), heights, "x", color="#d62728", markersize=7, label="crossing", zorder=4)
+    axis.plot(
+        [0.0] * len(heights),
+        heights,
+        "x",
+        color="#d62728",
+        markersize=7,
+        label="crossing",
+        zorder=4,
+    )
     if panel.view is not None:
         left, right, height = panel.view
         axis.set_xlim(left, right)
@@ -174,11 +221,28 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
     sweep = f"{variation.symbol} {variation.start:g} to {variation.end:g} {variation.unit}"
     crossing = f"\ncrossing at {values}" if values else "\nno crossing"
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.5}
-    axis.text(0.02, 0.98, sweep + crossing, transform=axis.transAxes, fontsize=7, va="top", zorder=6, bbox=box)
+    axis.text(
+        0.02,
+        0.98,
+        sweep + crossing,
+        transform=axis.transAxes,
+        fontsize=7,
+        va="top",
+        zorder=6,
+        bbox=box,
+    )
     axis.set_xlabel("real part, 1/s", fontsize=8)
     axis.set_ylabel("imaginary part, rad/s", fontsize=8)
 
 
 def _legend(figure: Figure, axis: Axes) -> None:
     handles, labels = axis.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8, frameon=False, markerscale=1.5)
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=len(labels),
+        fontsize=8,
+        frameon=False,
+        markerscale=1.5,
+    )

@@ -1,4 +1,5 @@
-"""§5.3 to §5.7: the stability of the quarter car with suspension MIL, vehicle structure MIL and both."""
+"""§5.3 to §5.7: the stability of the quarter car with suspension MIL, vehicle structure MIL and
+both."""
 
 from __future__ import annotations
 
@@ -31,8 +32,8 @@ STRUCTURE_LAG = 0.06895
 
 
 class Column(NamedTuple):
-    """A column of a table: what it changes, and the real parts printed, 1/s. Where the table prints 0, the digits of its other
-    columns are written."""
+    """A column of a table: what it changes, and the real parts printed, 1/s. Where the table prints
+    0, the digits of its other columns are written."""
 
     changes: Mapping[str, float]
     body: str
@@ -86,7 +87,8 @@ TABLE_5_13 = {
     "structure": "arrrra",
     "combined": "arrrra",
 }
-"""Model → stable (a) or unstable (r) at low and high sprung natural frequency, damping ratio, unsprung natural frequency."""
+"""Model → stable (a) or unstable (r) at low and high sprung natural frequency, damping ratio,
+unsprung natural frequency."""
 COLUMNS_5_13 = tuple(
     f"{end} {what}"
     for what in ("sprung natural frequency", "damping ratio", "unsprung natural frequency")
@@ -106,38 +108,73 @@ def _tables() -> list[Entry]:
         car = ARBITRARY._replace(**column.changes)
         for name, printed in ((BODY, column.body), (WHEEL, column.wheel or "")):
             ours = _real_part("suspension", car, SUSPENSION_LAG, name)
-            entries.append(digits("Table 5.6", f"case {number}, {name}, real part", printed, ours, "1/s", column.note))
+            entries.append(
+                digits(
+                    "Table 5.6",
+                    f"case {number}, {name}, real part",
+                    printed,
+                    ours,
+                    "1/s",
+                    column.note,
+                )
+            )
     for table, columns in STRUCTURE_TABLES.items():
         for number, column in enumerate(columns, 1):
-            ours = _real_part("structure", ARBITRARY._replace(**column.changes), STRUCTURE_LAG, BODY)
-            what = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in column.changes.items()) or "as chosen"
-            entries.append(digits(table, f"column {number}, {what}, body hop, real part", column.body, ours, "1/s"))
+            ours = _real_part(
+                "structure", ARBITRARY._replace(**column.changes), STRUCTURE_LAG, BODY
+            )
+            what = (
+                ", ".join(
+                    f"{name.replace('_', ' ')} {value:g}" for name, value in column.changes.items()
+                )
+                or "as chosen"
+            )
+            entries.append(
+                digits(
+                    table, f"column {number}, {what}, body hop, real part", column.body, ours, "1/s"
+                )
+            )
     critical = structure_lag()
-    entries.append(digits("Table 5.7", "critical lag of the first column", "0.06895", critical, "s"))
+    entries.append(
+        digits("Table 5.7", "critical lag of the first column", "0.06895", critical, "s")
+    )
     return entries
 
 
 def _table_5_13() -> list[Entry]:
-    """Ticks and crosses, each at an end of a sweep; of the unsprung frequency by the tyre and by the wheel's mass."""
+    """Ticks and crosses, each at an end of a sweep; of the unsprung frequency by the tyre and by
+    the wheel's mass."""
     entries = []
     for model, printed in TABLE_5_13.items():
         for column, name, cell in zip(range(6), COLUMNS_5_13, printed, strict=True):
             if cell == "-":
                 continue
             found = [not each.unstable_modes(value) for each, value in _ends(model, column)]
-            words = " and ".join("stable" if stable else "unstable" for stable in dict.fromkeys(found))
+            words = " and ".join(
+                "stable" if stable else "unstable" for stable in dict.fromkeys(found)
+            )
             says = "stable" if cell == "a" else "unstable"
             entries.append(
-                statement("Table 5.13", f"{model} MIL, {name}", says, all(each == (cell == "a") for each in found), words)
+                statement(
+                    "Table 5.13",
+                    f"{model} MIL, {name}",
+                    says,
+                    all(each == (cell == "a") for each in found),
+                    words,
+                )
             )
     return entries
 
 
 def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
     """The sweeps that a column of Table 5.13 sums up, and the end of each that it speaks of."""
-    frequency, ratio = of_natural_frequency(1.0, SUSPENSION_LAG, 1e5), of_damping_ratio(SUSPENSION_LAG)
+    frequency, ratio = (
+        of_natural_frequency(1.0, SUSPENSION_LAG, 1e5),
+        of_damping_ratio(SUSPENSION_LAG),
+    )
     tyre, wheel = of_tyre_stiffness(SMALL_LAG), of_wheel_mass(SMALL_LAG)
-    # The damping ratio falls, and the unsprung frequency falls with the wheel's mass, as the swept value rises.
+    # The damping ratio falls, and the unsprung frequency falls with the wheel's mass, as the swept
+    # value rises.
     chosen: tuple[tuple[tuple[Variation, bool], ...], ...] = (
         ((frequency, False),),
         ((frequency, True),),
@@ -146,7 +183,10 @@ def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
         ((tyre, False), (wheel, True)),
         ((tyre, True), (wheel, False)),
     )
-    return [(locus(model, variation), variation.end if last else variation.start) for variation, last in chosen[column]]
+    return [
+        (locus(model, variation), variation.end if last else variation.start)
+        for variation, last in chosen[column]
+    ]
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:

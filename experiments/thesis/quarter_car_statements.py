@@ -1,4 +1,5 @@
-"""§5.3 to §5.6: what the text says of the quarter car's critical lag and of the mode that crosses first."""
+"""§5.3 to §5.6: what the text says of the quarter car's critical lag and of the mode that crosses
+first."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from rigtwin.studies.stability.vehicle import QuarterCar
 SUSPENSION_LAG = 0.2
 """s, critical for suspension MIL (Table 5.6)."""
 SMALL_LAG = 0.0333
-"""s, at which the wheel's part in stability is judged: below b/k, where the suspension alone is stable."""
+"""s, at which the wheel's part in stability is judged: below b/k, where the suspension alone is
+stable."""
 RANDOM_CARS = 60
 BEYOND = np.logspace(0.01, 3.0, 12)
 """Of the critical lag, where it is asked what else becomes unstable."""
@@ -27,10 +29,18 @@ AROUND = np.array(ARBITRARY._replace(tyre_damping=10.0))
 def statements() -> list[Entry]:
     """What the text of §5.3 to §5.6 says."""
     random = np.random.default_rng(0)
-    cars = [QuarterCar(*map(float, np.exp(random.normal(0.0, 1.0, 6)) * AROUND)) for _ in range(RANDOM_CARS)]
+    cars = [
+        QuarterCar(*map(float, np.exp(random.normal(0.0, 1.0, 6)) * AROUND))
+        for _ in range(RANDOM_CARS)
+    ]
     undamped = [car._replace(tyre_damping=0.0) for car in cars]
     off = max(
-        abs(_time(critical_lag(LOOPS["suspension"](car))) * car.suspension_stiffness / car.suspension_damping - 1.0)
+        abs(
+            _time(critical_lag(LOOPS["suspension"](car)))
+            * car.suspension_stiffness
+            / car.suspension_damping
+            - 1.0
+        )
         for car in undamped
     )
     damped = _time(critical_lag(LOOPS["suspension"](ARBITRARY._replace(tyre_damping=10.0))))
@@ -40,7 +50,14 @@ def statements() -> list[Entry]:
     words = f"{damped:.4f} s, b/k = {SUSPENSION_LAG:g} s"
     entries = [
         statement(where, what, says, off < 1e-9, f"within {off:.1g} {at}, no tyre damping"),
-        statement(where, f"{what}, tyre damping 10", says, abs(damped - SUSPENSION_LAG) < 1e-6, words, note),
+        statement(
+            where,
+            f"{what}, tyre damping 10",
+            says,
+            abs(damped - SUSPENSION_LAG) < 1e-6,
+            words,
+            note,
+        ),
     ]
     for name, drawn in (("no tyre damping", undamped), ("tyre damping", cars)):
         for model, where in (("structure", "§5.3.6"), ("combined", "§5.6")):
@@ -56,11 +73,21 @@ def statements() -> list[Entry]:
 def _only_body(name: str, drawn: Sequence[QuarterCar]) -> Entry:
     """§5.3.6: `only the body hop poles can become unstable regardless of system parameters`."""
     unstable = [_wheel_too(car) for car in drawn]
-    ratios = np.array([car.unsprung.natural_frequency / car.sprung.natural_frequency for car in drawn])
-    words = f"with enough lag the wheel hop too in {sum(unstable)} of {len(drawn)} vehicles drawn at random"
+    ratios = np.array(
+        [car.unsprung.natural_frequency / car.sprung.natural_frequency for car in drawn]
+    )
+    words = (
+        f"with enough lag the wheel hop too in {sum(unstable)} "
+        f"of {len(drawn)} vehicles drawn at random"
+    )
     if any(unstable):
-        with_it, without = (float(np.median(ratios[np.array(unstable) == each])) for each in (True, False))
-        words += f"; median unsprung over sprung natural frequency {with_it:.2f} in those, {without:.2f} in the others"
+        with_it, without = (
+            float(np.median(ratios[np.array(unstable) == each])) for each in (True, False)
+        )
+        words += (
+            f"; median unsprung over sprung natural frequency {with_it:.2f} "
+            f"in those, {without:.2f} in the others"
+        )
     says, note = (
         "only the body hop can become unstable",
         "false for slow wheels, heavy or on soft tyres" if any(unstable) else "",
@@ -78,17 +105,32 @@ def _tendencies() -> list[Entry]:
     }
     entries = []
     for name, (says, rises) in words.items():
-        less, more = (structure_lag(**{name: factor * getattr(ARBITRARY, name)}) for factor in (1.0 / 1.2, 1.2))
-        found = f"critical lag {1e3 * less:.2f} ms with a sixth less of it, {1e3 * more:.2f} ms with a fifth more"
+        less, more = (
+            structure_lag(**{name: factor * getattr(ARBITRARY, name)})
+            for factor in (1.0 / 1.2, 1.2)
+        )
+        found = (
+            f"critical lag {1e3 * less:.2f} ms with a sixth less of "
+            f"it, {1e3 * more:.2f} ms with a fifth more"
+        )
         what = f"structure MIL, {name.replace('_', ' ')}"
         entries.append(statement("§5.3.6", what, says, (less < more) == rises, found))
-    low, own, high = (structure_lag(suspension_damping=damping) for damping in (50.0, 200.0, 1000.0))
-    found = f"critical lag {1e3 * low:.2f}, {1e3 * own:.2f}, {1e3 * high:.2f} ms at 50, 200 and 1000 Ns/m"
+    low, own, high = (
+        structure_lag(suspension_damping=damping) for damping in (50.0, 200.0, 1000.0)
+    )
+    found = (
+        f"critical lag {1e3 * low:.2f}, {1e3 * own:.2f}, "
+        f"{1e3 * high:.2f} ms at 50, 200 and 1000 Ns/m"
+    )
     bad = "unstable if too low or too high"
-    entries.append(statement("§5.3.6", "structure MIL, suspension damping", bad, own > max(low, high), found))
+    entries.append(
+        statement("§5.3.6", "structure MIL, suspension damping", bad, own > max(low, high), found)
+    )
     none, some = (structure_lag(tyre_damping=damping) for damping in (0.0, 10.0))
     found = f"critical lag {1e3 * none:.2f} and {1e3 * some:.2f} ms at 0 and 10 Ns/m"
-    entries.append(statement("§5.3.6", "structure MIL, tyre damping", "stabilises", some > none, found))
+    entries.append(
+        statement("§5.3.6", "structure MIL, tyre damping", "stabilises", some > none, found)
+    )
     return entries
 
 

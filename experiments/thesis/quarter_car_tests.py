@@ -1,4 +1,5 @@
-"""§6.3: the quarter car dropped and driven over two roads: Tables 6.2 to 6.5, Figures 6.24 to 6.51."""
+"""§6.3: the quarter car dropped and driven over two roads: Tables 6.2 to 6.5, Figures 6.24 to
+6.51."""
 
 from __future__ import annotations
 
@@ -32,11 +33,19 @@ TESTS = {
     "road10": ("Table 6.5", "7.86", "173", "0.0609", "61"),
 }
 """Test → its table: force N and %, position m and %."""
-OFFSET = "0.06 m (60 %) in every test and every table: an offset of the zero, which Figures 6.24 to 6.51 contradict"
-SHARE = "in % of the ideal force's rms about its mean; the thesis does not say of what, but this gives its force figures"
+OFFSET = (
+    "0.06 m (60 %) in every test and every table: an offset of "
+    "the zero, which Figures 6.24 to 6.51 contradict"
+)
+SHARE = (
+    "in % of the ideal force's rms about its mean; the thesis does "
+    "not say of what, but this gives its force figures"
+)
 
 
-def _run(name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c) -> Result:
+def _run(
+    name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c
+) -> Result:
     test = trial(name, seed, change)
     found: dict[str, Array | float] = dict(errors(test))
     found |= _observations(test)
@@ -47,11 +56,15 @@ def _run(name: str, seed: int, change: Callable[[Configuration], Configuration] 
 
 
 def _observations(test: Trial) -> dict[str, float]:
-    """What the thesis sees in its plots: overshoot, swing of the force at rest, motion of the wheel."""
+    """What the thesis sees in its plots: overshoot, swing of the force at rest, motion of the
+    wheel."""
     period = test.configuration.timing.period
     early, late = slice(0, round(3 / period)), slice(round(12 / period), None)
     while_hopping = slice(round(1.5 / period), round(4.0 / period))
-    moving = [float(np.mean(np.abs(np.gradient(w, period)) > 1e-4)) for w in (test.wheel, test.should.wheel)]
+    moving = [
+        float(np.mean(np.abs(np.gradient(w, period)) > 1e-4))
+        for w in (test.wheel, test.should.wheel)
+    ]
     return {
         "overshoot": float(np.min(test.should.structure[early]) - np.min(test.plate[early])),
         "swing at rest": float(np.ptp(test.force[late])),
@@ -74,7 +87,9 @@ def hop(signal: Array, period: float) -> Array:
 def _body_frequency(position: Array, period: float) -> float:
     """Hz, of the second swing after the drop: three crossings of the mean of the first 4 s."""
     early = position[: round(4 / period)]
-    crossings = np.flatnonzero(np.diff(np.sign(early - np.mean(position[-round(2 / period) :]))) != 0)
+    crossings = np.flatnonzero(
+        np.diff(np.sign(early - np.mean(position[-round(2 / period) :]))) != 0
+    )
     return float(1.0 / (period * (crossings[2] - crossings[0]))) if len(crossings) > 2 else math.nan
 
 
@@ -87,7 +102,10 @@ def _spectra(test: Trial) -> dict[str, Array]:
         "ideal plate": test.should.structure,
         "ideal travel": test.should.structure - test.should.wheel,
     }
-    found = {f"spectrum {name}": 1e3 * np.sqrt(welch(signal[5000:], **options)[1])[1:82] for name, signal in pairs.items()}
+    found = {
+        f"spectrum {name}": 1e3 * np.sqrt(welch(signal[5000:], **options)[1])[1:82]
+        for name, signal in pairs.items()
+    }
     return {**found, "frequencies": welch(test.plate[5000:], **options)[0][1:82]}
 
 
@@ -116,11 +134,21 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
         ]
     band = over_seeds(results, "road0.2-1.6", "force_total")
     wide = over_seeds(results, "road1.6", "force_total")
-    text = f"force e1 + e2 {np.median(band):.2f} N from 0.2 Hz, {np.median(wide):.2f} N from 0.02 Hz"
-    note = "§6.3.2 and its figure say 0.02 Hz, chapter 7 calls the same road 0.2 Hz; the errors hardly tell them apart"
+    text = (
+        f"force e1 + e2 {np.median(band):.2f} N from 0.2 Hz, {np.median(wide):.2f} N from 0.02 Hz"
+    )
+    note = (
+        "§6.3.2 and its figure say 0.02 Hz, chapter 7 calls the same "
+        "road 0.2 Hz; the errors hardly tell them apart"
+    )
     entries.append(
         statement(
-            "§6.3.2", "band of the road", "0.02 to 1.6 Hz", bool(abs(np.median(band) / np.median(wide) - 1) < 0.3), text, note
+            "§6.3.2",
+            "band of the road",
+            "0.02 to 1.6 Hz",
+            bool(abs(np.median(band) / np.median(wide) - 1) < 0.3),
+            text,
+            note,
         )
     )
     return entries + _statements(results)
@@ -130,9 +158,17 @@ def _statements(results: Mapping[str, Result]) -> list[Entry]:
     def middle(name: str, value: str) -> float:
         return float(np.median(over_seeds(results, name, value)))
 
-    overshoot, body, should = (middle("drop", key) for key in ("overshoot", "body frequency", "ideal body frequency"))
-    swing, hopped, hops = middle("drop", "swing at rest"), middle("drop", "hop"), middle("drop", "ideal hop")
-    drift = over_seeds(results, "drop", "rest position") - over_seeds(results, "drop", "ideal rest position")
+    overshoot, body, should = (
+        middle("drop", key) for key in ("overshoot", "body frequency", "ideal body frequency")
+    )
+    swing, hopped, hops = (
+        middle("drop", "swing at rest"),
+        middle("drop", "hop"),
+        middle("drop", "ideal hop"),
+    )
+    drift = over_seeds(results, "drop", "rest position") - over_seeds(
+        results, "drop", "ideal rest position"
+    )
     share, ideal_share = middle("road10", "moving"), middle("road10", "ideal moving")
     still, driven = middle("drop", "force_total"), middle("road1.6", "force_total")
     lags = lagged_drops()
@@ -145,12 +181,26 @@ def _statements(results: Mapping[str, Result]) -> list[Entry]:
     wheel_text = f"{1e6 * hopped:.0f} um rms from 1.5 to 4 s, ideal {1e6 * hops:.0f} um"
     return [
         statement(
-            "Figure 6.25", "first swing of the sprung mass", "beyond the ideal", overshoot > 0, f"by {1e3 * overshoot:.1f} mm"
+            "Figure 6.25",
+            "first swing of the sprung mass",
+            "beyond the ideal",
+            overshoot > 0,
+            f"by {1e3 * overshoot:.1f} mm",
         ),
         statement(
-            "Figure 6.25", "body frequency", "slightly above the ideal", body > should, f"{body:.3f} Hz, ideal {should:.3f} Hz"
+            "Figure 6.25",
+            "body frequency",
+            "slightly above the ideal",
+            body > should,
+            f"{body:.3f} Hz, ideal {should:.3f} Hz",
         ),
-        statement("Figure 6.26", "lag of 20 ms on force, or on position", "alike: larger swing", alike, text),
+        statement(
+            "Figure 6.26",
+            "lag of 20 ms on force, or on position",
+            "alike: larger swing",
+            alike,
+            text,
+        ),
         statement(
             "Figure 6.26",
             "lag of 50 ms on the damping force alone",
@@ -158,8 +208,20 @@ def _statements(results: Mapping[str, Result]) -> list[Entry]:
             faster[0] > 1.005 and faster[0] > faster[1],
             f"x {faster[0]:.3f}, with 20 ms on all the force x {faster[1]:.3f}",
         ),
-        statement("Figure 6.30", "force at rest", "limit cycle by friction", swing > 28.0, f"{swing:.0f} N peak to peak"),
-        statement("Figure 6.29", "wheel hop after the drop", "absent on the rig", hopped < 0.25 * hops, wheel_text),
+        statement(
+            "Figure 6.30",
+            "force at rest",
+            "limit cycle by friction",
+            swing > 28.0,
+            f"{swing:.0f} N peak to peak",
+        ),
+        statement(
+            "Figure 6.29",
+            "wheel hop after the drop",
+            "absent on the rig",
+            hopped < 0.25 * hops,
+            wheel_text,
+        ),
         statement(
             "Figure 6.31",
             "drift at rest",
@@ -176,15 +238,21 @@ def _statements(results: Mapping[str, Result]) -> list[Entry]:
             f"moves {100 * share:.0f} % of the time, ideal {100 * ideal_share:.0f} %",
         ),
         statement(
-            "§6.3.2", "force error on the road", "below that of the drop", driven < still, f"{driven:.1f} N, drop {still:.1f} N"
+            "§6.3.2",
+            "force error on the road",
+            "below that of the drop",
+            driven < still,
+            f"{driven:.1f} N, drop {still:.1f} N",
         ),
-        statement("Figure 6.33", "1000 Ns/m at the wheel", "hop gone after one swing", *_damped_wheel()),
+        statement(
+            "Figure 6.33", "1000 Ns/m at the wheel", "hop gone after one swing", *_damped_wheel()
+        ),
     ]
 
 
 def lagged_drops() -> dict[str, tuple[float, Array]]:
-    """Ideal drop with a first-order lag of 20 ms on force or position or 50 ms on the damping force (Fig. 6.26): body
-    frequency, Hz, and sprung position, m, every millisecond."""
+    """Ideal drop with a first-order lag of 20 ms on force or position or 50 ms on the damping force
+    (Fig. 6.26): body frequency, Hz, and sprung position, m, every millisecond."""
     k, b, m, kt, mu = 1000.0, 50.0, 25.0, 50_000.0, 34.0
     time = np.arange(0.0, 5.0, 1e-3)
 
@@ -222,10 +290,14 @@ def _damped_wheel() -> tuple[bool, str]:
     configuration = find("drop").configuration
     left = []
     for damping in (0.0, 1000.0):
-        plant = configuration.plant._replace(tyre=configuration.plant.tyre._replace(damping=damping))
+        plant = configuration.plant._replace(
+            tyre=configuration.plant.tyre._replace(damping=damping)
+        )
         wheel = simulate_ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
         left.append(float(np.std(hop(wheel, 1e-3)[600:1600])))
-    return left[1] < 0.1 * left[0], f"{1e6 * left[1]:.1f} um rms left after 0.6 s, without {1e6 * left[0]:.0f} um"
+    return left[1] < 0.1 * left[
+        0
+    ], f"{1e6 * left[1]:.1f} um rms left after 0.6 s, without {1e6 * left[0]:.0f} um"
 
 
 def _histories(name: str, result: Result, covers: str, until: float) -> Drawing:
@@ -239,8 +311,16 @@ def _histories(name: str, result: Result, covers: str, until: float) -> Drawing:
         ("force", "suspension force, N"),
     )
     for axis, (kind, label) in zip([*axes[0], axes[1][0]], panels, strict=True):
-        axis.plot(time[shown], np.asarray(result[f"ideal {kind}"])[shown], color=IDEAL, linewidth=1.2, label="ideal")
-        axis.plot(time[shown], np.asarray(result[kind])[shown], color=SENSED, linewidth=0.8, label="twin")
+        axis.plot(
+            time[shown],
+            np.asarray(result[f"ideal {kind}"])[shown],
+            color=IDEAL,
+            linewidth=1.2,
+            label="ideal",
+        )
+        axis.plot(
+            time[shown], np.asarray(result[kind])[shown], color=SENSED, linewidth=0.8, label="twin"
+        )
         axis.set(xlabel="time, s", ylabel=label)
     axes[0][0].legend(fontsize=8)
     for axis, kind, unit in ((axes[1][1], "force", "N"), (axes[1][2], "plate", "mm")):
@@ -248,31 +328,51 @@ def _histories(name: str, result: Result, covers: str, until: float) -> Drawing:
         axis.plot(should, np.asarray(result[kind]), color="#2f9e44", linewidth=0.5)
         axis.plot(should, should, color=SENSED, linewidth=1.0)
         axis.set(xlabel=f"ideal {kind}, {unit}", ylabel=f"twin {kind}, {unit}")
-    return Drawing(f"test-{name}", covers, f"Test {name}: twin beside the ideal; error subspaces.", figure)
+    return Drawing(
+        f"test-{name}", covers, f"Test {name}: twin beside the ideal; error subspaces.", figure
+    )
 
 
 def _lag_drawing() -> Drawing:
     figure, axes = sheet(1, 1, width=7.5, height=3.2)
     axis = axes[0][0]
-    for (name, (frequency, position)), colour in zip(lagged_drops().items(), (IDEAL, SENSED, "#2f9e44", ASKED), strict=True):
+    for (name, (frequency, position)), colour in zip(
+        lagged_drops().items(), (IDEAL, SENSED, "#2f9e44", ASKED), strict=True
+    ):
         axis.plot(
-            np.arange(len(position)) * 1e-3, 1e3 * position, color=colour, label=f"{name}, {frequency:.3f} Hz", linewidth=1.0
+            np.arange(len(position)) * 1e-3,
+            1e3 * position,
+            color=colour,
+            label=f"{name}, {frequency:.3f} Hz",
+            linewidth=1.0,
         )
     axis.set(xlabel="time, s", ylabel="sprung mass, mm")
     axis.legend(fontsize=8)
-    caption = "A lag on the damping alone puts it out of phase with the spring: the body swings faster."
+    caption = (
+        "A lag on the damping alone puts it out of phase with the spring: the body swings faster."
+    )
     return Drawing("figure-6.26", "Figure 6.26", caption, figure)
 
 
 def _spectrum_drawing(result: Result) -> Drawing:
     figure, axes = sheet(1, 2)
     for axis, kind in zip(axes[0], ("plate", "travel"), strict=True):
-        for name, colour, label in ((f"spectrum ideal {kind}", IDEAL, "ideal"), (f"spectrum {kind}", SENSED, "twin")):
+        for name, colour, label in (
+            (f"spectrum ideal {kind}", IDEAL, "ideal"),
+            (f"spectrum {kind}", SENSED, "twin"),
+        ):
             axis.loglog(result["frequencies"], result[name], color=colour, label=label)
-        axis.set(xlabel="Hz", ylabel="mm/√Hz", title={"plate": "sprung mass", "travel": "suspension travel"}[kind])
+        axis.set(
+            xlabel="Hz",
+            ylabel="mm/√Hz",
+            title={"plate": "sprung mass", "travel": "suspension travel"}[kind],
+        )
     axes[0][0].legend(fontsize=8)
     return Drawing(
-        "figure-6.48", "Figure 6.48 and 6.49", "10 Hz road: the wheel hop of the ideal is missing on the rig.", figure
+        "figure-6.48",
+        "Figure 6.48 and 6.49",
+        "10 Hz road: the wheel hop of the ideal is missing on the rig.",
+        figure,
     )
 
 

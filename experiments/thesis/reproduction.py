@@ -1,4 +1,5 @@
-"""What came out of reproducing the thesis, as text, JSON, one HTML file, or a gallery page with its pictures."""
+"""What came out of reproducing the thesis, as text, JSON, one HTML file, or a gallery page with its
+pictures."""
 
 from __future__ import annotations
 
@@ -54,15 +55,22 @@ def cut(study: Study, conclusion: Conclusion, wanted: Asked) -> Chapter:
 
 
 def shares(entries: Sequence[Entry], every: bool) -> list[Share]:
-    """For each table with entries, and with `every` for each table of the thesis, how many of its entries agree."""
+    """For each table with entries, and with `every` for each table of the thesis, how many of its
+    entries agree."""
     found = []
     for name in TABLES:
         own = [entry for entry in entries if entry.where == name]
         if own:
             reasons = dict.fromkeys(entry.note or entry.what for entry in own if not entry.agrees)
-            found.append(Share(name, share(own), all(entry.agrees for entry in own), "; ".join(reasons)))
+            found.append(
+                Share(name, share(own), all(entry.agrees for entry in own), "; ".join(reasons))
+            )
         elif every:
-            found.append(Share(name, "-", name in NOTHING_TO_COMPUTE, NOTHING_TO_COMPUTE.get(name, "no entry")))
+            found.append(
+                Share(
+                    name, "-", name in NOTHING_TO_COMPUTE, NOTHING_TO_COMPUTE.get(name, "no entry")
+                )
+            )
     return found
 
 
@@ -72,21 +80,47 @@ def text(chapters: Sequence[Chapter], every: bool) -> str:
     for chapter in chapters:
         blocks.append(f"{chapter.study.title} (chapter {chapter.study.chapter})")
         for where, entries in chapter.groups().items():
-            rows: list[tuple[str, ...]] = [(where, "thesis", "ours", "difference", "unit", share(entries), "by")]
+            rows: list[tuple[str, ...]] = [
+                (where, "thesis", "ours", "difference", "unit", share(entries), "by")
+            ]
             notes: dict[str, int] = {}
             for entry in entries:
                 mark = "agrees" if entry.agrees else "differs"
                 if entry.note:
                     mark += f" [{notes.setdefault(entry.note, len(notes) + 1)}]"
-                rows.append((f"  {entry.what}", entry.thesis, entry.ours, entry.difference, entry.unit, mark, entry.rule))
-            blocks.append("\n".join([table(rows), *(f"  [{number}] {note}" for note, number in notes.items())]))
+                rows.append(
+                    (
+                        f"  {entry.what}",
+                        entry.thesis,
+                        entry.ours,
+                        entry.difference,
+                        entry.unit,
+                        mark,
+                        entry.rule,
+                    )
+                )
+            blocks.append(
+                "\n".join(
+                    [table(rows), *(f"  [{number}] {note}" for note, number in notes.items())]
+                )
+            )
         if chapter.conclusion.remarks:
             blocks.append("\n".join(f"* {remark}" for remark in chapter.conclusion.remarks))
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     rows = [("table", "agree", "why not")]
-    rows += [(one.table, one.agree, "" if one.whole and not one.why else one.why) for one in shares(entries, every)]
+    rows += [
+        (one.table, one.agree, "" if one.whole and not one.why else one.why)
+        for one in shares(entries, every)
+    ]
     if len(rows) > 1:
-        blocks.append(table([(name, agree, why if len(why) < 120 else why[:117] + "...") for name, agree, why in rows]))
+        blocks.append(
+            table(
+                [
+                    (name, agree, why if len(why) < 120 else why[:117] + "...")
+                    for name, agree, why in rows
+                ]
+            )
+        )
     if entries:
         blocks.append(f"in all {share(entries)} entries agree")
     return "\n\n".join(blocks)
@@ -105,7 +139,10 @@ def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
                 "chapter": chapter.study.chapter,
                 "entries": [asdict(entry) for entry in chapter.conclusion.entries],
                 "remarks": list(chapter.conclusion.remarks),
-                "figures": [{"covers": one.covers, "caption": one.caption} for one in chapter.conclusion.drawings],
+                "figures": [
+                    {"covers": one.covers, "caption": one.caption}
+                    for one in chapter.conclusion.drawings
+                ],
             }
             for chapter in chapters
         ],
@@ -147,14 +184,29 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     """Writes gallery.md and its pictures into a folder. Raises RigtwinError if it cannot."""
     lines = ["# The thesis reproduced", ""]
     lines += [
-        "Made by `make gallery`. Every figure is of the nominal twin or in closed form. Nothing is tuned to the thesis but"
+        "Made by `make gallery`. Every figure is of the nominal twin or "
+        "in closed form. Nothing is tuned to the thesis but"
     ]
-    lines += ["the gains of the force loop of Tables 4.1 and 4.2, which are found from the first row alone."]
-    lines += ["", "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).", ""]
+    lines += [
+        "the gains of the force loop of Tables 4.1 and 4.2, "
+        "which are found from the first row alone."
+    ]
+    lines += [
+        "",
+        "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).",
+        "",
+    ]
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
-    lines += [f"| {one.table} | {one.agree} | {one.why.replace('|', '/')} |" for one in shares(entries, every)]
-    lines += ["", f"In all {share(entries)} entries agree, statements of the text and figures included.", ""]
+    lines += [
+        f"| {one.table} | {one.agree} | {one.why.replace('|', '/')} |"
+        for one in shares(entries, every)
+    ]
+    lines += [
+        "",
+        f"In all {share(entries)} entries agree, statements of the text and figures included.",
+        "",
+    ]
     pictures = folder / "gallery"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
@@ -163,7 +215,12 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
             for drawing in chapter.conclusion.drawings:
                 name = f"{chapter.study.name}-{drawing.name}.png"
                 (pictures / name).write_bytes(_png(drawing, 70))
-                lines += [f"**{drawing.covers}.** {drawing.caption}", "", f"![{drawing.covers}](gallery/{name})", ""]
+                lines += [
+                    f"**{drawing.covers}.** {drawing.caption}",
+                    "",
+                    f"![{drawing.covers}](gallery/{name})",
+                    "",
+                ]
         out = folder / "gallery.md"
         out.write_text("\n".join(lines), encoding="utf-8")
     except OSError as error:

@@ -10,7 +10,8 @@ from rigtwin.studies.stability.locus import BODY, WHEEL, Locus
 from rigtwin.studies.stability.models import ideal_quarter_car, ideal_single_mass, poles
 
 ALIKE = 0.1
-"""Of an ideal pole's distance from the origin: how far a pole may be from it and still resemble it."""
+"""Of an ideal pole's distance from the origin: how far a pole may be from it and still resemble
+it."""
 
 
 def closest_at(end: str) -> Judge:
@@ -19,7 +20,9 @@ def closest_at(end: str) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         start, last = (_apart(locus, float(value)) for value in locus.values[[0, -1]])
         first, second = max(start.values()), max(last.values())
-        return bool((first < second) == (end == "start")), f"{percent(first)} off at the start, {percent(second)} at the end"
+        return bool(
+            (first < second) == (end == "start")
+        ), f"{percent(first)} off at the start, {percent(second)} at the end"
 
     return judge
 
@@ -44,7 +47,10 @@ def closer_than(other: Locus, name: str) -> Judge:
     """The worst distance from the ideal over the sweep is smaller than another locus has."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
-        ours, others = (max(max(_apart(each, float(value)).values()) for value in each.values[::10]) for each in (locus, other))
+        ours, others = (
+            max(max(_apart(each, float(value)).values()) for value in each.values[::10])
+            for each in (locus, other)
+        )
         return ours < others, f"{percent(ours)} off at most; {name} {percent(others)}"
 
     return judge
@@ -54,7 +60,10 @@ def wheel_closer_than(other: Locus, name: str) -> Judge:
     """The worst distance of the ideal wheel hop from a pole is smaller than another locus has."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
-        ours, others = (max(_apart(each, float(value))[WHEEL] for value in each.values[::10]) for each in (locus, other))
+        ours, others = (
+            max(_apart(each, float(value))[WHEEL] for value in each.values[::10])
+            for each in (locus, other)
+        )
         return ours < others, f"wheel hop {percent(ours)} off at most; {name} {percent(others)}"
 
     return judge
@@ -71,14 +80,21 @@ def wheel_resembles(end: str) -> Judge:
 
 
 def wheel_damping_closest_at(end: str) -> Judge:
-    """The decay rate of the wheel hop is nearer to the ideal one at that end of the sweep than at the other."""
+    """The decay rate of the wheel hop is nearer to the ideal one at that end of the sweep than at
+    the other."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
         off = []
         for value in map(float, locus.values[[0, -1]]):
-            ideal, ours = (slowest(locus, value, each, WHEEL) for each in (locus.ideal_at(value), locus.poles_at(value)))
+            ideal, ours = (
+                slowest(locus, value, each, WHEEL)
+                for each in (locus.ideal_at(value), locus.poles_at(value))
+            )
             off.append(abs(ours / ideal - 1.0))
-        words = f"decay rate of the wheel hop {percent(off[0])} off at the start, {percent(off[1])} at the end"
+        words = (
+            f"decay rate of the wheel hop {percent(off[0])} off "
+            f"at the start, {percent(off[1])} at the end"
+        )
         return (off[0] < off[1]) == (end == "start"), words
 
     return judge
@@ -89,18 +105,24 @@ def worst(mode: str, end: str) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         apart = _apart(locus, float(locus.values[0 if end == "start" else -1]))
-        words = f"body hop {percent(apart[BODY])}, wheel hop {percent(apart[WHEEL])} off at the {end}"
+        words = (
+            f"body hop {percent(apart[BODY])}, wheel hop {percent(apart[WHEEL])} off at the {end}"
+        )
         return apart[mode] == max(apart.values()), words
 
     return judge
 
 
 def body_on_ideal_trajectory(other: Locus, name: str) -> Judge:
-    """The oscillating body hop stays within a tenth of its size of the curve that the ideal one describes, unlike another."""
+    """The oscillating body hop stays within a tenth of its size of the curve that the ideal one
+    describes, unlike another."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
         ours, others = _off_trajectory(locus), _off_trajectory(other)
-        return ours < ALIKE < others, f"{percent(ours)} off the curve at most; {name} {percent(others)}"
+        return (
+            ours < ALIKE < others,
+            f"{percent(ours)} off the curve at most; {name} {percent(others)}",
+        )
 
     return judge
 
@@ -115,7 +137,9 @@ def body_unstable_at_end(locus: Locus) -> tuple[bool, str]:
 def undamped_at_boundary(locus: Locus) -> tuple[bool, str]:
     """The frequencies at the crossings are those of the vehicle without damping."""
     car = locus.at(locus.crossings[0].value).car._replace(suspension_damping=0.0, tyre_damping=0.0)
-    undamped = ideal_single_mass(car.sprung) if locus.model == "single-mass" else ideal_quarter_car(car)
+    undamped = (
+        ideal_single_mass(car.sprung) if locus.model == "single-mass" else ideal_quarter_car(car)
+    )
     expected = sorted(pole.imag for pole in poles(undamped) if pole.imag > 0.0)
     crossed = sorted(crossing.frequency for crossing in locus.crossings)
     holds = len(crossed) == len(expected) and bool(np.allclose(crossed, expected, rtol=1e-6))
@@ -127,14 +151,20 @@ def undamped_at_end(mode: str) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         value = float(locus.values[-1])
-        ideal, ours = (slowest(locus, value, each, mode) for each in (locus.ideal_at(value), locus.poles_at(value)))
-        return ideal < 0.0 and abs(ours) < TOGETHER * abs(ideal), f"real part {ours:.2g} 1/s, ideal {ideal:.4g}"
+        ideal, ours = (
+            slowest(locus, value, each, mode)
+            for each in (locus.ideal_at(value), locus.poles_at(value))
+        )
+        return ideal < 0.0 and abs(ours) < TOGETHER * abs(
+            ideal
+        ), f"real part {ours:.2g} 1/s, ideal {ideal:.4g}"
 
     return judge
 
 
 def _apart(locus: Locus, value: float) -> dict[str, float]:
-    """Mode → how far its ideal poles are from those that stand for them, of their distance from the origin."""
+    """Mode → how far its ideal poles are from those that stand for them, of their distance from the
+    origin."""
     ideal, poles, car = locus.ideal_at(value), locus.poles_at(value), locus.at(value).car
     distances = np.abs(ideal[:, None] - poles[None, :]) / np.abs(ideal)[:, None]
     rows, columns = linear_sum_assignment(distances)
@@ -148,11 +178,16 @@ def _apart(locus: Locus, value: float) -> dict[str, float]:
 def slowest(locus: Locus, value: float, found: np.ndarray, mode: str) -> float:
     """The largest real part of the oscillating poles of that mode, 1/s."""
     car = locus.at(value).car
-    return max(pole.real for pole in found.tolist() if pole.imag > OSCILLATES * abs(pole) and locus.mode(car, pole) == mode)
+    return max(
+        pole.real
+        for pole in found.tolist()
+        if pole.imag > OSCILLATES * abs(pole) and locus.mode(car, pole) == mode
+    )
 
 
 def _off_trajectory(locus: Locus) -> float:
-    """The largest distance of an oscillating body hop pole from the ideal poles of the sweep, of its own from the origin."""
+    """The largest distance of an oscillating body hop pole from the ideal poles of the sweep, of
+    its own from the origin."""
     curve = locus.ideal.ravel()
     worst_of_all = 0.0
     for value, row in zip(locus.values[::10], locus.poles[::10], strict=True):

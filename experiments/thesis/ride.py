@@ -1,4 +1,5 @@
-"""Chapter 7: what a suspension gives the body and the wheel, over many roads; shared by the studies of both structures."""
+"""Chapter 7: what a suspension gives the body and the wheel, over many roads; shared by the studies
+of both structures."""
 
 from __future__ import annotations
 
@@ -24,7 +25,10 @@ from rigtwin.simulation.structure_motion import states, wing
 
 SHOWN_SEED = 0
 OFFSET = "the same 0.06 m (58 %) in every table: an offset of the zero"
-LIMIT_CYCLE = "mostly the limit cycle by friction, whose size depends on the force loop's gains; the thesis does not give them"
+LIMIT_CYCLE = (
+    "mostly the limit cycle by friction, whose size depends on the "
+    "force loop's gains; the thesis does not give them"
+)
 TAXIING = 10.0
 """s after which the drop has decayed and the road alone moves the car."""
 COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
@@ -33,7 +37,12 @@ COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
 def states_of(test: Trial) -> Array:
     """The controller's packed state at every tick, shape (ticks, SIZE)."""
     demands = test.ran.commands[:, :3]
-    return states(test.configuration.controller, test.configuration.timing.period, test.ran.measurements, demands)
+    return states(
+        test.configuration.controller,
+        test.configuration.timing.period,
+        test.ran.measurements,
+        demands,
+    )
 
 
 def damping(test: Trial) -> Array:
@@ -41,15 +50,22 @@ def damping(test: Trial) -> Array:
     settings, found = test.configuration.controller, states_of(test)
     # The tick uses the structure's velocity of the tick before.
     sprung = np.concatenate([[0.0], found[:-1, 6]])
-    return np.array([semi_active_damping(settings, s, v) for s, v in zip(sprung.tolist(), found[:, 2].tolist(), strict=True)])
+    return np.array(
+        [
+            semi_active_damping(settings, s, v)
+            for s, v in zip(sprung.tolist(), found[:, 2].tolist(), strict=True)
+        ]
+    )
 
 
 def measures(test: Trial) -> dict[str, Array | float]:
-    """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their means, switches of the damper
-    a second, and the errors of appendix B."""
+    """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their
+    means, switches of the damper a second, and the errors of appendix B."""
     period = test.configuration.timing.period
     late = slice(round(TAXIING / period), None)
-    tyre, should_tyre = (wheel - test.ran.commands[:, 0] for wheel in (test.wheel, test.should.wheel))
+    tyre, should_tyre = (
+        wheel - test.ran.commands[:, 0] for wheel in (test.wheel, test.should.wheel)
+    )
     found: dict[str, Array | float] = dict(errors(test))
     found |= {
         "acceleration": body_acceleration(test.plate, period),
@@ -96,7 +112,9 @@ def _damper(test: Trial) -> Array:
     return test.ran.commands[:, 2] - settings.preload + settings.suspension_stiffness * found[:, 1]
 
 
-def reduction(results: dict[str, Result], better: str, base: str, value: str = "acceleration") -> Array:
+def reduction(
+    results: dict[str, Result], better: str, base: str, value: str = "acceleration"
+) -> Array:
     """In %, of each seed."""
     return 100 * (1 - over_seeds(results, better, value) / over_seeds(results, base, value))
 
@@ -108,25 +126,49 @@ def interval(values: Array, unit: str) -> str:
 
 def remark(results: dict[str, Result], name: str) -> str:
     """The body's acceleration by both measures, and the ideal's."""
-    body, everything, should = (over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything"))
+    body, everything, should = (
+        over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything")
+    )
     return (
-        f"{name}: body acceleration {interval(body, ' m/s²')}, with everything in it {interval(everything, '')}; "
+        f"{name}: body acceleration {interval(body, ' m/s²')}, with "
+        f"everything in it {interval(everything, '')}; "
         f"ideal {interval(should, '')}"
     )
 
 
 def reduced(
-    where: str, results: dict[str, Result], better: str, base: str, printed: str, within: float, note: str = ""
+    where: str,
+    results: dict[str, Result],
+    better: str,
+    base: str,
+    printed: str,
+    within: float,
+    note: str = "",
 ) -> Entry:
     """A printed reduction of the body's acceleration, in %, beside the interval over the seeds."""
-    return band(where, f"{better} against {base}", printed, reduction(results, better, base), "%", within, note)
+    return band(
+        where,
+        f"{better} against {base}",
+        printed,
+        reduction(results, better, base),
+        "%",
+        within,
+        note,
+    )
 
 
 def tracking(
-    table: str, results: dict[str, Result], name: str, printed: tuple[str, str, str, str], within: float
+    table: str,
+    results: dict[str, Result],
+    name: str,
+    printed: tuple[str, str, str, str],
+    within: float,
 ) -> list[Entry]:
     """A table of appendix B: force N and %, position m and %."""
-    force, position = over_seeds(results, name, "force_total"), over_seeds(results, name, "position_total")
+    force, position = (
+        over_seeds(results, name, "force_total"),
+        over_seeds(results, name, "position_total"),
+    )
     force_share = 100 * force / over_seeds(results, name, "ideal_force")
     position_share = 100 * position / over_seeds(results, name, "ideal_position")
     return [
@@ -137,7 +179,9 @@ def tracking(
     ]
 
 
-def histories(name: str, covers: str, caption: str, runs: dict[str, Result], until: float = 20.0) -> Drawing:
+def histories(
+    name: str, covers: str, caption: str, runs: dict[str, Result], until: float = 20.0
+) -> Drawing:
     """Sprung mass, travel and tyre of several runs, label → result."""
     figure, axes = sheet(3, 1, height=2.2)
     for label, result in runs.items():
@@ -145,7 +189,13 @@ def histories(name: str, covers: str, caption: str, runs: dict[str, Result], unt
         shown = time <= until
         tyre = np.asarray(result["wheel"]) - np.asarray(result["ground"])
         for row, values in zip(axes, (result["plate"], result["travel"], tyre), strict=True):
-            row[0].plot(time[shown], np.asarray(values)[shown], linewidth=0.9, label=label, color=COLOUR.get(label))
+            row[0].plot(
+                time[shown],
+                np.asarray(values)[shown],
+                linewidth=0.9,
+                label=label,
+                color=COLOUR.get(label),
+            )
     for row, label in zip(axes, ("sprung mass, mm", "travel, mm", "tyre, mm"), strict=True):
         row[0].set(ylabel=label)
     axes[0][0].legend(fontsize=8, ncols=4, loc="lower right")
@@ -153,4 +203,6 @@ def histories(name: str, covers: str, caption: str, runs: dict[str, Result], unt
     return Drawing(name, covers, caption, figure)
 
 
-MEASURED = f"acceleration of the plate up to {BODY:g} Hz: the thesis does not say how it was measured"
+MEASURED = (
+    f"acceleration of the plate up to {BODY:g} Hz: the thesis does not say how it was measured"
+)

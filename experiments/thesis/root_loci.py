@@ -1,4 +1,5 @@
-"""Appendix A: root loci of the quarter car with suspension MIL, vehicle structure MIL and both, one parameter swept each."""
+"""Appendix A: root loci of the quarter car with suspension MIL, vehicle structure MIL and both, one
+parameter swept each."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 
 CAPTION = (
-    "Grey: the ideal quarter car. Coloured: with the lag, from dark at the start of the sweep to light at its end. "
+    "Grey: the ideal quarter car. Coloured: with the lag, from dark "
+    "at the start of the sweep to light at its end. "
     "Crosses: where poles cross the imaginary axis."
 )
 VARIED = {
@@ -37,9 +39,25 @@ def _tables() -> list[Entry]:
     for appendix, model in MODELS.items():
         for number, ratio, printed in ((1, 1.0, "316.2"), (2, 0.5, "158.1")):
             ours = damping(ratio, ARBITRARY.suspension_stiffness)
-            found.append(digits(f"Table {appendix}.1", f"b_s of case {number}, ζ = {ratio:g}", printed, ours, "Ns/m"))
+            found.append(
+                digits(
+                    f"Table {appendix}.1",
+                    f"b_s of case {number}, ζ = {ratio:g}",
+                    printed,
+                    ours,
+                    "Ns/m",
+                )
+            )
         end = math.sqrt(1e5 / ARBITRARY.sprung_mass)
-        found.append(digits(f"Table {appendix}.2", "natural frequency at the end, cases 1 to 3", "44.72", end, "rad/s"))
+        found.append(
+            digits(
+                f"Table {appendix}.2",
+                "natural frequency at the end, cases 1 to 3",
+                "44.72",
+                end,
+                "rad/s",
+            )
+        )
         found.append(_ratio(f"Table {appendix}.3"))
         for table, variation in (("4", TYRES[PRINTED_LAG]), ("5", WHEELS[PRINTED_LAG])):
             largest = _largest_critical(model, variation)
@@ -60,10 +78,15 @@ def _ratio(table: str) -> Entry:
     """What stiffness and mass varied together vary."""
     variation = of_damping_ratio(FILTER_LAG)
     ends = [variation.at(value).car.sprung for value in (variation.start, variation.end)]
-    frequencies, ratios = [mass.natural_frequency for mass in ends], [mass.damping_ratio for mass in ends]
+    frequencies, ratios = (
+        [mass.natural_frequency for mass in ends],
+        [mass.damping_ratio for mass in ends],
+    )
     words = f"{frequencies[0]:g} to {frequencies[1]:g} rad/s, ζ from {ratios[0]:g} to {ratios[1]:g}"
     varies = frequencies[0] == frequencies[1] and ratios[0] > ratios[1]
-    return statement(table, "k_s = m_s, 1 to 100 000", "varies the damping ratio alone", varies, words)
+    return statement(
+        table, "k_s = m_s, 1 to 100 000", "varies the damping ratio alone", varies, words
+    )
 
 
 def _largest_critical(model: str, variation: Variation) -> float:
@@ -75,7 +98,10 @@ def _largest_critical(model: str, variation: Variation) -> float:
 
 def entries() -> list[Entry]:
     """Every statement beside what was found."""
-    return [*_tables(), *(entry for cases_of in CASES.values() for case in cases_of() for entry in case.entries())]
+    return [
+        *_tables(),
+        *(entry for cases_of in CASES.values() for case in cases_of() for entry in case.entries()),
+    ]
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
@@ -84,17 +110,23 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     for table, cases_of in CASES.items():
         cases = cases_of()
         appendix, _, varied = table.partition(".")
-        names = dict.fromkeys(f"Figure {panel.name.partition(',')[0]}" for case in cases for panel in case.panels)
+        names = dict.fromkeys(
+            f"Figure {panel.name.partition(',')[0]}" for case in cases for panel in case.panels
+        )
         caption = f"Table {table}, {MODELS[appendix]} MIL: {VARIED[varied]} varied. {CAPTION}"
         drawings.append(drawing(f"root-loci-{table}", ", ".join(names), caption, cases))
     return Conclusion(entries(), drawings, REMARKS)
 
 
 REMARKS = (
-    "Body hop and wheel hop are told apart as in §5.3.1, by whether the masses move the same way or against each other.",
-    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for case 1. The loop is then unstable for every value of "
-    "the sweep, and most of what the sections say is false; with 0.0333 s it is true. Both are drawn.",
-    "Table A1.3 prints b_u for b_t, Table A3.4 is captioned Table A1.3, and §A2.2 calls cases 4 to 6 cases 3 to 5.",
+    "Body hop and wheel hop are told apart as in §5.3.1, by whether "
+    "the masses move the same way or against each other.",
+    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for "
+    "case 1. The loop is then unstable for every value of "
+    "the sweep, and most of what the sections say is false; "
+    "with 0.0333 s it is true. Both are drawn.",
+    "Table A1.3 prints b_u for b_t, Table A3.4 is captioned Table "
+    "A1.3, and §A2.2 calls cases 4 to 6 cases 3 to 5.",
 )
 STUDY = Study(
     "root-loci",

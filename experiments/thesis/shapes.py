@@ -1,4 +1,5 @@
-"""What can be asked of a root locus's course: asymptotes, and where poles leave the real axis and come back to it."""
+"""What can be asked of a root locus's course: asymptotes, and where poles leave the real axis and
+come back to it."""
 
 from __future__ import annotations
 
@@ -9,21 +10,37 @@ from rigtwin.studies.stability.locus import Locus
 
 
 def asymptote(end: str) -> Judge:
-    """Towards that end, `start` or `end`, a pair's frequency grows without bound while its real part comes to rest."""
+    """Towards that end, `start` or `end`, a pair's frequency grows without bound while its real
+    part comes to rest."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
         near, far = _beyond(locus, end)
-        holds = far.imag > 5.0 * near.imag and abs(far.real - near.real) < 0.05 * abs(far.real) and far.real < 0.0
-        return bool(holds), f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+        holds = (
+            far.imag > 5.0 * near.imag
+            and abs(far.real - near.real) < 0.05 * abs(far.real)
+            and far.real < 0.0
+        )
+        return bool(
+            holds
+        ), f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
 
     return judge
 
 
 def asymptote_at_zero(locus: Locus) -> tuple[bool, str]:
-    """Towards the end of the sweep a pair's frequency grows without bound while its real part vanishes from the left."""
+    """Towards the end of the sweep a pair's frequency grows without bound while its real part
+    vanishes from the left."""
     near, far = _beyond(locus, "end")
-    holds = far.imag > 5.0 * near.imag and near.real < far.real < 0.0 and abs(far.real) < 0.05 * abs(near.real)
-    return bool(holds), f"real part {near.real:.3g} → {far.real:.3g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+    holds = (
+        far.imag > 5.0 * near.imag
+        and near.real < far.real < 0.0
+        and abs(far.real) < 0.05 * abs(near.real)
+    )
+    return (
+        bool(holds),
+        f"real part {near.real:.3g} → {far.real:.3g} 1/s, frequency "
+        f"{near.imag:.3g} → {far.imag:.3g} rad/s",
+    )
 
 
 def no_asymptote_at_zero(locus: Locus) -> tuple[bool, str]:
@@ -32,12 +49,16 @@ def no_asymptote_at_zero(locus: Locus) -> tuple[bool, str]:
 
 
 def asymptote_left_of(other: Locus, name: str) -> Judge:
-    """Both have an asymptote at the start of the sweep; this one is further left and has a higher frequency there."""
+    """Both have an asymptote at the start of the sweep; this one is further left and has a higher
+    frequency there."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
         ours, others = _beyond(locus, "start"), _beyond(other, "start")
         holds = ours[1].real < others[1].real and _highest(locus, 0).imag > _highest(other, 0).imag
-        words = f"{ours[1].real:.4g} 1/s, {_highest(locus, 0).imag:.3g} rad/s at the start; {name} {others[1].real:.4g} 1/s, "
+        words = (
+            f"{ours[1].real:.4g} 1/s, {_highest(locus, 0).imag:.3g} rad/s "
+            f"at the start; {name} {others[1].real:.4g} 1/s, "
+        )
         return bool(holds), words + f"{_highest(other, 0).imag:.3g} rad/s"
 
     return judge
@@ -88,7 +109,9 @@ def wheel_goes_left(locus: Locus) -> tuple[bool, str]:
     """In the last third of the sweep the fastest oscillation's real part falls."""
     third = locus.poles[2 * len(locus.poles) // 3 :]
     real = [max(row.tolist(), key=lambda pole: pole.imag).real for row in third]
-    return bool(np.all(np.diff(real) < 0.0)), f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
+    return bool(
+        np.all(np.diff(real) < 0.0)
+    ), f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
 
 
 def ends_left_of(other: Locus, name: str) -> Judge:
@@ -135,7 +158,10 @@ def pairs_at_end(ideal: int, ours: int) -> Judge:
 def _pairs_at(row: int, end: str, ideal: int, ours: int) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         found = oscillating_pairs(locus.ideal[row]), oscillating_pairs(locus.poles[row])
-        return found == (ideal, ours), f"{found[0]} ideal and {found[1]} MIL pairs oscillate at the {end}"
+        return found == (
+            ideal,
+            ours,
+        ), f"{found[0]} ideal and {found[1]} MIL pairs oscillate at the {end}"
 
     return judge
 
@@ -161,5 +187,8 @@ def _beyond(locus: Locus, end: str) -> tuple[complex, complex]:
     """The pole of the highest frequency at that end of the sweep and far past it."""
     value = float(locus.values[0] if end == "start" else locus.values[-1])
     factors = (1.0 / BEYOND, BEYOND**-2) if end == "start" else (BEYOND, BEYOND**2)
-    near, far = (max(locus.poles_at(value * factor).tolist(), key=lambda pole: pole.imag) for factor in factors)
+    near, far = (
+        max(locus.poles_at(value * factor).tolist(), key=lambda pole: pole.imag)
+        for factor in factors
+    )
     return near, far

@@ -1,5 +1,5 @@
-"""Thesis §3.5: the Boeing 707's landing gear scaled down to the rig. Tables 3.1 to 3.3 and the gas spring, and a landing that
-is simulated in full size and at the rig's scale."""
+"""Thesis §3.5: the Boeing 707's landing gear scaled down to the rig. Tables 3.1 to 3.3 and the gas
+spring, and a landing that is simulated in full size and at the rig's scale."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ from rigtwin.studies.similitude import (
 )
 
 BOEING = Landing()
-UNITS = {name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)}
+UNITS = {
+    name: meaning.unit for name, meaning in fields(Landing).items() if isinstance(meaning, Quantity)
+}
 UNITS |= {"stroke": "m", "time": "s"}
 RIG_STROKE = 0.18
 """m, Table 3.2."""
@@ -49,7 +51,10 @@ INSTANTS = np.linspace(0.0, 3.0, 1501)
 
 def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
     """Rig over aircraft. mass: sprung mass of the rig, kg; stroke: of the landing gear, m."""
-    return scaling(UNITS, {"sprung_mass": mass / BOEING.sprung_mass, "stroke": RIG_STROKE / stroke, "time": time})
+    return scaling(
+        UNITS,
+        {"sprung_mass": mass / BOEING.sprung_mass, "stroke": RIG_STROKE / stroke, "time": time},
+    )
 
 
 def at_scale(landing: Landing, scale: Scaling) -> Landing:
@@ -58,7 +63,8 @@ def at_scale(landing: Landing, scale: Scaling) -> Landing:
 
 
 def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
-    """The scaled landing, simulated at its own size and pace, in the measures of the original; instants: of the original, s."""
+    """The scaled landing, simulated at its own size and pace, in the measures of the original;
+    instants: of the original, s."""
     factors = np.array([scale.factor(unit) for unit in ("m", "m/s", "N")])
     return touch_down(landing, instants * scale.time) / factors[:, None]
 
@@ -74,16 +80,25 @@ def _table_1() -> list[Entry]:
     return [
         digits("Table 3.1", "sprung mass", "68210", vehicle.sprung_mass, "kg", note),
         digits("Table 3.1", "unsprung mass", "1140", vehicle.unsprung_mass, "kg", note),
-        digits("Table 3.1", "suspension stiffness", "11250000", vehicle.suspension_stiffness, "N/m", note),
-        digits("Table 3.1", "suspension damping", "105400", vehicle.suspension_damping, "Ns/m", note),
+        digits(
+            "Table 3.1",
+            "suspension stiffness",
+            "11250000",
+            vehicle.suspension_stiffness,
+            "N/m",
+            note,
+        ),
+        digits(
+            "Table 3.1", "suspension damping", "105400", vehicle.suspension_damping, "Ns/m", note
+        ),
         digits("Table 3.1", "tyre stiffness", "8461000", tyre.stiffness, "N/m", note),
         digits("Table 3.1", "tyre damping", "0", tyre.damping, "Ns/m", note),
     ]
 
 
 def _springs() -> dict[str, tuple[GasSpring, float]]:
-    """By words, the gas spring and its stroke, m: as printed, with the exponent of four times the static load; and the one
-    that the printed stiffness asks for."""
+    """By words, the gas spring and its stroke, m: as printed, with the exponent of four times the
+    static load; and the one that the printed stiffness asks for."""
     load, length = BOEING.sprung_mass * BOEING.gravity, BOEING.gas_length
     _, printed = PRINTED
     exponent = math.log(4.0 * load / BOEING.gas_force) / math.log(length / (length - printed))
@@ -97,48 +112,119 @@ def _springs() -> dict[str, tuple[GasSpring, float]]:
 def _equation_3() -> list[Entry]:
     where, load = "Equation 3.3", BOEING.sprung_mass * BOEING.gravity
     _, stroke = RECONSTRUCTED
-    lengths = [design(load / 4.0, f * load, x, BOEING.exponent).length for f, x in ((4.0, PRINTED[1]), (3.0, stroke))]
+    lengths = [
+        design(load / 4.0, f * load, x, BOEING.exponent).length
+        for f, x in ((4.0, PRINTED[1]), (3.0, stroke))
+    ]
     wrong = "0.589 m and four times are not what this was computed with"
     entries = [
-        digits(where, "force fully extended, a quarter of the static load", "167285", load / 4.0, "N"),
-        digits(where, "length for 0.589 m, exponent 1.4, four times the static load", "0.673", lengths[0], "m", wrong),
-        digits(where, "length for 0.559 m, exponent 1.4, three times the static load", "0.673", lengths[1], "m"),
+        digits(
+            where, "force fully extended, a quarter of the static load", "167285", load / 4.0, "N"
+        ),
+        digits(
+            where,
+            "length for 0.589 m, exponent 1.4, four times the static load",
+            "0.673",
+            lengths[0],
+            "m",
+            wrong,
+        ),
+        digits(
+            where,
+            "length for 0.559 m, exponent 1.4, three times the static load",
+            "0.673",
+            lengths[1],
+            "m",
+        ),
         digits(
             where,
             "stroke at which an exponent of 1.4 has 24.7 MN/m",
             "0.589",
             _reaches(BOEING.spring, 24.7e6),
             "m",
-            "0.559 m (22 in) is right: length, stiffness and equilibrium here, velocity and gas force in Table 3.3 all need it",
+            "0.559 m (22 in) is right: length, stiffness and equilibrium here, "
+            "velocity and gas force in Table 3.3 all need it",
         ),
     ]
     for words, (spring, travel) in _springs().items():
         at_rest = equilibrium(spring, load)
         differs = wrong if travel == PRINTED[1] else ""
-        small = f"the stroke is not in it; 3.79 MN/m is reached {1e3 * (_reaches(spring, 3.79e6) - at_rest):.1f} mm further on"
+        small = (
+            "the stroke is not in it; 3.79 MN/m is reached "
+            f"{1e3 * (_reaches(spring, 3.79e6) - at_rest):.1f} mm further on"
+        )
         entries += [
-            digits(where, f"stiffness at equilibrium, {words}", "3.79", 1e-6 * stiffness(spring, at_rest), "MN/m", small),
-            digits(where, f"stiffness fully compressed, {words}", "24.7", 1e-6 * stiffness(spring, travel), "MN/m", differs),
-            digits(where, f"equilibrium over stroke, {words}", "76", 100.0 * at_rest / travel, "%", differs),
+            digits(
+                where,
+                f"stiffness at equilibrium, {words}",
+                "3.79",
+                1e-6 * stiffness(spring, at_rest),
+                "MN/m",
+                small,
+            ),
+            digits(
+                where,
+                f"stiffness fully compressed, {words}",
+                "24.7",
+                1e-6 * stiffness(spring, travel),
+                "MN/m",
+                differs,
+            ),
+            digits(
+                where,
+                f"equilibrium over stroke, {words}",
+                "76",
+                100.0 * at_rest / travel,
+                "%",
+                differs,
+            ),
         ]
     spring, travel = BOEING.spring, stroke
     pressed = spring_force(spring, travel) / load
     beyond = "sized for three times: its length, 24.7 MN/m and 76 % ask for that"
-    entries.append(digits(where, "force fully compressed over static load, exponent 1.4", "4", pressed, "1", beyond))
+    entries.append(
+        digits(
+            where,
+            "force fully compressed over static load, exponent 1.4",
+            "4",
+            pressed,
+            "1",
+            beyond,
+        )
+    )
     soft, hard = (1e-6 * stiffness(spring, x) for x in (equilibrium(spring, load), travel))
     rated = 1e-6 * VEHICLES["boeing-707"].suspension_stiffness
     says = "11.25 MN/m lies between equilibrium and full compression"
-    return [*entries, statement(where, "rated stiffness", says, soft < rated < hard, f"{soft:.2f} < {rated:.2f} < {hard:.2f}")]
+    return [
+        *entries,
+        statement(
+            where,
+            "rated stiffness",
+            says,
+            soft < rated < hard,
+            f"{soft:.2f} < {rated:.2f} < {hard:.2f}",
+        ),
+    ]
 
 
 def _reaches(spring: GasSpring, wanted: float) -> float:
-    """Compression at which the stiffness is the one wanted, N/m: where γ F L^γ = k (L − x)^(γ + 1)."""
+    """Compression at which the stiffness is the one wanted, N/m: where γ F L^γ = k (L − x)^(γ +
+    1)."""
     constant = spring.exponent * spring.force * spring.length**spring.exponent
     return spring.length - (constant / wanted) ** (1.0 / (spring.exponent + 1.0))
 
 
 def _equation_6() -> list[Entry]:
-    units = {"m_u": "kg", "m_s": "kg", "x_u": "m", "x_s": "m", "u": "m", "L": "m", "P_iA_g": "N", "b_s": "Ns/m"}
+    units = {
+        "m_u": "kg",
+        "m_s": "kg",
+        "x_u": "m",
+        "x_s": "m",
+        "u": "m",
+        "L": "m",
+        "P_iA_g": "N",
+        "b_s": "Ns/m",
+    }
     units |= {"b_t": "Ns/m", "k_t": "N/m", "g": "m/s^2", "t": "s"}
     groups = pi_groups(units, ("m_s", "x_s", "t"))
     ours = ", ".join(str(group) for group in groups)
@@ -154,37 +240,93 @@ def _equation_6() -> list[Entry]:
         {"g": 1, "t": 2, "x_s": -1},
     )
     same = [dict(group.exponents) for group in groups] == [dict(group) for group in printed]
-    note = "numbered to π8 because there are two π4; the exponent γ, a group of its own, is not counted"
+    note = (
+        "numbered to π8 because there are two π4; the exponent "
+        "γ, a group of its own, is not counted"
+    )
     scale = scaling(units, {"m_s": 0.0123, "x_s": 0.345, "t": 6.78})
-    relations = ("m_s = m_u", "x_s = x_u", "x_s = u", "x_s = L", "m_s x_s = P_iA_g t t", "m_s = b_s t", "m_s = b_t t")
+    relations = (
+        "m_s = m_u",
+        "x_s = x_u",
+        "x_s = u",
+        "x_s = L",
+        "m_s x_s = P_iA_g t t",
+        "m_s = b_s t",
+        "m_s = b_t t",
+    )
     relations += ("m_s = k_t t t", "x_s = g t t")
     sides = [
-        [math.prod(scale.factor(units[name]) for name in side.split()) for side in each.split(" = ")] for each in relations
+        [
+            math.prod(scale.factor(units[name]) for name in side.split())
+            for side in each.split(" = ")
+        ]
+        for each in relations
     ]
     apart = max(abs(left / right - 1.0) for left, right in sides)
     # The groups are kept by any scale factors of these relations, and by no others.
     before = dict.fromkeys(units, 1.0)
     change = max(apart, largest_change(units, before, scale_values(before, units, scale)))
     return [
-        statement("Equation 3.6", "groups of 12 variables", "n − m dimensionless groups, listed", same, ours, note),
         statement(
-            "Equation 3.8", "nine relations of factors", "keep every group", change < 1e-12, f"to {change:.0e}, time scale too"
+            "Equation 3.6",
+            "groups of 12 variables",
+            "n − m dimensionless groups, listed",
+            same,
+            ours,
+            note,
+        ),
+        statement(
+            "Equation 3.8",
+            "nine relations of factors",
+            "keep every group",
+            change < 1e-12,
+            f"to {change:.0e}, time scale too",
         ),
     ]
 
 
 def _table_2() -> list[Entry]:
     where, (_, stroke) = "Table 3.2", RECONSTRUCTED
-    wheel, damper, fast = number("8.36") / BOEING.unsprung_mass, number("772") / BOEING.damping, number("0.966")
+    wheel, damper, fast = (
+        number("8.36") / BOEING.unsprung_mass,
+        number("772") / BOEING.damping,
+        number("0.966"),
+    )
     because = "wheel mass and damping of Table 3.3 both ask for 500 kg; 500 is right"
     back = "worked back from Table 3.3"
     return [
-        digits(where, "rig suspension stroke, of 0.559 m", "0.18", fast / BOEING.velocity * stroke, "m", back),
         digits(
-            where, "rig suspension stroke, of 0.589 m", "0.18", fast / BOEING.velocity * PRINTED[1], "m", "0.559 m is right"
+            where,
+            "rig suspension stroke, of 0.559 m",
+            "0.18",
+            fast / BOEING.velocity * stroke,
+            "m",
+            back,
         ),
-        digits(where, "rig sprung mass, by the wheel mass", "200", wheel * BOEING.sprung_mass, "kg", because),
-        digits(where, "rig sprung mass, by the damping", "200", damper * BOEING.sprung_mass, "kg", because),
+        digits(
+            where,
+            "rig suspension stroke, of 0.589 m",
+            "0.18",
+            fast / BOEING.velocity * PRINTED[1],
+            "m",
+            "0.559 m is right",
+        ),
+        digits(
+            where,
+            "rig sprung mass, by the wheel mass",
+            "200",
+            wheel * BOEING.sprung_mass,
+            "kg",
+            because,
+        ),
+        digits(
+            where,
+            "rig sprung mass, by the damping",
+            "200",
+            damper * BOEING.sprung_mass,
+            "kg",
+            because,
+        ),
         digits(where, "time scaling factor, mass over damping", "1", wheel / damper, "1", back),
         digits(where, "landing velocity, of 0.559 m", "3", fast / RIG_STROKE * stroke, "m/s", back),
     ]
@@ -196,15 +338,23 @@ def _table_3() -> list[Entry]:
         rig = at_scale(BOEING, similar(mass, stroke))
         words = f"{mass:g} kg and {stroke:g} m"
         printed = (mass, stroke) == PRINTED
-        note = "Table 3.3 was not computed from Table 3.2; it needs 500 kg and 0.559 m" if printed else ""
+        note = (
+            "Table 3.3 was not computed from Table 3.2; it needs 500 kg and 0.559 m"
+            if printed
+            else ""
+        )
         product = rig.damping * rig.velocity
         # The thesis multiplies its own rounded figures.
         rounded = product if printed else round(rig.damping) * round(rig.velocity, 3)
         cut, multiplied = (
-            (note, note) if printed else ("772.6, cut off and not rounded", f"773 × 0.966; unrounded {product:.1f}")
+            (note, note)
+            if printed
+            else ("772.6, cut off and not rounded", f"773 × 0.966; unrounded {product:.1f}")
         )
         entries += [
-            digits("Table 3.3", f"gas spring force constant, {words}", "395", rig.gas_force, "N", note),
+            digits(
+                "Table 3.3", f"gas spring force constant, {words}", "395", rig.gas_force, "N", note
+            ),
             digits("Table 3.3", f"damping coefficient, {words}", "772", rig.damping, "Ns/m", cut),
             digits("Table 3.3", f"maximum velocity, {words}", "0.966", rig.velocity, "m/s", note),
             digits("Table 3.3", f"maximum damping force, {words}", "747", rounded, "N", multiplied),
@@ -218,36 +368,60 @@ def _cylinder() -> list[Entry]:
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
     charge, plain = (find_charge(rig.spring, each, RIG_STROKE) for each in (area, number("0.0012")))
     bar = 1e-5
-    whose = "annulus of a 50 mm bore with a 32 mm rod; an area of 0.00116 m² gives all three printed figures"
+    whose = (
+        "annulus of a 50 mm bore with a 32 mm rod; an area of "
+        "0.00116 m² gives all three printed figures"
+    )
     litres = "a thousand times too large: litres, not m³"
     ratio = charge.gas / charge.cylinder
     odd = BOEING.exponent * BOEING.gas_length / PRINTED[1]
     gas = (
-        f"by the thesis' own rule cylinder : gas = stroke : length, 1 : {ratio:.3f}; printed 1 : {334 / 209:.3f}, "
+        "by the thesis' own rule cylinder : gas = stroke : length, "
+        f"1 : {ratio:.3f}; printed 1 : {334 / 209:.3f}, "
         f"near 1.4 · 0.673/0.589 = {odd:.3f}, as if multiplied by the exponent"
     )
     motor, limit = Motor(), Cylinder().speed_limit
     damper = rig.damping * rig.velocity
     return [
         digits(where, "cylinder's area", "0.0012", area, "m²", whose),
-        digits(where, "cylinder's volume, in m³ as printed", "209e-3", charge.cylinder, "m³", litres),
+        digits(
+            where, "cylinder's volume, in m³ as printed", "209e-3", charge.cylinder, "m³", litres
+        ),
         digits(where, "cylinder's volume, in litres", "209e-3", 1e3 * charge.cylinder, "l"),
         digits(where, "initial pressure", "3.41", bar * charge.pressure, "bar"),
-        digits(where, "initial pressure, area as printed", "3.41", bar * plain.pressure, "bar", "0.0012 m² is rounded"),
+        digits(
+            where,
+            "initial pressure, area as printed",
+            "3.41",
+            bar * plain.pressure,
+            "bar",
+            "0.0012 m² is rounded",
+        ),
         digits(where, "accumulator's volume, in m³ as printed", "334e-3", charge.gas, "m³", litres),
         digits(where, "accumulator's volume, in litres", "334e-3", 1e3 * charge.gas, "l", gas),
         digits(where, "stroke of the electric actuator", "0.21", motor.stroke, "m", "the twin's"),
-        digits(where, "force of the electric actuator", "1860", motor.force_limit, "N", "the twin's"),
-        digits(where, "maximum velocity of the hydraulic actuator", "0.3", limit, "m/s", "the twin's"),
+        digits(
+            where, "force of the electric actuator", "1860", motor.force_limit, "N", "the twin's"
+        ),
+        digits(
+            where, "maximum velocity of the hydraulic actuator", "0.3", limit, "m/s", "the twin's"
+        ),
         statement(
             where,
             "damping force against the actuator",
             "well within its capability",
             damper < motor.force_limit,
             f"{damper:.0f} N of {motor.force_limit:g} N",
-            f"the gas spring's {spring_force(rig.spring, RIG_STROKE):.0f} N fully compressed are not; it has to be hardware",
+            f"the gas spring's {spring_force(rig.spring, RIG_STROKE):.0f} "
+            "N fully compressed are not; it has to be hardware",
         ),
-        statement(where, "velocity", "greater than 0.3 m/s", rig.velocity > limit, f"{rig.velocity:.3f} m/s"),
+        statement(
+            where,
+            "velocity",
+            "greater than 0.3 m/s",
+            rig.velocity > limit,
+            f"{rig.velocity:.3f} m/s",
+        ),
         statement(
             where,
             "gravity without a scale of time",
@@ -268,7 +442,10 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
     wrong = mapped_back(mixed, real, INSTANTS)
     apart = [difference(full, back) for back in backs]
     off = difference(full, wrong)
-    fastest = [float(np.max(np.abs(back[1]))) * scale.factor("m/s") for (scale, _), back in zip(pairs, backs, strict=True)]
+    fastest = [
+        float(np.max(np.abs(back[1]))) * scale.factor("m/s")
+        for (scale, _), back in zip(pairs, backs, strict=True)
+    ]
     limit = Cylinder().speed_limit
     entries = [
         statement(
@@ -276,9 +453,12 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
             f"simulated landing mapped back, {words}",
             "can be scaled back to the original system",
             worst < 1e-6,
-            f"largest difference {worst:.0e} of the peak; sprung mass up to {speed:.3f} m/s on the rig",
+            f"largest difference {worst:.0e} of the peak; sprung "
+            f"mass up to {speed:.3f} m/s on the rig",
         )
-        for words, worst, speed in zip(("real time", f"{slow.time:.2f} times slower"), apart, fastest, strict=True)
+        for words, worst, speed in zip(
+            ("real time", f"{slow.time:.2f} times slower"), apart, fastest, strict=True
+        )
     ]
     entries.append(
         statement(
@@ -289,39 +469,74 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
             f"{slow.time:.2f} times slower for {limit:g} m/s",
         )
     )
-    return entries, _drawing(full, backs, wrong, [scale for scale, _ in pairs], off), _remarks(real, slow, off)
+    return (
+        entries,
+        _drawing(full, backs, wrong, [scale for scale, _ in pairs], off),
+        _remarks(real, slow, off),
+    )
+
+
+def _rest() -> float:
+    """Compression of the aeroplane's spring at rest, m."""
+    return equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)
 
 
 def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
-    pressures = [1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure for each in (real, slow)]
+    pressures = [
+        1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure
+        for each in (real, slow)
+    ]
     kept = scaling(UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time})
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
     return [
-        "Tables 3.2 and 3.3: 500 kg and 0.559 m are right, not 200 kg and 0.589 m. Table 3.3's figures with a sprung mass of "
-        f"200 kg are no similar system: that landing, mapped back, is off by {100.0 * off:.0f} % of the peak.",
-        "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, exponent 1.4 and three times the static load fully "
-        "compressed; the text says 0.589 m and four times. No stroke gives the 3.79 MN/m at equilibrium: the closed form is "
-        f"{1e-6 * stiffness(BOEING.spring, equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)):.2f} MN/m.",
-        f"Pseudo-dynamic: {BOEING.velocity:g} m/s are {real.factor('m/s') * BOEING.velocity:.3f} m/s on the rig; a time scale "
-        f"of {slow.time:.3f} brings them to {Cylinder().speed_limit:g} m/s. Forces fall by its square: the gas charge from "
-        f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas spring, scale its force in place of the mass: the "
+        "Tables 3.2 and 3.3: 500 kg and 0.559 m are right, not 200 kg and "
+        "0.589 m. Table 3.3's figures with a sprung mass of "
+        "200 kg are no similar system: that landing, mapped back, "
+        f"is off by {100.0 * off:.0f} % of the peak.",
+        "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, "
+        "exponent 1.4 and three times the static load fully "
+        "compressed; the text says 0.589 m and four times. No stroke gives "
+        "the 3.79 MN/m at equilibrium: the closed form is "
+        f"{1e-6 * stiffness(BOEING.spring, _rest()):.2f} "
+        ""
+        ""
+        ""
+        ""
+        ""
+        "MN/m.",
+        f"Pseudo-dynamic: {BOEING.velocity:g} m/s are "
+        f"{real.factor('m/s') * BOEING.velocity:.3f} m/s on the rig; a time scale "
+        f"of {slow.time:.3f} brings them to {Cylinder().speed_limit:g} "
+        "m/s. Forces fall by its square: the gas charge from "
+        f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas "
+        "spring, scale its force in place of the mass: the "
         f"numerical sprung mass is then {kept.mass * BOEING.sprung_mass:.0f} kg and the wheel "
-        f"{kept.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that is compressed slower gives off more heat, so its "
+        f"{kept.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that "
+        "is compressed slower gives off more heat, so its "
         "exponent falls: time cannot be stretched freely where the gas is hardware.",
-        "Eq. 3.4 and 3.5 as printed lack the exponent γ, take the tyre's deflection between the masses and leave out the "
+        "Eq. 3.4 and 3.5 as printed lack the exponent γ, take the tyre's "
+        "deflection between the masses and leave out the "
         "wheel's weight; the landing is simulated with all three put right.",
-        f"With full weight from touch-down on, as in Eq. 3.4, the strut is compressed by {no_lift:.3f} m, of "
-        f"{RECONSTRUCTED[1]:g} m; with lift that fades over {BOEING.lift_time:g} s by {inside:.3f} m.",
+        "With full weight from touch-down on, as in Eq. 3.4, the "
+        f"strut is compressed by {no_lift:.3f} m, of "
+        f"{RECONSTRUCTED[1]:g} m; with lift that fades over "
+        f"{BOEING.lift_time:g} s by {inside:.3f} m.",
     ]
 
 
-SIGNALS = (("strut compression", "m", 1.0), ("velocity of the sprung mass", "m/s", 1.0), ("strut force", "kN", 1e-3))
+SIGNALS = (
+    ("strut compression", "m", 1.0),
+    ("velocity of the sprung mass", "m/s", 1.0),
+    ("strut force", "kN", 1e-3),
+)
 STYLES = (("rig, real time", "#2a6fa8", "--"), ("rig, pseudo-dynamic", "#d1603d", ":"))
 
 
-def _drawing(full: Array, backs: list[Array], wrong: Array, scales: list[Scaling], off: float) -> Drawing:
+def _drawing(
+    full: Array, backs: list[Array], wrong: Array, scales: list[Scaling], off: float
+) -> Drawing:
     figure, axes = sheet(2, len(SIGNALS), 13.0, 3.4)
     worst = max(difference(full, back) for back in backs)
     for column, (name, unit, size) in enumerate(SIGNALS):
@@ -330,23 +545,49 @@ def _drawing(full: Array, backs: list[Array], wrong: Array, scales: list[Scaling
         above.plot(INSTANTS, size * full[column], color="#c3c8d0", linewidth=6.0, label="full size")
         below.set_title(f"{name}, {unit if size == 1.0 else 'N'}: on the rig", fontsize=9)
         for (label, colour, dashes), back, scale in zip(STYLES, backs, scales, strict=True):
-            above.plot(INSTANTS, size * back[column], dashes, color=colour, linewidth=2.0, label=label)
+            above.plot(
+                INSTANTS, size * back[column], dashes, color=colour, linewidth=2.0, label=label
+            )
             own = scale.factor(("m", "m/s", "N")[column]) * back[column]
-            below.plot(INSTANTS * scale.time, own, color=colour, label=f"{label}, time scale {scale.time:.2f}")
-        above.plot(INSTANTS, size * wrong[column], color="#6b7280", linewidth=0.8, label="Table 3.3 with 200 kg")
+            below.plot(
+                INSTANTS * scale.time,
+                own,
+                color=colour,
+                label=f"{label}, time scale {scale.time:.2f}",
+            )
+        above.plot(
+            INSTANTS,
+            size * wrong[column],
+            color="#6b7280",
+            linewidth=0.8,
+            label="Table 3.3 with 200 kg",
+        )
         above.set_xlabel("s of full size", fontsize=8)
         below.set_xlabel("s on the rig", fontsize=8)
     for sign in (-1.0, 1.0):
-        axes[1][1].axhline(sign * Cylinder().speed_limit, color="black", linewidth=0.8, linestyle="--")
-    axes[1][1].text(9.6, 1.1 * Cylinder().speed_limit, "hydraulic actuator ± 0.3 m/s", fontsize=7, ha="right", va="bottom")
+        axes[1][1].axhline(
+            sign * Cylinder().speed_limit, color="black", linewidth=0.8, linestyle="--"
+        )
+    axes[1][1].text(
+        9.6,
+        1.1 * Cylinder().speed_limit,
+        "hydraulic actuator ± 0.3 m/s",
+        fontsize=7,
+        ha="right",
+        va="bottom",
+    )
     axes[0][1].legend(fontsize=7, loc="lower right")
     axes[1][2].legend(fontsize=7)
     caption = (
-        "A Boeing 707 lands at 3 m/s: full size, and the rig of 500 kg and 0.18 m of stroke in real time and "
-        f"{scales[1].time:.2f} times slower. Mapped back by the scale factors they differ by {worst:.0e} of the peak at most; "
+        "A Boeing 707 lands at 3 m/s: full size, and the rig of "
+        "500 kg and 0.18 m of stroke in real time and "
+        f"{scales[1].time:.2f} times slower. Mapped back by the scale factors "
+        f"they differ by {worst:.0e} of the peak at most; "
         f"Table 3.3's figures with Table 3.2's 200 kg by {100.0 * off:.0f} %."
     )
-    return Drawing("similitude", "landing in full size and at the rig's scale, §3.5", caption, figure)
+    return Drawing(
+        "similitude", "landing in full size and at the rig's scale, §3.5", caption, figure
+    )
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:

@@ -31,16 +31,30 @@ def formulas() -> list[Entry]:
     masses = [SingleMass(*map(float, np.exp(random.normal(0.0, 2.0, 3)) * MASS)) for _ in range(20)]
     found = [critical_lag(single_mass(mass)) for mass in masses]
     off = [
-        each.time * mass.stiffness / mass.damping - 1.0 if each else math.inf for each, mass in zip(found, masses, strict=True)
+        each.time * mass.stiffness / mass.damping - 1.0 if each else math.inf
+        for each, mass in zip(found, masses, strict=True)
     ]
     undamped = [
-        each.frequency / mass.natural_frequency - 1.0 if each else math.inf for each, mass in zip(found, masses, strict=True)
+        each.frequency / mass.natural_frequency - 1.0 if each else math.inf
+        for each, mass in zip(found, masses, strict=True)
     ]
     worst, slowest = max(map(abs, off)), max(map(abs, undamped))
     at = "of 20 masses drawn at random"
     return [
-        statement("Equation 5.28", "critical lag", "τ_c = b/k", worst < 1e-9, f"within {worst:.1g} of b/k {at}"),
-        statement("§5.1.5", "at the critical lag", "as undamped", slowest < 1e-9, f"at √(k/m) within {slowest:.1g} {at}"),
+        statement(
+            "Equation 5.28",
+            "critical lag",
+            "τ_c = b/k",
+            worst < 1e-9,
+            f"within {worst:.1g} of b/k {at}",
+        ),
+        statement(
+            "§5.1.5",
+            "at the critical lag",
+            "as undamped",
+            slowest < 1e-9,
+            f"at √(k/m) within {slowest:.1g} {at}",
+        ),
         _region_entry(),
         _equivalence(),
         *_cardano(),
@@ -50,7 +64,9 @@ def formulas() -> list[Entry]:
 
 def _region_entry() -> Entry:
     own = _critical(MASS)
-    other = {name: _critical(MASS._replace(**{name: 2.0 * getattr(MASS, name)})) for name in MASS._fields}
+    other = {
+        name: _critical(MASS._replace(**{name: 2.0 * getattr(MASS, name)})) for name in MASS._fields
+    }
     holds = other["damping"] > own > other["stiffness"] and abs(other["mass"] / own - 1.0) < 1e-9
     words = ", ".join(f"{time:.4g} s with twice the {name}" for name, time in other.items())
     says = "larger with damping, smaller with stiffness, no matter the mass"
@@ -58,7 +74,8 @@ def _region_entry() -> Entry:
 
 
 def _equivalence() -> Entry:
-    """(5.17): to the wheel's ground the lagged force and the lagged position of the mass are one system."""
+    """(5.17): to the wheel's ground the lagged force and the lagged position of the mass are one
+    system."""
     lag, frequencies = 0.1, np.logspace(-1.0, 3.0, 50)
     s = 1j * frequencies
     spring = MASS.damping * s + MASS.stiffness
@@ -68,7 +85,12 @@ def _equivalence() -> Entry:
     off = max(float(np.max(np.abs(each * spring / printed - 1.0))) for each in (force, plate))
     note = "with the ground's share of the force filtered too, which (5.13) leaves out"
     return statement(
-        "Equation 5.17", "suspension and structure MIL", "identical", off < 1e-9, f"both within {off:.1g} of (5.17)", note
+        "Equation 5.17",
+        "suspension and structure MIL",
+        "identical",
+        off < 1e-9,
+        f"both within {off:.1g} of (5.17)",
+        note,
     )
 
 
@@ -84,13 +106,30 @@ def _cardano() -> list[Entry]:
 
     def remainder(a: float, b_: float) -> float:
         root = np.emath.sqrt(a**2 + b_**3)
-        s = complex(a + root) ** (1.0 / 3.0) if a + root > 0 else -(complex(-(a + root)) ** (1.0 / 3.0))
-        t = complex(a - root) ** (1.0 / 3.0) if a - root > 0 else -(complex(-(a - root)) ** (1.0 / 3.0))
+        s = (
+            complex(a + root) ** (1.0 / 3.0)
+            if a + root > 0
+            else -(complex(-(a + root)) ** (1.0 / 3.0))
+        )
+        t = (
+            complex(a - root) ** (1.0 / 3.0)
+            if a - root > 0
+            else -(complex(-(a - root)) ** (1.0 / 3.0))
+        )
         return abs(cubic(s + t - 1.0 / (3.0 * tau)))
 
-    printed = remainder(1 / (27 * tau**3) - b / (6 * m * tau**2) - k / (2 * m * tau), 1 / (9 * tau**2) + b / (3 * m * tau))
-    right = remainder(-1 / (27 * tau**3) + b / (6 * m * tau**2) - k / (2 * m * tau), -1 / (9 * tau**2) + b / (3 * m * tau))
-    note = "A = −1/(27τ³) + b/(6mτ²) − k/(2mτ) and B = −1/(9τ²) + b/(3mτ): three signs are lost in print"
+    printed = remainder(
+        1 / (27 * tau**3) - b / (6 * m * tau**2) - k / (2 * m * tau),
+        1 / (9 * tau**2) + b / (3 * m * tau),
+    )
+    right = remainder(
+        -1 / (27 * tau**3) + b / (6 * m * tau**2) - k / (2 * m * tau),
+        -1 / (9 * tau**2) + b / (3 * m * tau),
+    )
+    note = (
+        "A = −1/(27τ³) + b/(6mτ²) − k/(2mτ) and B = −1/(9τ²) "
+        "+ b/(3mτ): three signs are lost in print"
+    )
     return [
         statement(
             "Equation 5.18",
@@ -100,7 +139,13 @@ def _cardano() -> list[Entry]:
             f"leaves {printed:.3g}",
             note,
         ),
-        statement("Equation 5.18", "with the signs put right", "a root of (5.17)", right < 1e-6, f"leaves {right:.2g}"),
+        statement(
+            "Equation 5.18",
+            "with the signs put right",
+            "a root of (5.17)",
+            right < 1e-6,
+            f"leaves {right:.2g}",
+        ),
     ]
 
 
@@ -122,9 +167,29 @@ def _double_lag() -> list[Entry]:
     safe = f"up to 45° the second order filter is ahead by {min(ahead):.2g} to {max(ahead):.2g}°"
     return [
         digits("§5.1.6", "frequency of 45° lag", "41.4", at, "rad/s"),
-        digits("§5.1.6", "k/b, first order, marginal", "41.6", first, "1/s", "41.4 in (5.32) and Table 5.2, which is right"),
-        digits("§5.1.6", "k/b, second order, marginal", "49.5", second, "1/s", "(2 − τ b/m)/(4τ) = 49.995"),
-        statement("Figure 5.6", "first order filter", "slightly larger lag up to 45°: safe", min(ahead) > 0.0, safe),
+        digits(
+            "§5.1.6",
+            "k/b, first order, marginal",
+            "41.6",
+            first,
+            "1/s",
+            "41.4 in (5.32) and Table 5.2, which is right",
+        ),
+        digits(
+            "§5.1.6",
+            "k/b, second order, marginal",
+            "49.5",
+            second,
+            "1/s",
+            "(2 − τ b/m)/(4τ) = 49.995",
+        ),
+        statement(
+            "Figure 5.6",
+            "first order filter",
+            "slightly larger lag up to 45°: safe",
+            min(ahead) > 0.0,
+            safe,
+        ),
     ]
 
 
@@ -139,14 +204,23 @@ def region() -> Drawing:
     stiffness, dampings = np.linspace(100.0, 2000.0, 24), np.linspace(10.0, 400.0, 24)
     lags = np.array([[_critical(SingleMass(MASS.mass, k, b)) for k in stiffness] for b in dampings])
     levels = [0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6]
-    shades = axes[0][0].contourf(stiffness, dampings, lags, levels=[0.005, *levels, 4.0], cmap="viridis", norm=LogNorm())
-    lines = axes[0][0].contour(stiffness, dampings, lags, levels=levels, colors="white", linewidths=0.8)
+    shades = axes[0][0].contourf(
+        stiffness, dampings, lags, levels=[0.005, *levels, 4.0], cmap="viridis", norm=LogNorm()
+    )
+    lines = axes[0][0].contour(
+        stiffness, dampings, lags, levels=levels, colors="white", linewidths=0.8
+    )
     axes[0][0].clabel(lines, fmt="%g s", fontsize=8)
     figure.colorbar(shades, ax=axes[0][0], label="critical lag τ_c, s: stable below it")
     axes[0][0].set_xlabel("suspension stiffness k, N/m")
     axes[0][0].set_ylabel("suspension damping b, Ns/m")
     axes[0][0].set_title("Figure 5.4: stability region of the single mass", fontsize=10)
-    return Drawing("single-mass-region", "Figure 5.4", "The critical lag over stiffness and damping; it is b/k.", figure)
+    return Drawing(
+        "single-mass-region",
+        "Figure 5.4",
+        "The critical lag over stiffness and damping; it is b/k.",
+        figure,
+    )
 
 
 def _critical(mass: SingleMass) -> float:
@@ -166,11 +240,15 @@ def bode() -> Drawing:
         response = 1.0 / np.polyval(coefficients, 1j * frequencies)
         axes[0][0].semilogx(frequencies, 20.0 * np.log10(np.abs(response)), label=name)
         axes[1][0].semilogx(frequencies, np.degrees(np.unwrap(np.angle(response))), label=name)
-    axes[1][0].plot(at, -45.0, "o", color="black", markerfacecolor="white", label=f"45° at {at:.1f} rad/s")
+    axes[1][0].plot(
+        at, -45.0, "o", color="black", markerfacecolor="white", label=f"45° at {at:.1f} rad/s"
+    )
     axes[0][0].set_ylabel("magnitude, dB")
     axes[1][0].set_ylabel("phase, degrees")
     axes[1][0].set_xlabel("frequency, rad/s")
-    axes[0][0].set_title("Figure 5.6: two lags of 10 ms and the one that stands for them", fontsize=10)
+    axes[0][0].set_title(
+        "Figure 5.6: two lags of 10 ms and the one that stands for them", fontsize=10
+    )
     for row in axes:
         row[0].legend(fontsize=8)
     return Drawing("single-mass-filters", "Figure 5.6", "Bode plot of (5.31) and (5.32).", figure)

@@ -1,4 +1,5 @@
-"""§5.2 as data: every case of Tables 5.3 to 5.5, the figures that show it, and what the thesis says of it."""
+"""§5.2 as data: every case of Tables 5.3 to 5.5, the figures that show it, and what the thesis says
+of it."""
 
 from __future__ import annotations
 
@@ -20,8 +21,12 @@ from rigtwin.studies.stability.locus import BODY
 
 MODEL = "single-mass"
 LAGS = {ratio: of_lag(ratio) for ratio in (1.0, 0.5)}
-SLOW = {ratio: replace(of_natural_frequency(ratio, 0.2, 1e5), symbol="k") for ratio in (1.0, 1.5, 0.5)}
-QUICK = {ratio: replace(of_natural_frequency(ratio, 0.01, 1e5), symbol="k") for ratio in (1.0, 1.5, 0.5)}
+SLOW = {
+    ratio: replace(of_natural_frequency(ratio, 0.2, 1e5), symbol="k") for ratio in (1.0, 1.5, 0.5)
+}
+QUICK = {
+    ratio: replace(of_natural_frequency(ratio, 0.01, 1e5), symbol="k") for ratio in (1.0, 1.5, 0.5)
+}
 RATIOS = {lag: replace(of_damping_ratio(lag), symbol="k = m") for lag in (0.2, 0.01, 0.001)}
 
 
@@ -33,36 +38,86 @@ def _table_5_3() -> tuple[Case, ...]:
     cases = []
     for number, ratio in ((1, 1.0), (2, 0.5)):
         claims = [
-            _says("5.7", "smallest lag", "the filter's pole is on the far left", shapes.far_left(1)),
-            _says("5.7", "stability", "unstable as the lag increases", judges.becomes_unstable(BODY)),
-            _says("5.8", "small lags", "the poles match the ideal ones", resemblance.resembles("start")),
-            _says("5.8", "boundary", "resembles an undamped mass on a spring", resemblance.undamped_at_boundary),
+            _says(
+                "5.7", "smallest lag", "the filter's pole is on the far left", shapes.far_left(1)
+            ),
+            _says(
+                "5.7", "stability", "unstable as the lag increases", judges.becomes_unstable(BODY)
+            ),
+            _says(
+                "5.8",
+                "small lags",
+                "the poles match the ideal ones",
+                resemblance.resembles("start"),
+            ),
+            _says(
+                "5.8",
+                "boundary",
+                "resembles an undamped mass on a spring",
+                resemblance.undamped_at_boundary,
+            ),
         ]
         if number == 1:
-            claims.append(_says("5.8", "critically damped", "moves away from the real axis", shapes.breaks_away))
+            claims.append(
+                _says(
+                    "5.8", "critically damped", "moves away from the real axis", shapes.breaks_away
+                )
+            )
         panels = (Panel("5.7"), Panel("5.8", (-12.0, 2.0, 6.0)))
-        cases.append(Case(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims)))
+        cases.append(
+            Case(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims))
+        )
     return tuple(cases)
 
 
 def _table_5_4() -> tuple[Case, ...]:
     cases = []
     for number, ratio, figure in ((1, 1.0, "5.9"), (2, 1.5, "5.10"), (3, 0.5, "5.11")):
-        claims = [_says(figure, "stability", "unstable as the natural frequency increases", judges.becomes_unstable(BODY))]
+        claims = [
+            _says(
+                figure,
+                "stability",
+                "unstable as the natural frequency increases",
+                judges.becomes_unstable(BODY),
+            )
+        ]
         if ratio > 0.5:
             left = shapes.ends_left_of(locus(MODEL, SLOW[0.5]), "ζ = 0.5")
-            claims.append(_says(figure, "end of the sweep", "further right for lower damping ratios", left))
-        cases.append(Case(MODEL, f"case {number}, ζ = {ratio:g}, τ = 0.2 s", SLOW[ratio], (Panel(figure),), tuple(claims)))
+            claims.append(
+                _says(figure, "end of the sweep", "further right for lower damping ratios", left)
+            )
+        cases.append(
+            Case(
+                MODEL,
+                f"case {number}, ζ = {ratio:g}, τ = 0.2 s",
+                SLOW[ratio],
+                (Panel(figure),),
+                tuple(claims),
+            )
+        )
     for number, ratio, figure in ((4, 1.0, "5.12"), (5, 1.5, "5.13"), (6, 0.5, "5.14")):
         slow = locus(MODEL, SLOW[ratio])
         claims = [
             _says(figure, "stability", "no instability at 44.72 rad/s", judges.stable_throughout),
-            _says(figure, "end of the sweep", "a much higher frequency", shapes.ends_faster_than(slow, "τ = 0.2 s")),
+            _says(
+                figure,
+                "end of the sweep",
+                "a much higher frequency",
+                shapes.ends_faster_than(slow, "τ = 0.2 s"),
+            ),
         ]
         if ratio >= 1.0:
             left = shapes.breaks_away_left_of(slow, "τ = 0.2 s")
             claims.append(_says(figure, "breakaway", "further left with less lag", left))
-        cases.append(Case(MODEL, f"case {number}, ζ = {ratio:g}, τ = 0.01 s", QUICK[ratio], (Panel(figure),), tuple(claims)))
+        cases.append(
+            Case(
+                MODEL,
+                f"case {number}, ζ = {ratio:g}, τ = 0.01 s",
+                QUICK[ratio],
+                (Panel(figure),),
+                tuple(claims),
+            )
+        )
     return tuple(cases)
 
 
@@ -90,7 +145,13 @@ def _table_5_5() -> tuple[Case, ...]:
             (Panel("5.17"), Panel("5.18", low)),
             (
                 _says("5.17", "high ratios", "asymptote further left, frequencies higher", further),
-                _says("5.18", "damping ratio 0.005", "does not cause instability", judges.not_unstable_at(at), note),
+                _says(
+                    "5.18",
+                    "damping ratio 0.005",
+                    "does not cause instability",
+                    judges.not_unstable_at(at),
+                    note,
+                ),
             ),
         ),
         Case(
@@ -100,12 +161,26 @@ def _table_5_5() -> tuple[Case, ...]:
             (Panel("5.19"), Panel("5.20", low)),
             (
                 _says("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
-                _says("5.19", "resemblance", "far better than with more lag", resemblance.closer_than(quick, "τ = 0.01 s")),
-                _says("5.20", "damping ratio 0.005", "does not cause instability", judges.not_unstable_at(at)),
+                _says(
+                    "5.19",
+                    "resemblance",
+                    "far better than with more lag",
+                    resemblance.closer_than(quick, "τ = 0.01 s"),
+                ),
+                _says(
+                    "5.20",
+                    "damping ratio 0.005",
+                    "does not cause instability",
+                    judges.not_unstable_at(at),
+                ),
             ),
         ),
     )
 
 
-CASES: Mapping[str, Callable[[], tuple[Case, ...]]] = {"5.3": _table_5_3, "5.4": _table_5_4, "5.5": _table_5_5}
+CASES: Mapping[str, Callable[[], tuple[Case, ...]]] = {
+    "5.3": _table_5_3,
+    "5.4": _table_5_4,
+    "5.5": _table_5_5,
+}
 """Table → its cases."""

@@ -1,4 +1,5 @@
-"""§5.1 and §5.2: the stability of a single mass whose suspension or structure comes through a lag."""
+"""§5.1 and §5.2: the stability of a single mass whose suspension or structure comes through a
+lag."""
 
 from __future__ import annotations
 
@@ -17,18 +18,35 @@ from rigtwin.studies.stability.models import poles, single_mass_structure, singl
 from rigtwin.studies.stability.vehicle import SingleMass
 
 TABLE_5_1 = {
-    0.01: (("-100", "-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i"), ("-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i")),
-    0.1: (("-10", "-9.012", "-0.4940 + 3.294i", "-0.4940 - 3.294i"), ("-9.012", "-0.4940 + 3.294i", "-0.4940 - 3.294i")),
-    0.2: (("-5", "-5", "0.0000 + 3.162i", "0.0000 - 3.162i"), ("-5", "0.0000 + 3.162i", "0.0000 - 3.162i")),
-    0.5: (("-4", "-2.946", "0.4732 + 2.562i", "0.4732 - 2.562i"), ("-2.946", "0.4732 + 2.562i", "0.4732 - 2.562i")),
+    0.01: (
+        ("-100", "-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i"),
+        ("-98.06", "-0.9677 + 3.043i", "-0.9677 - 3.043i"),
+    ),
+    0.1: (
+        ("-10", "-9.012", "-0.4940 + 3.294i", "-0.4940 - 3.294i"),
+        ("-9.012", "-0.4940 + 3.294i", "-0.4940 - 3.294i"),
+    ),
+    0.2: (
+        ("-5", "-5", "0.0000 + 3.162i", "0.0000 - 3.162i"),
+        ("-5", "0.0000 + 3.162i", "0.0000 - 3.162i"),
+    ),
+    0.5: (
+        ("-4", "-2.946", "0.4732 + 2.562i", "0.4732 - 2.562i"),
+        ("-2.946", "0.4732 + 2.562i", "0.4732 - 2.562i"),
+    ),
 }
-"""Lag → poles of the structure's model and of the suspension's. A real part that is not printed is written to the digits of its
-column."""
-TABLE_5_2 = (("0.00 + 0.91i", "0.00 - 0.91i", "-41.4"), ("-1.7e-5 + 0.91i", "-1.7e-5 - 0.91i", "-101", "-98.9"))
+"""Lag → poles of the structure's model and of the suspension's. A real part that is not printed is
+written to the digits of its column."""
+TABLE_5_2 = (
+    ("0.00 + 0.91i", "0.00 - 0.91i", "-41.4"),
+    ("-1.7e-5 + 0.91i", "-1.7e-5 - 0.91i", "-101", "-98.9"),
+)
 """Poles with the first and with the second order filter; 0 is written to the digits beside it."""
 
 
-def _pole_entries(where: str, what: str, printed: Sequence[str], found: np.ndarray, notes: Mapping[str, str]) -> list[Entry]:
+def _pole_entries(
+    where: str, what: str, printed: Sequence[str], found: np.ndarray, notes: Mapping[str, str]
+) -> list[Entry]:
     """Every printed pole beside the one of ours that stands for it."""
     values = np.array([complex(text.replace(" ", "").replace("i", "j")) for text in printed])
     # By the square root, so that what agrees is paired first and one wrong figure stays one.
@@ -53,20 +71,47 @@ def _tables() -> list[Entry]:
             ("structure", structure, single_mass_structure(MASS, lag)),
             ("suspension", suspension, single_mass_suspension(MASS, lag)),
         ):
-            entries += _pole_entries("Table 5.1", f"τ = {lag:g} s, MIL {name}", printed, poles(system), doubled)
+            entries += _pole_entries(
+                "Table 5.1", f"τ = {lag:g} s, MIL {name}", printed, poles(system), doubled
+            )
     slip = {text: "−1.7e-3, a slip of the exponent" for text in TABLE_5_2[1][:2]}
-    for name, printed, lags in (("first", TABLE_5_2[0], (1.0 / 41.4,)), ("second", TABLE_5_2[1], (FILTER, FILTER))):
+    for name, printed, lags in (
+        ("first", TABLE_5_2[0], (1.0 / 41.4,)),
+        ("second", TABLE_5_2[1], (FILTER, FILTER)),
+    ):
         found = poles(single_mass_suspension(SOFT, *lags))
         entries += _pole_entries("Table 5.2", f"{name} order filter", printed, found, slip)
     for number, ratio, printed in ((1, 1.0, "316.2"), (2, 0.5, "158.1")):
         found = damping(ratio, ARBITRARY.suspension_stiffness)
-        entries.append(digits("Table 5.3", f"b of case {number}, ζ = {ratio:g}", printed, found, "Ns/m"))
-    entries.append(digits("Table 5.4", "natural frequency at the end", "44.72", math.sqrt(1e5 / MASS.mass), "rad/s"))
+        entries.append(
+            digits("Table 5.3", f"b of case {number}, ζ = {ratio:g}", printed, found, "Ns/m")
+        )
+    entries.append(
+        digits(
+            "Table 5.4",
+            "natural frequency at the end",
+            "44.72",
+            math.sqrt(1e5 / MASS.mass),
+            "rad/s",
+        )
+    )
     ends = [SingleMass(both, both, 100.0) for both in (1.0, 1e5)]
     for case in (1, 2, 3):
-        entries.append(digits("Table 5.5", f"natural frequency of case {case}", "1", ends[0].natural_frequency, "rad/s"))
+        entries.append(
+            digits(
+                "Table 5.5",
+                f"natural frequency of case {case}",
+                "1",
+                ends[0].natural_frequency,
+                "rad/s",
+            )
+        )
     note = "the printed range ends at 0.0005; 0.005 is k = m = 10 000, where b/k = 0.01 s"
-    entries.append(digits("§5.2.3", "lowest damping ratio of Table 5.5", "0.005", ends[1].damping_ratio, "1", note))
+    entries.append(
+        digits(
+            "§5.2.3", "lowest damping ratio of Table 5.5", "0.005", ends[1].damping_ratio, "1", note
+        )
+    )
     return entries
 
 
@@ -79,15 +124,18 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
             entries += case.entries()
         names = dict.fromkeys(f"Figure {panel.name}" for case in cases for panel in case.panels)
         caption = (
-            f"Table {table}. Grey: the ideal mass. Coloured: with the lag, dark at the start of the sweep, light at its end."
+            f"Table {table}. Grey: the ideal mass. Coloured: with the lag, "
+            "dark at the start of the sweep, light at its end."
         )
         drawings.append(drawing(f"single-mass-loci-{table}", ", ".join(names), caption, cases))
     return Conclusion(entries, drawings, REMARKS)
 
 
 REMARKS = (
-    "(5.7) and (5.16) print −k and −b where +k and +b stand on that side, and (5.16) +1/τ for −1/τ of the lagged velocity.",
-    "Table 5.1: the structure's state-space model has one pole more, at −1/τ, which no output sees; the table misprints it for "
+    "(5.7) and (5.16) print −k and −b where +k and +b stand on that "
+    "side, and (5.16) +1/τ for −1/τ of the lagged velocity.",
+    "Table 5.1: the structure's state-space model has one pole more, at "
+    "−1/τ, which no output sees; the table misprints it for "
     "τ = 0.5 s.",
 )
 STUDY = Study(

@@ -1,4 +1,5 @@
-"""§7.1 and appendix B1, B2: semi-active and active skyhook under a point mass, over many roads: Tables 7.1 to 7.3."""
+"""§7.1 and appendix B1, B2: semi-active and active skyhook under a point mass, over many roads:
+Tables 7.1 to 7.3."""
 
 from __future__ import annotations
 
@@ -25,13 +26,24 @@ def _run(name: str, seed: int) -> Result:
     if name in GAINS:
         gain = GAINS[name]
         return ride.kept(
-            trial("active", seed, lambda c: c._replace(controller=c.controller._replace(skyhook_damping=gain))), seed
+            trial(
+                "active",
+                seed,
+                lambda c: c._replace(controller=c.controller._replace(skyhook_damping=gain)),
+            ),
+            seed,
         )
     return ride.kept(trial(name, seed), seed)
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
-    return seeded({name: lambda seed, name=name: _run(name, seed) for name in ("passive", "semi-active", *GAINS)}, seeds)
+    return seeded(
+        {
+            name: lambda seed, name=name: _run(name, seed)
+            for name in ("passive", "semi-active", *GAINS)
+        },
+        seeds,
+    )
 
 
 def _entries(results: dict[str, Result]) -> list[Entry]:
@@ -45,7 +57,17 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     ]
     for table, printed in (("Table 7.2", TABLE_7_2), ("Table 7.3", TABLE_7_3)):
         for name, text in printed.items():
-            entries.append(band(table, name, text, over_seeds(results, name, "acceleration"), "m/s²", WITHIN, MEASURED))
+            entries.append(
+                band(
+                    table,
+                    name,
+                    text,
+                    over_seeds(results, name, "acceleration"),
+                    "m/s²",
+                    WITHIN,
+                    MEASURED,
+                )
+            )
     entries += [
         ride.reduced("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
         ride.reduced("§7.1.2", results, "active", "passive", "63.8", WITHIN),
@@ -70,7 +92,9 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     less = all_of("semi-active", "travel rms") < all_of("passive", "travel rms")
     switches = all_of("semi-active", "switches")
     return [
-        statement("Table 7.2", "more skyhook damping", "less body acceleration", bool(np.all(falls)), text),
+        statement(
+            "Table 7.2", "more skyhook damping", "less body acceleration", bool(np.all(falls)), text
+        ),
         statement(
             "§7.1.2",
             "more skyhook damping",
@@ -106,16 +130,26 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
 def _forces(results: dict[str, Result]) -> Drawing:
     figure, axes = sheet(3, 1, height=2.2)
     for name, axis in (("semi-active", axes[0][0]), ("active", axes[2][0])):
-        for label, colour in (("passive", COLOURS["other"]), (name, SENSED if name == "semi-active" else ASKED)):
+        for label, colour in (
+            ("passive", COLOURS["other"]),
+            (name, SENSED if name == "semi-active" else ASKED),
+        ):
             result = results[f"{label}/{SHOWN_SEED}"]
-            axis.plot(result["time"], result["asked damper"], color=colour, linewidth=0.8, label=label)
+            axis.plot(
+                result["time"], result["asked damper"], color=colour, linewidth=0.8, label=label
+            )
         axis.set(ylabel="damping force, N", xlim=(0, 15))
         axis.legend(fontsize=8)
     result = results[f"semi-active/{SHOWN_SEED}"]
     axes[1][0].plot(result["time"], result["damping"], color=SENSED, linewidth=0.6)
     axes[1][0].set(ylabel="damper, Ns/m", xlim=(0, 15))
     axes[2][0].set(xlabel="time, s")
-    return Drawing("figure-7.1", "Figure 7.1 to 7.3", "Demanded damping forces and the semi-active coefficient.", figure)
+    return Drawing(
+        "figure-7.1",
+        "Figure 7.1 to 7.3",
+        "Demanded damping forces and the semi-active coefficient.",
+        figure,
+    )
 
 
 def _box(results: dict[str, Result]) -> Drawing:
@@ -133,10 +167,27 @@ def _box(results: dict[str, Result]) -> Drawing:
                 markersize=14,
                 label="ideal" if number == 0 else None,
             )
-            axis.plot(number + 0.3, float(text), "*", color=ASKED, markersize=9, label="thesis" if number == 0 else None)
-        axis.set(xticks=range(len(printed)), xticklabels=printed, ylabel="rms body acceleration, m/s²", ylim=(0, None))
+            axis.plot(
+                number + 0.3,
+                float(text),
+                "*",
+                color=ASKED,
+                markersize=9,
+                label="thesis" if number == 0 else None,
+            )
+        axis.set(
+            xticks=range(len(printed)),
+            xticklabels=printed,
+            ylabel="rms body acceleration, m/s²",
+            ylim=(0, None),
+        )
         axis.legend(fontsize=8)
-    return Drawing("table-7.3", "Table 7.2 and 7.3", "Boxes: the twin over all seeds, whiskers 5 and 95 %.", figure)
+    return Drawing(
+        "table-7.3",
+        "Table 7.2 and 7.3",
+        "Boxes: the twin over all seeds, whiskers 5 and 95 %.",
+        figure,
+    )
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
@@ -146,11 +197,19 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     drawings = [
         _forces(found),
         ride.histories("figure-7.4", "Figure 7.4 to 7.6", "Active skyhook, three gains.", gains),
-        ride.histories("figure-7.7", "Figure 7.7 to 7.9, B1.1 to B2.6", "Passive, semi-active and active skyhook.", shown),
+        ride.histories(
+            "figure-7.7",
+            "Figure 7.7 to 7.9, B1.1 to B2.6",
+            "Passive, semi-active and active skyhook.",
+            shown,
+        ),
         _box(found),
     ]
     remarks = [ride.remark(found, name) for name in ("passive", "semi-active", *GAINS)]
-    remarks.append(f"{MEASURED}; below the twin's limit cycle by friction, at 3.4 Hz and above, whose tail is still in it")
+    remarks.append(
+        f"{MEASURED}; below the twin's limit cycle by friction, at "
+        "3.4 Hz and above, whose tail is still in it"
+    )
     return Conclusion(_entries(found), drawings, remarks)
 
 

@@ -1,4 +1,5 @@
-"""What a study of the thesis is: jobs that can run side by side, and what is concluded from their results."""
+"""What a study of the thesis is: jobs that can run side by side, and what is concluded from their
+results."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ Job = Callable[[], Result]
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of the thesis drawn anew. name: of its file, without ending; covers: the figures it stands for, in words."""
+    """A figure of the thesis drawn anew. name: of its file, without ending; covers: the figures it
+    stands for, in words."""
 
     name: str
     covers: str
@@ -41,11 +43,11 @@ def _no_jobs(seeds: int) -> Mapping[str, Job]:
 
 @dataclass(frozen=True)
 class Study:
-    """name: as `rigtwin reproduce` takes it; chapter: `3` to `7`, `A` or `B`; covers: the tables, figures and equations that
-    can be asked for by name, such as `Table 5.1` or `Figure 5.7`.
+    """name: as `rigtwin reproduce` takes it; chapter: `3` to `7`, `A` or `B`; covers: the tables,
+    figures and equations that can be asked for by name, such as `Table 5.1` or `Figure 5.7`.
 
-    jobs: of the number of seeds, key → work whose result is kept on disk, so that a broken run goes on where it was;
-    conclude: of the results by key.
+    jobs: of the number of seeds, key → work whose result is kept on disk, so that a broken run goes
+    on where it was; conclude: of the results by key.
     """
 
     name: str
@@ -61,7 +63,9 @@ def span(kind: str, chapter: str, first: int, last: int) -> tuple[str, ...]:
     return tuple(f"{kind} {chapter}{number}" for number in range(first, last + 1))
 
 
-def sheet(rows: int, columns: int, width: float = 11.0, height: float = 3.0) -> tuple[Figure, list[list]]:
+def sheet(
+    rows: int, columns: int, width: float = 11.0, height: float = 3.0
+) -> tuple[Figure, list[list]]:
     """An empty figure and its axes, in rows; height: of a row, inch."""
     figure = Figure(figsize=(width, height * rows), layout="constrained")
     FigureCanvasAgg(figure)

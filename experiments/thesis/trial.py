@@ -1,4 +1,5 @@
-"""One test of a study: run on the twin in memory, beside the ideal system, and what of it is kept."""
+"""One test of a study: run on the twin in memory, beside the ideal system, and what of it is
+kept."""
 
 from __future__ import annotations
 
@@ -21,15 +22,17 @@ from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip, explain_trip
 
 BODY = 3.0
-"""Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the twin's friction limit cycle,
-whose size depends on gains that the thesis does not give, begins at 3.4 Hz."""
+"""Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the
+twin's friction limit cycle, whose size depends on gains that the thesis does not give, begins at
+3.4 Hz."""
 SHOWN = 20
 """Ticks between the samples of a curve that is kept to be drawn."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A test, what the twin did, and what the ideal system would have done. truth columns: ground, structure, travel, force."""
+    """A test, what the twin did, and what the ideal system would have done. truth columns: ground,
+    structure, travel, force."""
 
     configuration: Configuration
     ran: SimulationResult
@@ -56,7 +59,9 @@ class Trial:
         return self.ran.truth[:, 3]
 
 
-def trial(name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c) -> Trial:
+def trial(
+    name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c
+) -> Trial:
     """Runs an experiment, with its configuration changed. Raises RigtwinError if it trips."""
     experiment = find(name)
     configuration = change(experiment.configuration)
@@ -64,15 +69,20 @@ def trial(name: str, seed: int, change: Callable[[Configuration], Configuration]
     ran = simulate(configuration, demands, seed)
     if ran.trip != Trip.NONE:
         raise RigtwinError(
-            f"{name} with seed {seed}: {explain_trip(ran.trip, configuration.safety)} after {len(ran.commands)} ticks"
+            f"{name} with seed {seed}: {explain_trip(ran.trip, configuration.safety)} "
+            f"after {len(ran.commands)} ticks"
         )
     return Trial(configuration, ran, simulate_ideal(configuration, ran.commands[:, 0]))
 
 
 def errors(test: Trial) -> dict[str, float]:
-    """rms e1, e2 and e1 + e2 of position (m) and force (N), and of what they are a share: the ideal's motion about its mean."""
+    """rms e1, e2 and e1 + e2 of position (m) and force (N), and of what they are a share: the
+    ideal's motion about its mean."""
     found = compute_tracking(test.should, test.ran.commands, test.plate, test.force)
-    swing = {"ideal_position": float(np.std(test.should.structure)), "ideal_force": float(np.std(test.should.force))}
+    swing = {
+        "ideal_position": float(np.std(test.should.structure)),
+        "ideal_force": float(np.std(test.should.force)),
+    }
     return {**vars(found), **swing}
 
 
@@ -118,11 +128,18 @@ def curves(test: Trial) -> dict[str, Array]:
 def seeded(names: Mapping[str, Callable[[int], Result]], seeds: int) -> dict[str, Job]:
     """A job for each name and seed, its key `name/seed`."""
     return {
-        f"{name}/{seed}": (lambda work=work, seed=seed: work(seed)) for name, work in names.items() for seed in range(seeds)
+        f"{name}/{seed}": (lambda work=work, seed=seed: work(seed))
+        for name, work in names.items()
+        for seed in range(seeds)
     }
 
 
 def over_seeds(results: Mapping[str, Result], name: str, value: str) -> Array:
     """One value of every seed's result, shape (seeds,)."""
     keys = [key for key in results if key.rpartition("/")[0] == name]
-    return np.array([float(results[key][value]) for key in sorted(keys, key=lambda key: int(key.rpartition("/")[2]))])
+    return np.array(
+        [
+            float(results[key][value])
+            for key in sorted(keys, key=lambda key: int(key.rpartition("/")[2]))
+        ]
+    )

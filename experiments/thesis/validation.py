@@ -1,4 +1,5 @@
-"""§3.6: the rig against the ideal single mass, dropped and driven: Table 3.4 and 3.5, Figures 3.11 to 3.20."""
+"""§3.6: the rig against the ideal single mass, dropped and driven: Table 3.4 and 3.5, Figures 3.11
+to 3.20."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from rigtwin.render.plot import ASKED, COLOURS, SENSED
 
 IDEAL = COLOURS["other"]
 WITHIN = 2.0
-"""Factor within which an experimental figure agrees: the force loop's gains, noise and road are not those of the lab."""
+"""Factor within which an experimental figure agrees: the force loop's gains, noise and road are not
+those of the lab."""
 TESTS = {"single-mass": "no ground input", "single-mass-road": "ground input"}
 TABLE_3_5 = {
     "position_e1": ("0.00772", "0.00448", "m"),
@@ -25,7 +27,8 @@ TABLE_3_5 = {
     "force_e2": ("9.53", "8.79", "N"),
     "force_sum": ("12.2", "11.5", "N"),
 }
-"""Thesis Table 3.5: without and with ground input. The totals are sums of both rms errors, as in the thesis."""
+"""Thesis Table 3.5: without and with ground input. The totals are sums of both rms errors, as in
+the thesis."""
 SHOWN_SEED = 0
 MOST_SEEDS = 12
 
@@ -36,7 +39,9 @@ def _run(name: str, seed: int) -> Result:
     frequencies, ours, ideal = _acceleration_response(test)
     found |= {"frequencies": frequencies, "response": ours, "ideal response": ideal}
     late = slice(0, 8000)
-    found["overshoot"] = -float(np.min(test.ran.commands[late, 1]) - np.min(test.should.structure[late]))
+    found["overshoot"] = -float(
+        np.min(test.ran.commands[late, 1]) - np.min(test.should.structure[late])
+    )
     if seed == SHOWN_SEED:
         found |= curves(test)
     return found  # type: ignore[return-value]
@@ -58,7 +63,9 @@ def _acceleration_response(test) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
-    return seeded({name: lambda seed, name=name: _run(name, seed) for name in TESTS}, min(seeds, MOST_SEEDS))
+    return seeded(
+        {name: lambda seed, name=name: _run(name, seed) for name in TESTS}, min(seeds, MOST_SEEDS)
+    )
 
 
 def _value(results: Mapping[str, Result], name: str, error: str) -> np.ndarray:
@@ -76,26 +83,47 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
         digits("Table 3.4", "preload", "220", settings.preload, "N"),
         digits("Table 3.4", "suspension damping", "30", settings.suspension_damping, "Ns/m"),
     ]
-    drop = (settings.sprung_mass * settings.gravity - settings.preload) / settings.suspension_stiffness
+    drop = (
+        settings.sprung_mass * settings.gravity - settings.preload
+    ) / settings.suspension_stiffness
     entries.append(digits("§3.6", "extension above equilibrium at the start", "0.072", drop, "m"))
     for error, (*printed, unit) in TABLE_3_5.items():
         for name, text in zip(TESTS, printed, strict=True):
             what = f"{error.replace('_', ' ').replace('sum', 'e1 + e2')}, {TESTS[name]}"
-            entries.append(factor("Table 3.5", what, text, _value(results, name, error), unit, WITHIN))
+            entries.append(
+                factor("Table 3.5", what, text, _value(results, name, error), unit, WITHIN)
+            )
     for name, says in TESTS.items():
         larger = _value(results, name, "force_e2") > _value(results, name, "force_e1")
         smaller = _value(results, name, "position_e2") < _value(results, name, "position_e1")
         share = f"in {int(np.sum(larger & smaller))} of {len(larger)} seeds"
         text = "force: e2 above e1; position: e2 below e1"
-        entries.append(statement("§3.6", f"which error is larger, {says}", text, bool(np.all(larger & smaller)), share))
+        entries.append(
+            statement(
+                "§3.6",
+                f"which error is larger, {says}",
+                text,
+                bool(np.all(larger & smaller)),
+                share,
+            )
+        )
     overshoot = over_seeds(results, "single-mass", "overshoot")
     text = f"{1e3 * np.median(overshoot):.1f} mm further than the ideal"
-    entries.append(statement("Figure 3.11", "first swing", "overshoots the ideal", bool(np.all(overshoot > 0)), text))
-    road, still = _value(results, "single-mass-road", "position_e1"), _value(results, "single-mass", "position_e1")
+    entries.append(
+        statement(
+            "Figure 3.11", "first swing", "overshoots the ideal", bool(np.all(overshoot > 0)), text
+        )
+    )
+    road, still = (
+        _value(results, "single-mass-road", "position_e1"),
+        _value(results, "single-mass", "position_e1"),
+    )
     text = f"{np.median(road):.4f} m against {np.median(still):.4f} m"
     holds = bool(np.median(road) < np.median(still))
     note = "" if holds else "of a road with other phases; the lab's is not known"
-    entries.append(statement("§3.6", "e1 with ground input", "smaller than without", holds, text, note))
+    entries.append(
+        statement("§3.6", "e1 with ground input", "smaller than without", holds, text, note)
+    )
     return entries
 
 
@@ -108,8 +136,20 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[0][1], "ideal force", "asked force", "force", "N"),
     ):
         axis.plot(time[early], np.asarray(result[quantity])[early], color=IDEAL, label="ideal")
-        axis.plot(time[early], np.asarray(result[asked])[early], color=ASKED, linewidth=1.0, label="demanded")
-        axis.plot(time[early], np.asarray(result[sensed])[early], color=SENSED, linewidth=0.7, label="twin")
+        axis.plot(
+            time[early],
+            np.asarray(result[asked])[early],
+            color=ASKED,
+            linewidth=1.0,
+            label="demanded",
+        )
+        axis.plot(
+            time[early],
+            np.asarray(result[sensed])[early],
+            color=SENSED,
+            linewidth=0.7,
+            label="twin",
+        )
         axis.set(xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     axes[0][0].set_title(f"{title}: sprung mass")
@@ -119,8 +159,20 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[1][0], "asked position", "plate", "mm"),
         (axes[1][1], "asked force", "force", "N"),
     ):
-        axis.plot(time[close], np.asarray(result[asked])[close], color=ASKED, linewidth=1.0, label="demanded")
-        axis.plot(time[close], np.asarray(result[sensed])[close], color=SENSED, linewidth=0.9, label="twin")
+        axis.plot(
+            time[close],
+            np.asarray(result[asked])[close],
+            color=ASKED,
+            linewidth=1.0,
+            label="demanded",
+        )
+        axis.plot(
+            time[close],
+            np.asarray(result[sensed])[close],
+            color=SENSED,
+            linewidth=0.9,
+            label="twin",
+        )
         axis.set(title="tracking, close up", xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     number = "3.11 to 3.14" if "drop" in title else "3.15 to 3.17"
@@ -132,9 +184,14 @@ def _subspace(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(1, 4, height=3.2)
     for column, (name, words) in enumerate(TESTS.items()):
         result = results[f"{name}/{SHOWN_SEED}"]
-        for axis, kind, unit in ((axes[0][2 * column], "force", "N"), (axes[0][2 * column + 1], "plate", "mm")):
+        for axis, kind, unit in (
+            (axes[0][2 * column], "force", "N"),
+            (axes[0][2 * column + 1], "plate", "mm"),
+        ):
             should = np.asarray(result[f"ideal {kind}"])
-            axis.plot(should, np.asarray(result[kind]), color="#2f9e44", linewidth=0.6, label="twin")
+            axis.plot(
+                should, np.asarray(result[kind]), color="#2f9e44", linewidth=0.6, label="twin"
+            )
             axis.plot(should, should, color=SENSED, linewidth=1.0, label="ideal")
             axis.set(title=f"{kind}, {words}", xlabel=f"ideal, {unit}", ylabel=f"twin, {unit}")
             axis.title.set_fontsize(9)
@@ -155,7 +212,9 @@ def _response(results: Mapping[str, Result]) -> Drawing:
         axis.semilogy(frequencies[~inside], middle[~inside], color=colour, alpha=0.35)
     axis.axvline(0.576, color="black", linewidth=0.6, linestyle=":")
     axis.set(
-        xlabel="Hz", ylabel="acceleration / ground velocity, 1/s", title="beyond the road's band (dotted) there is only noise"
+        xlabel="Hz",
+        ylabel="acceleration / ground velocity, 1/s",
+        title="beyond the road's band (dotted) there is only noise",
     )
     axis.legend(fontsize=8)
     return Drawing("figure-3.18", "Figure 3.18", "Median of all seeds.", figure)

@@ -25,7 +25,12 @@ LIGHT_WHEEL = 40.0
 """kg: with it the car of Table 6.1, printed with 400 kg, behaves as §6.2 says."""
 UNLOADED = 0.1
 """Of the sprung mass's weight: what the spring does not carry when the body is let go."""
-PRINTED_RATIOS = {"boeing-707": "0.0094", "truck": "0.0484", "car": "0.0650", "motorcycle": "0.0987"}
+PRINTED_RATIOS = {
+    "boeing-707": "0.0094",
+    "truck": "0.0484",
+    "car": "0.0650",
+    "motorcycle": "0.0987",
+}
 CAR_NOTE = "the unsprung mass of 400 kg is a misprint of 40 kg, with which it is unstable"
 SHOWN = (
     ("boeing-707", "6.15", "6.16", 0.45),
@@ -38,8 +43,12 @@ SHOWN = (
 
 
 def vehicles() -> dict[str, QuarterCar]:
-    """Those of Table 6.1, tyres without damping, and the car with the wheel that it ought to have."""
-    found = {name: QuarterCar(tyre_damping=0.0, **vehicle._asdict()) for name, vehicle in VEHICLES.items()}
+    """Those of Table 6.1, tyres without damping, and the car with the wheel that it ought to
+    have."""
+    found = {
+        name: QuarterCar(tyre_damping=0.0, **vehicle._asdict())
+        for name, vehicle in VEHICLES.items()
+    }
     return found | {"car, 40 kg wheel": found["car"]._replace(unsprung_mass=LIGHT_WHEEL)}
 
 
@@ -49,7 +58,8 @@ def growth(car: QuarterCar) -> complex:
 
 
 def drop(system: StateSpace, car: QuarterCar, time: np.ndarray) -> dict[str, np.ndarray]:
-    """Body and wheel, m from where they would come to rest, after the body is let go with a tenth of its weight unsupported.
+    """Body and wheel, m from where they would come to rest, after the body is let go with a tenth
+    of its weight unsupported.
 
     time: s, in equal steps from 0.
     """
@@ -65,7 +75,13 @@ def _start(system: StateSpace, car: QuarterCar) -> np.ndarray:
     """At rest, every filter settled; m from the rest after the drop, and N."""
     force = UNLOADED * car.sprung_mass * Settings().gravity
     travel, wheel = force / car.suspension_stiffness, force / car.tyre_stiffness
-    start = {"force": force, "travel": travel, "plate": travel + wheel, "body": travel + wheel, "wheel": wheel}
+    start = {
+        "force": force,
+        "travel": travel,
+        "plate": travel + wheel,
+        "body": travel + wheel,
+        "wheel": wheel,
+    }
     return np.array([start.get(label, 0.0) for label in system.state_labels])
 
 
@@ -78,18 +94,40 @@ def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
     truck = cars["truck"].sprung.damping_ratio
     note = "the text's assumption does not follow from the table: it is half critical"
     entries.append(
-        statement("Table 6.1", "damping of the truck", "critical", abs(truck - 1.0) < 0.05, f"ζ = {truck:.3f}", note)
+        statement(
+            "Table 6.1",
+            "damping of the truck",
+            "critical",
+            abs(truck - 1.0) < 0.05,
+            f"ζ = {truck:.3f}",
+            note,
+        )
     )
     for name, body, wheel, _ in SHOWN:
         pole, note = growth(cars[name]), CAR_NOTE if name == "car" else ""
         for figure in (body, wheel):
-            where, words = f"Figure {figure.partition(',')[0]}", f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s"
-            entries.append(statement(where, f"{name}, four lags of 10 ms", "unstable", pole.real > 0.0, words, note))
+            where, words = (
+                f"Figure {figure.partition(',')[0]}",
+                f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s",
+            )
+            entries.append(
+                statement(
+                    where, f"{name}, four lags of 10 ms", "unstable", pole.real > 0.0, words, note
+                )
+            )
     rates = {name: growth(car).real for name, car in cars.items()}
     slow = (rates["car, 40 kg wheel"], rates["motorcycle"])
     words = ", ".join(f"{name} {rate:+.3g} 1/s" for name, rate in rates.items())
     fastest = rates["boeing-707"] > rates["truck"] > max(slow) and min(slow) > 0.0
-    entries.append(statement("§6.2", "growth", "fastest for the aircraft, then the truck, then the others", fastest, words))
+    entries.append(
+        statement(
+            "§6.2",
+            "growth",
+            "fastest for the aircraft, then the truck, then the others",
+            fastest,
+            words,
+        )
+    )
     return [*entries, *_all_dampings(cars)]
 
 
@@ -98,13 +136,19 @@ def _all_dampings(cars: Mapping[str, QuarterCar]) -> list[Entry]:
     entries = []
     for name, car in cars.items():
         dampings = car.suspension_damping * np.logspace(-3.0, 3.0, 601)
-        real = np.array([growth(car._replace(suspension_damping=float(damping))).real for damping in dampings])
+        real = np.array(
+            [growth(car._replace(suspension_damping=float(damping))).real for damping in dampings]
+        )
         stable = dampings[real < 0.0]
         words = f"at best {real.min():+.3g} 1/s, at {dampings[real.argmin()]:.4g} Ns/m"
         if len(stable):
             words += f"; stable from {stable[0]:.4g} to {stable[-1]:.4g} Ns/m"
         note = CAR_NOTE if name == "car" else ""
-        entries.append(statement("§6.2", f"{name}, any suspension damping", "unstable", not len(stable), words, note))
+        entries.append(
+            statement(
+                "§6.2", f"{name}, any suspension damping", "unstable", not len(stable), words, note
+            )
+        )
     return entries
 
 
@@ -118,14 +162,24 @@ def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
             axis.plot(time, 1e3 * moved[part], linewidth=0.9, label="on the rig")
             axis.plot(time, 1e3 * ideal[part], color="0.6", linewidth=0.9, zorder=1, label="ideal")
             height = 1e3 * _share(car, part) * np.exp(rate * time)
-            axis.plot(time, height, "--", color="#d1603d", linewidth=0.8, label="envelope of the rightmost mode")
+            axis.plot(
+                time,
+                height,
+                "--",
+                color="#d1603d",
+                linewidth=0.8,
+                label="envelope of the rightmost mode",
+            )
             axis.plot(time, -height, "--", color="#d1603d", linewidth=0.8)
             axis.set_title(f"Figure {numbered}: {name}, {part}, {rate:+.3g} 1/s", fontsize=9)
             axis.set_xlabel("time, s", fontsize=8)
             axis.set_ylabel("position, mm", fontsize=8)
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-    caption = "The linear rig with four lags of 10 ms, the body let go with a tenth of its weight unsupported."
+    caption = (
+        "The linear rig with four lags of 10 ms, the body let "
+        "go with a tenth of its weight unsupported."
+    )
     return Drawing("vehicles-drop", "Figure 6.15 to 6.22", caption, figure)
 
 
@@ -144,7 +198,8 @@ def _said(found: Critical | None) -> str:
 
 def _remarks(cars: Mapping[str, QuarterCar]) -> list[str]:
     return [
-        f"{name}: four equal lags are critical at {_said(critical_lag(LOOPS['rig'](car)))}, four equal pure delays at "
+        f"{name}: four equal lags are critical at "
+        f"{_said(critical_lag(LOOPS['rig'](car)))}, four equal pure delays at "
         f"{_said(critical_delay(LOOPS['rig'](car)))}."
         for name, car in cars.items()
     ]

@@ -1,4 +1,5 @@
-"""The command line. Parsing only; each command's work is imported when it is asked for, so that help is instant."""
+"""The command line. Parsing only; each command's work is imported when it is asked for, so that
+help is instant."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from types import ModuleType
 from rigtwin.errors import RigtwinError
 
 OVERVIEW = """\
-The digital twin of a hybrid suspension rig, and the tool that says why the twin and the rig disagree.
+The digital twin of a test rig, and the tool that says why the twin and the rig disagree.
 
 a first session:
   rigtwin list                                  what can be run
@@ -73,8 +74,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a test that tripped,
-    130 interrupted."""
+    """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a
+    test that tripped, 130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that cannot show a sign gets a question mark, not the end of the program.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from machines import DEFAULT_MACHINE
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
-from machines import DEFAULT_MACHINE
 
 SUMMARY = "list the effects that a machine can have"
 MORE = """\

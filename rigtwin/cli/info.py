@@ -25,18 +25,21 @@ def execute(parsed: argparse.Namespace) -> int:
     recording = rigtwin.load(parsed.recording)
     print(f"{recording.path}: {recording.experiment} on {recording.machine}")
     print(
-        f"{recording.ticks} ticks of {recording.period:g} s, {recording.time[0]:g} to {recording.time[-1]:.3f} s"
+        f"{recording.ticks} ticks of {recording.period:g} s, "
+        f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
     )
     print(f"ended: {recording.end or 'not said'}")
     if recording.twin:
         print(
-            f"made by a twin: seed {recording.twin.get('seed')}, rigtwin {recording.twin.get('version')}"
+            f"made by a twin: seed {recording.twin.get('seed')}, "
+            f"rigtwin {recording.twin.get('version')}"
         )
     for note in recording.notes:
         print(f"note: {note}")
     for step in recording.transitions:
         print(
-            f"{step.get('time', '?'):>12s} s  {step.get('from')} → {step.get('to')}: {step.get('reason')}"
+            f"{step.get('time', '?'):>12s} s  {step.get('from')} "
+            f"→ {step.get('to')}: {step.get('reason')}"
         )
     if recording.lateness:
         print(late(recording.lateness))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from rigtwin.console import table
 from machines import DEFAULT_MACHINE
+from rigtwin.console import table
 
 SUMMARY = "list the experiments, or the settings"
 MORE = """\

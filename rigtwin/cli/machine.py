@@ -9,7 +9,8 @@ from rigtwin.console import table
 
 SUMMARY = "check a machine's description"
 MORE = """\
-rigtwin machine check F.toml explains every mistake in one line each; without any, what will be looked for."""
+rigtwin machine check F.toml explains every mistake in one line each; without
+any, what will be looked for."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,7 +33,8 @@ def execute(parsed: argparse.Namespace) -> int:
     for replay in found.replays:
         closed = ", commanded by the controller" if replay.closed else ""
         print(
-            f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; observed {', '.join(r.name for r in replay.rows)}"
+            f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; "
+            f"observed {', '.join(r.name for r in replay.rows)}"
         )
     rows = [
         ("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")

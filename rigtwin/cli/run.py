@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
 from rigtwin.cli.rig_options import add_supervised
 from rigtwin.console import apart, writable
 from rigtwin.errors import RigtwinError
-from machines import DEFAULT_MACHINE
 
 SUMMARY = "run an experiment on the twin and record it"
 MORE = """\

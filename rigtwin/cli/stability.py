@@ -97,7 +97,8 @@ def execute(parsed: argparse.Namespace) -> int:
     at_rig = _rows(car, RIG_LAG, delay=False)["rig"]
     words = "stable" if at_rig["stable"] else "unstable"
     print(
-        f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
+        f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} "
+        f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
     )
     if parsed.map:
         draw(stability_map(parsed.model, car, tau, axes[0], axes[1]), out)
@@ -138,7 +139,8 @@ def _changed(car: QuarterCar, assignments: list[str]) -> QuarterCar:
         name, _, text = assignment.partition("=")
         if name not in QuarterCar._fields:
             raise RigtwinError(
-                f"--set {assignment}: unknown parameter {name!r}; there are {', '.join(QuarterCar._fields)}"
+                f"--set {assignment}: unknown parameter {name!r}; "
+                f"there are {', '.join(QuarterCar._fields)}"
             )
         try:
             car = car._replace(**{name: float(text)})

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 SUMMARY = "tune the controller on the twin, and judge it on roads that the tuning has not seen"
 MORE = """\
-A study is a TOML file: parameters with bounds, objectives, constraints, and what varies; docs/tuning.md. Without one, those
-that come along are listed.
+A study is a TOML file: parameters with bounds, objectives, constraints, and what varies;
+docs/tuning.md. Without one, those that come along are listed.
 
 examples:
   rigtwin tune skyhook --out tuning/skyhook

@@ -301,9 +301,7 @@ def override(
     known = groups(configuration)
     for group_name, values in changes.items():
         if group_name not in known:
-            raise RigtwinError(
-                f"unknown group {group_name!r}; there are {', '.join(known)}"
-            )
+            raise RigtwinError(f"unknown group {group_name!r}; there are {', '.join(known)}")
         if not isinstance(values, Mapping):
             raise RigtwinError(
                 f"{group_name} = {values!r}: expected a table of settings, such as [{group_name}]"

@@ -104,7 +104,8 @@ class Machine:
     plant: a NamedTuple of components with their nominal values; structure: what they make up;
     rough: whether nominal values are only a start; form: share of a signal that no model is held
     to, None for the usual one; told: `component.parameter` → setting of the recording's controller
-    that says its value; experiments: Python module that has them, or tables of the description; next_tests: those that a diagnosis may propose.
+    that says its value; experiments: Python module that has them, or tables of the description;
+    next_tests: those that a diagnosis may propose.
     """
 
     name: str

@@ -87,7 +87,9 @@ class ComponentReplays:
         """The true motion that a sensor measured, given what a replay expects of it."""
         sensor = getattr(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(self._sensor(name), self._apply_sensor(name, expected), self.period, mains)
+        found = estimate_motion(
+            self._sensor(name), self._apply_sensor(name, expected), self.period, mains
+        )
         return EstimatedMotion(
             expected + undo_sensor(sensor, found.correction, self.period),
             found.correction,
@@ -157,7 +159,9 @@ class ComponentReplays:
         """Of plate against wheel, by the difference that the carriage's replay leaves between the
         LVDTs."""
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(self.wheel, self._apply_lvdts(self.carriage_output), self.period, mains)
+        found = estimate_motion(
+            self.wheel, self._apply_lvdts(self.carriage_output), self.period, mains
+        )
         sensor = self.configuration.plant.suspension_lvdt
         wheel = self.carriage_output + undo_sensor(sensor, found.correction, self.period)
         error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)

@@ -107,7 +107,9 @@ def lines(
     noise = np.array([white_noise(row) for row in measured])
     resolution = np.array([smallest_step(row) for row in measured])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
-    fade = np.stack([_fade(ticks, recording.period) * counted * ~find_cut_off(row) for row in measured])
+    fade = np.stack(
+        [_fade(ticks, recording.period) * counted * ~find_cut_off(row) for row in measured]
+    )
     if (carried := model.propagated_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0

@@ -208,7 +208,8 @@ class JointModel:
     def _softest(
         self, guide: Guide, inertia: Inertia, position: Array, acceleration: Array, error: float
     ) -> float:
-        """Compliance, m/N, over which friction that reverses builds up: no less than what a measured motion's error hides."""
+        """Compliance, m/N, over which friction that reverses builds up: no less than what a
+        measured motion's error hides."""
         carried_load = inertia.mass * acceleration + guide.stiffness * (position - inertia.rest)
         load = float(np.sqrt(np.mean(carried_load**2)))
         size = max(friction_size(friction(guide), load), 1e-300)

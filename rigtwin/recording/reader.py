@@ -22,9 +22,9 @@ from mcap.records import Channel, Message, Metadata, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
+from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from machines import DEFAULT_MACHINE
 from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,
@@ -201,7 +201,7 @@ def load(path: Path) -> Recording:
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period, machine = _period(path, about), about.get("machine", DEFAULT_MACHINE)
+    period = _period(path, about)
     controller = _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
@@ -235,7 +235,7 @@ def load(path: Path) -> Recording:
         notes[0] += f"; readable up to {time[-1]:.3f} s"
     return Recording(
         path=path,
-        machine=about.get("machine", ""),
+        machine=about.get("machine", DEFAULT_MACHINE),
         experiment=about.get("experiment", ""),
         period=period,
         time=time,

@@ -40,9 +40,9 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from machines import DEFAULT_MACHINE
 from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.schema import (
     END_RECORD,

@@ -160,7 +160,11 @@ def run(
                         commands = check_commands(commands)
                 rows.append((commands, measured))
                 number, column = judge_limits(
-                    configuration.safety, configuration.timing.period, limit_memory, measured, commands
+                    configuration.safety,
+                    configuration.timing.period,
+                    limit_memory,
+                    measured,
+                    commands,
                 )
                 trip = Trip(number)
                 if trip != Trip.NONE:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from machines import DEFAULT_MACHINE
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, Safety, apply_effects, flatten
 from rigtwin.description.machine import OWN
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from machines import DEFAULT_MACHINE
 from rigtwin.simulation.loop import Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explain_trip
 from rigtwin.simulation.twin import Twin

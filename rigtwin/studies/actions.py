@@ -27,7 +27,12 @@ class Actions(Protocol):
         ...
 
     def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
+        self,
+        controlling: Controller,
+        state: State,
+        measured: Measurements,
+        demand: Demand,
+        action: Array,
     ) -> tuple[State, Commands]:
         """One tick under an action."""
         ...
@@ -55,26 +60,43 @@ class Schedule:
         for name, ends in self.bounds.items():
             meaning = known.get(name)
             if not isinstance(meaning, Quantity):
-                raise RigtwinError(f"action {name!r}: expected a setting of the controller that is a number")
+                raise RigtwinError(
+                    f"action {name!r}: expected a setting of the controller that is a number"
+                )
             if not isinstance(ends, tuple | list) or len(ends) != 2:
                 raise RigtwinError(f"action {name}: {ends!r}; expected its bounds, (low, high)")
             low, high = ends
             if not meaning.low <= low < high <= meaning.high:
                 allowed = f"{meaning.low:g} to {meaning.high:g} {meaning.unit}"
-                raise RigtwinError(f"action {name} from {low:g} to {high:g}: expected low below high within {allowed}")
+                raise RigtwinError(
+                    f"action {name} from {low:g} to {high:g}: expected "
+                    f"low below high within {allowed}"
+                )
 
     def spec(self, configuration: Configuration) -> specs.BoundedArray:  # noqa: ARG002
         low, high = (np.array(ends) for ends in zip(*self.bounds.values(), strict=True))
-        return specs.BoundedArray((len(self.bounds),), np.float64, low, high, name=", ".join(self.bounds))
+        return specs.BoundedArray(
+            (len(self.bounds),), np.float64, low, high, name=", ".join(self.bounds)
+        )
 
     def rest(self, configuration: Configuration) -> Array:
         return np.array([getattr(configuration.controller, name) for name in self.bounds])
 
     def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
+        self,
+        controlling: Controller,
+        state: State,
+        measured: Measurements,
+        demand: Demand,
+        action: Array,
     ) -> tuple[State, Commands]:
         changed = dict(zip(self.bounds, action.tolist(), strict=True))
-        return update(controlling._replace(settings=controlling.settings._replace(**changed)), state, measured, demand)
+        return update(
+            controlling._replace(settings=controlling.settings._replace(**changed)),
+            state,
+            measured,
+            demand,
+        )
 
 
 def suspension(settings: Settings) -> Schedule:
@@ -88,8 +110,8 @@ def suspension(settings: Settings) -> Schedule:
     Returns
     -------
     Schedule
-        The suspension's damping, Ns/m, from a fifth to ten times what it is, and its preload, N, half
-        as much more or less.
+        The suspension's damping, Ns/m, from a fifth to ten times what it is, and its preload, N,
+        half as much more or less.
     """
     factors = {"suspension_damping": (0.2, 10.0), "preload": (0.5, 1.5)}
     bounds = {}
@@ -101,7 +123,8 @@ def suspension(settings: Settings) -> Schedule:
 
 
 class Actuators:
-    """The agent is the controller: plate position, m, and motor voltage, V. The road stays the experiment's."""
+    """The agent is the controller: plate position, m, and motor voltage, V. The road stays the
+    experiment's."""
 
     def spec(self, configuration: Configuration) -> specs.BoundedArray:
         high = np.array([configuration.safety.structure, configuration.controller.voltage_limit])
@@ -112,9 +135,15 @@ class Actuators:
         return np.array([settings.start, settings.preload / configuration.plant.motor.constant])
 
     def act(
-        self, controlling: Controller, state: State, measured: Measurements, demand: Demand, action: Array
+        self,
+        controlling: Controller,
+        state: State,
+        measured: Measurements,
+        demand: Demand,
+        action: Array,
     ) -> tuple[State, Commands]:
-        # The controller runs beside, so that its filters show what they would; what it wants is not done.
+        # The controller runs beside, so that its filters show what they would; what it wants is not
+        # done.
         state, _ = update(controlling, state, measured, demand)
         structure, voltage = action.tolist()
         return state, Commands(demand.ground, structure, measured.load_cell, voltage)

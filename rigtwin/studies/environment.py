@@ -1,4 +1,5 @@
-"""The rig as a dm_env environment, for whatever learns: observations, actions and rewards in physical units.
+"""The rig as a dm_env environment, for whatever learns: observations, actions and rewards in
+physical units.
 
 An episode is one test of an experiment; each takes the next seed, so another road and other noise.
 A trip of a safety limit ends it with discount 0 and a penalty, the test's end with discount 1. A
@@ -44,8 +45,8 @@ if TYPE_CHECKING:
 INTERVAL = 10
 """Ticks that an action is held for: 10 ms."""
 OBSERVED = ("travel", "velocity", "force", "structure_position", "structure_velocity")
-"""Of the controller's state: filtered travel (m), its velocity (m/s), filtered force (N), structure model's position (m) and
-velocity (m/s)."""
+"""Of the controller's state: filtered travel (m), its velocity (m/s), filtered force (N), structure
+model's position (m) and velocity (m/s)."""
 TRIP_PENALTY = 1000.0
 """Of a trip, in costs of a step."""
 ACTION_NOISE = 3
@@ -55,8 +56,8 @@ ACTION_NOISE = 3
 class Reward(NamedTuple):
     """Minus the mean over a step's ticks of (a/ride)² + (ΔF/road_holding)² + (Δs/travel)².
 
-    Each figure is what costs 1, by default about what the passive car shows on the road of chapter 7;
-    an infinite one does not count.
+    Each figure is what costs 1, by default about what the passive car shows on the road of chapter
+    7; an infinite one does not count.
 
     Attributes
     ----------
@@ -79,8 +80,8 @@ class Task(NamedTuple):
     Attributes
     ----------
     random
-        Where `dm_control.suite.wrappers.action_noise` draws from; begins anew with each episode, from
-        its seed.
+        Where `dm_control.suite.wrappers.action_noise` draws from; begins anew with each episode,
+        from its seed.
     """
 
     random: np.random.Generator
@@ -94,8 +95,8 @@ class Environment(dm_env.Environment):
     """One experiment as episodes.
 
     An observation is a dictionary: `sensors`, the last raw samples, columns of
-    `controllers.Measurements`, m and N; `controller`, see `OBSERVED`; `commands`, the last, columns of
-    `controllers.Commands`, m, N and V.
+    `controllers.Measurements`, m and N; `controller`, see `OBSERVED`; `commands`, the last, columns
+    of `controllers.Commands`, m, N and V.
 
     Parameters
     ----------
@@ -134,10 +135,21 @@ class Environment(dm_env.Environment):
         reward: Reward = Reward(),  # noqa: B008
         interval: int = INTERVAL,
     ) -> None:
-        whole = all(isinstance(number, int) and not isinstance(number, bool) for number in (seed, interval))
-        if not (whole and seed >= 0 and interval >= 1 and isinstance(reward, Reward) and all(one > 0.0 for one in reward)):
+        whole = all(
+            isinstance(number, int) and not isinstance(number, bool) for number in (seed, interval)
+        )
+        if not (
+            whole
+            and seed >= 0
+            and interval >= 1
+            and isinstance(reward, Reward)
+            and all(one > 0.0 for one in reward)
+        ):
             given = f"seed {seed}, interval {interval}, {reward}"
-            raise RigtwinError(f"{given}: expected seed 0 or more, interval 1 or more ticks, a Reward of figures above 0")
+            raise RigtwinError(
+                f"{given}: expected seed 0 or more, interval 1 or "
+                "more ticks, a Reward of figures above 0"
+            )
         self.configuration, self.interval, self.reward = configuration, interval, reward
         self.actions: Actions = suspension(configuration.controller) if actions is None else actions
         self.trip = Trip.NONE
@@ -145,7 +157,9 @@ class Environment(dm_env.Environment):
         self._demands, self._next_seed = demands, seed
         self._controlling = controller(configuration.controller, configuration.timing.period)
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
-        self._sag = (configuration.controller.preload - self._static) / max(configuration.controller.suspension_stiffness, 1e-9)
+        self._sag = (configuration.controller.preload - self._static) / max(
+            configuration.controller.suspension_stiffness, 1e-9
+        )
         self._over = True
         self._twin: Twin | None = None
         self._physics: Physics | None = None
@@ -154,8 +168,8 @@ class Environment(dm_env.Environment):
     def physics(self) -> Physics:
         """dm_control's view of the twin that runs, for its time, its joints and pictures of it.
 
-        It looks at the twin's own model and data, so a force written to `data.xfrc_applied` acts on the
-        rig. Only the environment steps it. Each episode has its own, and frees the one before.
+        It looks at the twin's own model and data, so a force written to `data.xfrc_applied` acts on
+        the rig. Only the environment steps it. Each episode has its own, and frees the one before.
         """
         from dm_control.mujoco import Physics, wrapper  # loads OpenGL, which only pictures need
 
@@ -187,7 +201,8 @@ class Environment(dm_env.Environment):
         }
 
     def rest(self) -> Array:
-        """The action that leaves the experiment as it is; of `Actuators`, the one that it starts with.
+        """The action that leaves the experiment as it is; of `Actuators`, the one that it starts
+        with.
 
         Returns
         -------
@@ -204,12 +219,18 @@ class Environment(dm_env.Environment):
         dm_env.TimeStep
             Of type FIRST.
         """
-        twin = self._begin(self._next_seed) if self._twin is None or self.seed != self._next_seed else self._twin
+        twin = (
+            self._begin(self._next_seed)
+            if self._twin is None or self.seed != self._next_seed
+            else self._twin
+        )
         self._next_seed += 1
         self._state, self._memory = initial_state(self._controlling), empty_memory()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
-        self._measured = Measurements(float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload)
+        self._measured = Measurements(
+            float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload
+        )
         self._plate: list[float] = []
         return dm_env.restart(self._observation(twin))
 
@@ -236,7 +257,9 @@ class Environment(dm_env.Environment):
             return self.reset()
         action = np.asarray(self.action_spec().validate(np.asarray(action, dtype=np.float64)))
         if not np.all(np.isfinite(action)):
-            raise ValueError(f"action {action} for {self.action_spec().name}: expected finite numbers")
+            raise ValueError(
+                f"action {action} for {self.action_spec().name}: expected finite numbers"
+            )
         cost, first = 0.0, self._tick
         while self._tick < min(first + self.interval, len(self._asked)) and self.trip == Trip.NONE:
             cost += self._ticked(twin, action)
@@ -266,10 +289,14 @@ class Environment(dm_env.Environment):
         if twin.misses(1)[0]:
             commands = twin.held
         else:
-            self._state, commands = self.actions.act(self._controlling, self._state, measured, demand, action)
+            self._state, commands = self.actions.act(
+                self._controlling, self._state, measured, demand, action
+            )
         self._measured = measured
         self._tick += 1
-        number, _ = judge_limits(self.configuration.safety, period, self._memory, measured, commands)
+        number, _ = judge_limits(
+            self.configuration.safety, period, self._memory, measured, commands
+        )
         self.trip = Trip(number)
         if self.trip == Trip.NONE:
             twin.write(commands)
@@ -278,11 +305,22 @@ class Environment(dm_env.Environment):
     def _cost(self, true: Measurements) -> float:
         period = self.configuration.timing.period
         self._plate = [*self._plate[-2:], true.structure_lvdt]
-        ride = (self._plate[0] - 2.0 * self._plate[1] + self._plate[2]) / period**2 if len(self._plate) == 3 else 0.0
+        ride = (
+            (self._plate[0] - 2.0 * self._plate[1] + self._plate[2]) / period**2
+            if len(self._plate) == 3
+            else 0.0
+        )
         deflection = np.array([true.ground_lvdt - true.structure_lvdt + true.suspension_lvdt])
-        tyre = float(tyre_force(self.configuration.plant.tyre, deflection, np.zeros(1))[0]) - self._static
+        tyre = (
+            float(tyre_force(self.configuration.plant.tyre, deflection, np.zeros(1))[0])
+            - self._static
+        )
         travel = true.suspension_lvdt - self._sag
-        return (ride / self.reward.ride) ** 2 + (tyre / self.reward.road_holding) ** 2 + (travel / self.reward.travel) ** 2
+        return (
+            (ride / self.reward.ride) ** 2
+            + (tyre / self.reward.road_holding) ** 2
+            + (travel / self.reward.travel) ** 2
+        )
 
     def _observation(self, twin: Twin) -> dict[str, Array]:
         state = self._state

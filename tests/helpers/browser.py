@@ -8,7 +8,14 @@ import shutil
 import subprocess
 from pathlib import Path
 
-BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+BROWSER = next(
+    (
+        found
+        for name in ("chromium", "chromium-browser", "google-chrome")
+        if (found := shutil.which(name))
+    ),
+    None,
+)
 VIEWER = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 <iframe id="page" src="report.html" style="width:{width}px;height:900px;border:0"></iframe>
 <script>
@@ -16,7 +23,8 @@ const page = document.getElementById('page');
 page.onload = () => {{
   const root = page.contentDocument.documentElement;
   document.body.dataset.result = JSON.stringify({{
-    wide: root.scrollWidth, first: page.contentDocument.querySelector('h1').getBoundingClientRect().bottom,
+    wide: root.scrollWidth,
+    first: page.contentDocument.querySelector('h1').getBoundingClientRect().bottom,
     text: page.contentDocument.querySelector('h1').textContent,
     small: [...page.contentDocument.querySelectorAll('td,li,p,h1,h2')]
       .filter(e => parseFloat(getComputedStyle(e).fontSize) < 12).length
@@ -26,8 +34,9 @@ page.onload = () => {{
 
 
 def looked_at(page: str, width: int, folder: Path) -> dict[str, float]:
-    """How wide a page is in a window of that width, px, where its heading ends, and how many of its texts are too small to
-    read. Fails if the browser's console has an error, or the page asks for anything from elsewhere."""
+    """How wide a page is in a window of that width, px, where its heading ends, and how many of its
+    texts are too small to read. Fails if the browser's console has an error, or the page asks for
+    anything from elsewhere."""
     (folder / "report.html").write_text(page)
     (folder / "viewer.html").write_text(VIEWER.format(width=width))
     log = folder / "net.json"
@@ -58,6 +67,8 @@ def looked_at(page: str, width: int, folder: Path) -> dict[str, float]:
     found = re.search(r'data-result="([^"]*)"', done.stdout)
     assert found, done.stdout[-500:]
     result = json.loads(found.group(1).replace("&quot;", '"'))
-    requests = set(re.findall(r'"url":"(https?://[^"]*)"', log.read_text())) if log.exists() else set()
+    requests = (
+        set(re.findall(r'"url":"(https?://[^"]*)"', log.read_text())) if log.exists() else set()
+    )
     assert not {url for url in requests if "google" not in url and "gvt" not in url}, requests
     return result

@@ -11,14 +11,16 @@ from rigtwin.description.machine import Machine
 from rigtwin.recording import Recording
 
 BODIES = {
-    "slide": '<joint name="axis" type="slide" axis="1 0 0" stiffness="150" damping="6"/><geom size="0.05" mass="2"/>',
+    "slide": '<joint name="axis" type="slide" axis="1 0 0" stiffness="150" '
+    'damping="6"/><geom size="0.05" mass="2"/>',
     "pendulum": '<joint name="axis" type="hinge" axis="0 1 0" damping="0.3"/>'
     '<geom type="capsule" fromto="0 0 0 0 0 -0.4" size="0.02" mass="1.5"/>',
 }
 MJCF = """<mujoco model="bench"><option integrator="RK4"/>
 <worldbody><body name="arm">{body}</body></worldbody>
 <actuator><motor name="drive" joint="axis"/></actuator>
-<sensor><jointpos name="encoder" joint="axis"/><jointactuatorfrc name="cell" joint="axis"/></sensor></mujoco>
+<sensor><jointpos name="encoder" joint="axis"/>
+<jointactuatorfrc name="cell" joint="axis"/></sensor></mujoco>
 """
 TOML = """
 [machine]
@@ -53,7 +55,11 @@ def described(folder: Path, sort: str = "slide", toml: str = TOML) -> Machine:
     return load(folder / "bench.toml")
 
 
-def recording_of(machine: Machine, command: np.ndarray, position: np.ndarray, period: float = 1e-3) -> Recording:
+def recording_of(
+    machine: Machine, command: np.ndarray, position: np.ndarray, period: float = 1e-3
+) -> Recording:
     """A recording of it."""
     columns = {"/command": {"force": command}, "/sensor": {"position": position}}
-    return Recording(Path("bench"), machine.name, "", period, np.arange(len(command)) * period, columns, {})
+    return Recording(
+        Path("bench"), machine.name, "", period, np.arange(len(command)) * period, columns, {}
+    )

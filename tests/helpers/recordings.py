@@ -1,4 +1,5 @@
-"""Recordings of the stand-in rig, made by other code: what comes with the project, and what a checkout may have beside it."""
+"""Recordings of the stand-in rig, made by other code: what comes with the project, and what a
+checkout may have beside it."""
 
 from __future__ import annotations
 
@@ -13,7 +14,9 @@ from rigtwin.recording import Recording, load
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "nominal-imposed.mcap"
-SHIPPED = {path.stem: path for path in (EXAMPLE, *sorted((ROOT / "tests" / "recordings").glob("*.mcap")))}
+SHIPPED = {
+    path.stem: path for path in (EXAMPLE, *sorted((ROOT / "tests" / "recordings").glob("*.mcap")))
+}
 BESIDE = ROOT.parent / "shared" / "recordings"
 """Longer and more of them, where a checkout has them."""
 
@@ -33,17 +36,24 @@ def beside(name: str) -> Recording:
 
 
 def rig_recording(name: str) -> Recording:
-    """The one that comes with the project, or else the one beside the checkout; skips the test where there is neither."""
+    """The one that comes with the project, or else the one beside the checkout; skips the test
+    where there is neither."""
     return shipped(name) if name in SHIPPED else beside(name)
 
 
 def beginning(recording: Recording, seconds: float) -> Recording:
     """The recording as if it had ended then."""
     ticks = round(seconds / recording.period)
-    columns = {topic: {name: values[:ticks] for name, values in fields.items()} for topic, fields in recording.columns.items()}
+    columns = {
+        topic: {name: values[:ticks] for name, values in fields.items()}
+        for topic, fields in recording.columns.items()
+    }
     return replace(recording, time=recording.time[:ticks], columns=columns)
 
 
 def replace_sensors(recording: Recording, **sensors: Array) -> Recording:
     """The recording with other values of these sensors, shape (ticks,) each."""
-    return replace(recording, columns={**recording.columns, "/sensor": {**recording.columns["/sensor"], **sensors}})
+    return replace(
+        recording,
+        columns={**recording.columns, "/sensor": {**recording.columns["/sensor"], **sensors}},
+    )

@@ -10,11 +10,19 @@ from rigtwin.numerics.arrays import Array
 
 @njit
 def coulomb_carriage(
-    ground: Array, force: Array, step: float, mass: float, stiffness: float, friction: float, start: float, every: int
+    ground: Array,
+    force: Array,
+    step: float,
+    mass: float,
+    stiffness: float,
+    friction: float,
+    start: float,
+    every: int,
 ) -> Array:
     """Carriage with set-valued dry friction on a tyre that only pushes; Moreau's time stepping.
 
-    ground (m) and force (N, against +x) at every step; returns the position at every `every`-th step.
+    ground (m) and force (N, against +x) at every step; returns the position at every `every`-th
+    step.
     """
     out = np.empty((len(ground) + every - 1) // every)
     position, velocity = start, 0.0

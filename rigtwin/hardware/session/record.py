@@ -75,7 +75,9 @@ class Test:
 
     def terminals(self) -> Terminals:
         """Builds the twin at the card's terminals, wired as the table says."""
-        return Terminals(apply_effects(self.configuration, list(self.effects)), self.table, self.seed)
+        return Terminals(
+            apply_effects(self.configuration, list(self.effects)), self.table, self.seed
+        )
 
 
 def open_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:

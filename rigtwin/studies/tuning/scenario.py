@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from machines import DEFAULT_MACHINE
 from rigtwin.components import RigPlant
 from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Configuration, override
 from rigtwin.description.posterior import Changes, Posterior, shift_within, value_of
-from machines import DEFAULT_MACHINE
 from rigtwin.studies.tuning.study import Study
 
 APART = 1_000_000
