@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
 from rigtwin.cli.rig_options import add_supervised
 from rigtwin.console import apart, writable
 from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin import Machine
 
 SUMMARY = "run an experiment on the twin and record it"
 MORE = """\
@@ -60,7 +64,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
     if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
-        return _run_supervised(parsed, path)
+        return _run_supervised(parsed, machine, path)
     for option in ("dry_run", "arm", "without_dry_run", "stop_file", "live"):
         if getattr(parsed, option):
             needs = "--card or --real-time" if option in ("stop_file", "live") else "--target daq"
@@ -92,12 +96,16 @@ def _fresh(stem: str) -> Path:
     return path
 
 
-def _run_supervised(parsed: argparse.Namespace, path: Path) -> int:
+def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) -> int:
     from rigtwin.cli.session_commands import plan_test
     from rigtwin.cli.session_commands import run as work
+    from rigtwin.components import RigPlant
 
-    if parsed.machine != DEFAULT_MACHINE:
-        raise RigtwinError(f"--card, --real-time and --target daq are of {DEFAULT_MACHINE} alone")
+    if machine.plant != RigPlant():
+        raise RigtwinError(
+            "--card, --real-time and --target daq run the nominal suspension rig alone; "
+            f"{machine.name} has other components or values"
+        )
     if parsed.target == "daq" and parsed.card is None:
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
