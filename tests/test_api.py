@@ -35,7 +35,14 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
 @pytest.mark.parametrize(
     ("sort", "experiment", "effect", "magnitude", "channel"),
     [
-        ("suspension-rig", "imposed", "viscous@motor", 50.0, "/sensor.load_cell"),
+        pytest.param(
+            "suspension-rig",
+            "imposed",
+            "viscous@motor",
+            50.0,
+            "/sensor.load_cell",
+            marks=pytest.mark.slow,  # the notebook has the same lines for the rig
+        ),
         ("emps", "positioning", "coulomb@guide", 20.0, "/sensor.position"),
         ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
     ],
