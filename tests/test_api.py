@@ -41,7 +41,7 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
             "viscous@motor",
             50.0,
             "/sensor.load_cell",
-            marks=pytest.mark.slow,  # the notebook has the same lines for the rig
+            marks=pytest.mark.slow,
         ),
         ("emps", "positioning", "coulomb@guide", 20.0, "/sensor.position"),
         ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
@@ -183,6 +183,7 @@ def test_importing_costs_nothing_and_every_name_is_there():
         rigtwin.nonsense  # noqa: B018
 
 
+@pytest.mark.slow
 def test_the_notebook_runs(tmp_path):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
     notebook = nbformat.read(EXAMPLES / "quickstart.ipynb", as_version=4)
