@@ -14,7 +14,7 @@ from rigtwin.components import Motion, RigPlant
 from rigtwin.description.configuration import Configuration, without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
-from rigtwin.diagnosis.fit import Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.localisation import region
 from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis

@@ -9,7 +9,9 @@ import pytest
 from rigtwin.components import KINDS, RigPlant
 from rigtwin.diagnosis.attribute import attribute, detection_limit, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, despike
-from rigtwin.diagnosis.fit import BEYOND, Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.fit import Fit, with_values
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.space import BEYOND, Space
 from rigtwin.signals.runs import find_cut_off
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 

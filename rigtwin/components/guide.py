@@ -35,8 +35,8 @@ LEAST_FRICTION = 10.0
 """N; on the suspension rig a change of friction is tried in shares of what there is, or of this."""
 SLOWEST, SLOW = 0.01, 0.35
 """Shares of the highest speed between which Stribeck friction must fade."""
-WAVES = 1.5
-"""Waves along the stroke that cogging has at least."""
+WAVES = 3.0
+"""Waves along the stroke that cogging has at least: fewer are a force that depends on the place."""
 
 
 class Rail(NamedTuple):
@@ -252,7 +252,7 @@ def _stribeck(at: Context) -> Starts:
 
 def _cogging(at: Context) -> Starts:
     force, stroke = at.scales.force, at.scales.stroke
-    # Waves that fit the stroke one and a half to forty times: a longer one is no wave.
+    # Waves that fit the stroke three to forty times: a longer one is no wave.
     pitches = 2.0 * stroke / np.geomspace(WAVES, 40.0, 24)
     bounds = ((0.0, 1e7), (0.02 * stroke, 2.0 * stroke / WAVES), (-6.3, 6.3))
     return _waves(0.03 * force, pitches.tolist(), (0.003 * force, 0.002 * stroke, 0.05), bounds)
@@ -265,6 +265,13 @@ def late_starts(at: Context) -> Starts:
         share * scales.time for share in (0.012, 0.05, 0.15)
     }
     return Starts.single(sorted(times), min(0.001 * scales.time, 0.25 * scales.period))
+
+
+def _drag(at: Context) -> Starts:
+    unit, there = at.scales.force / at.scales.speed**2, at.nominal
+    values = [there + share * unit for share in (0.02, 0.05, 0.15, 0.4)]
+    # It takes energy away; a negative one stands for a nominal viscous friction that is too high.
+    return Starts(tuple((v,) for v in values), (0.005 * unit,), bounds=((min(there, 0.0), 1e9),))
 
 
 def _force(scales: Scales) -> float:
@@ -377,7 +384,7 @@ KINDS = (
         "quadratic friction",
         ("drag",),
         "friction with the square of the speed",
-        {Guide: around_nominal(lambda s: s.force / s.speed**2, (-0.3, -0.05, 0.05, 0.3), 0.005)},
+        {Guide: _drag},
     ),
     Kind(
         "relaxation",

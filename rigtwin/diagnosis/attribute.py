@@ -11,16 +11,13 @@ from functools import partial
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Fitter, Proposal, with_values, without_each
-from rigtwin.diagnosis.stepwise import (
-    Growth,
-    drop_needless,
-    fit_stepwise,
-    penalised_cost,
-    within_tolerance,
-)
+from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
+from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
+from rigtwin.diagnosis.selection import Selection, select
+from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 THREADS = 2
@@ -56,7 +53,8 @@ class Attribution:
     named, None for none; ranking: all tried, the likeliest first; explained: share of the gap;
     left: χ² per degree of freedom above 1 after it; unknown: whether what is left is a gap; shares:
     of the gap, of each effect named; silent: effects that no size tried makes noticeable on this
-    evidence; chain: the fits as effects were found one after another, the first alone first."""
+    evidence; chain: nested fits, the best of one effect first; selection: of a rough model, what was
+    judged on held-out data."""
 
     nothing: Fit
     expected: float
@@ -68,6 +66,7 @@ class Attribution:
     shares: dict[str, float]
     silent: tuple[Effect, ...]
     chain: tuple[Fit, ...] = ()
+    selection: Selection | None = None
 
 
 def library(evidence: Evidence) -> list[Effect]:
@@ -84,6 +83,41 @@ def library(evidence: Evidence) -> list[Effect]:
         Those that the machine can have and that are not read off a signal.
     """
     return [effect for effect in evidence.machine.effects() if effect.searched]
+
+
+MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What a search needs. coarse, fitter: on evidence of half as many steps, and on all;
+    map_fits: runs fits side by side."""
+
+    coarse: Fitter
+    fitter: Fitter
+    effects: Sequence[Effect]
+    least: float
+    thresholds: Thresholds
+    map_fits: MapFits
+
+    def cost(self, fit: Fit) -> float:
+        return penalised_cost(fit, self.thresholds.price)
+
+    def fit_singles(self) -> tuple[Fit, list[Fit]]:
+        """The nominal plant and each effect alone, the best again with the tolerances taken at
+        them."""
+        singles = self.map_fits(self.coarse.fit_one, self.effects)
+        singles.sort(key=self.cost)
+        # Those far behind stay there, however the tolerances are taken.
+        near = (
+            singles[0].misfit
+            + self.thresholds.near * max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
+            + 2.0 * self.least
+        )
+        close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
+        tried = self.map_fits(self.fitter.refit_with_tolerances, close) + singles[len(close) :]
+        tried.sort(key=self.cost)
+        return self.fitter.refit_with_tolerances(self.fitter.nothing), tried
 
 
 def attribute(
@@ -107,11 +141,8 @@ def attribute(
     Attribution
         Everything tried, and the explanation to be named.
     """
-    least = detection_limit(evidence, thresholds)
-    rules = thresholds.rough if evidence.machine.rough else thresholds.known
-    cost = partial(penalised_cost, price=thresholds.price)
-    search, fitter = Fitter(evidence.halve_steps()), Fitter(evidence)
     effects = library(evidence)
+    coarse = Fitter(evidence.halve_steps())
     with ThreadPoolExecutor(THREADS) as pool:
 
         def map_fits(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
@@ -126,67 +157,86 @@ def attribute(
                 raise
             return results
 
-        singles = map_fits(search.fit_one, effects)
-        singles.sort(key=cost)
-        # Those far behind stay there, however the tolerances are taken.
-        near = (
-            singles[0].misfit
-            + thresholds.near * max(search.nothing.misfit - singles[0].misfit, 0.0)
-            + 2.0 * least
+        least = detection_limit(evidence, thresholds)
+        search = _Search(coarse, Fitter(evidence), effects, least, thresholds, map_fits)
+        nothing, tried = search.fit_singles()
+        silent = tuple(
+            effect for effect in effects if coarse.largest_response(effect) < thresholds.detected
         )
-        close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        tried = map_fits(fitter.refit_with_tolerances, close) + singles[len(close) :]
-        tried.sort(key=cost)
-        first = tried[0]
-        nothing = fitter.refit_with_tolerances(fitter.nothing)
-        if nothing.misfit - cost(first) > least:
-            much = _excess(first.misfit, evidence) > thresholds.much * evidence.expected
-            hopes: list[Proposal] = []
-            for leader in tried[: BEAM if much else 1]:
-                # What stands far behind as the first of two is no leader.
-                if leader.misfit - first.misfit <= thresholds.far_behind * max(
-                    nothing.misfit - first.misfit, 0.0
-                ):
-                    hopes += search.propose_additions(leader, effects, least)
-            hopes.sort(key=lambda hope: hope.promised)
-            hopeful = _distinct(hopes)[: MANY if much else FEW]
-            pairs = map_fits(
-                lambda hope: search.refine(hope.effects, hope.values, hope.space), hopeful
-            )
-            pairs.sort(key=cost)
-            for _ in range(LOOKED_AGAIN if pairs else 0):
-                known = {frozenset(pair.effects) for pair in pairs}
-                fresh = [
-                    pair
-                    for pair in search.propose_replacements(pairs[0], effects)
-                    if frozenset(pair[0]) not in known
-                ]
-                pairs += map_fits(lambda pair: search.refine(*pair), fresh)
-                pairs.sort(key=cost)
-            pairs = (
-                map_fits(fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
-                + pairs[SETTLED_PAIRS:]
-            )
-            least_more = max(
-                thresholds.second * least, rules.more * _excess(first.misfit, evidence)
-            )
-            tried += [
-                p
-                for p in pairs
-                if first.misfit - p.misfit > least_more
-                and not within_tolerance(p, evidence, thresholds)
-            ]
-        chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
-        if rules.most > thresholds.known.most:
-            more, chain = fit_stepwise(
-                tried, first, Growth(search, fitter, effects, least, rules, thresholds), map_fits
-            )
-            tried += more
+        if evidence.machine.rough:
+            return _attribute_rough(search, nothing, tried, silent)
+        if nothing.misfit - search.cost(tried[0]) > least:
+            tried += _fit_pairs(search, nothing, tried)
+    chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
     tried = drop_needless(tried, least, thresholds)
-    silent = tuple(
-        effect for effect in effects if search.largest_response(effect) < thresholds.detected
-    )
     return _conclude(nothing, tried, evidence, silent, thresholds, chain)
+
+
+def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]:
+    """Pairs of effects that explain enough of what the best one leaves."""
+    evidence, thresholds, first = search.fitter.evidence, search.thresholds, tried[0]
+    much = _excess(first.misfit, evidence) > thresholds.much * evidence.expected
+    hopes: list[Proposal] = []
+    for leader in tried[: BEAM if much else 1]:
+        # What stands far behind as the first of two is no leader.
+        if leader.misfit - first.misfit <= thresholds.far_behind * max(
+            nothing.misfit - first.misfit, 0.0
+        ):
+            hopes += propose_additions(search.coarse, leader, search.effects, search.least)
+    hopes.sort(key=lambda hope: hope.promised)
+    hopeful = _distinct(hopes)[: MANY if much else FEW]
+    pairs = search.map_fits(
+        lambda hope: search.coarse.refine(hope.effects, hope.values, hope.space), hopeful
+    )
+    pairs.sort(key=search.cost)
+    for _ in range(LOOKED_AGAIN if pairs else 0):
+        known = {frozenset(pair.effects) for pair in pairs}
+        fresh = [
+            pair
+            for pair in propose_replacements(search.coarse, pairs[0], search.effects)
+            if frozenset(pair[0]) not in known
+        ]
+        pairs += search.map_fits(lambda pair: search.coarse.refine(*pair), fresh)
+        pairs.sort(key=search.cost)
+    settled = search.map_fits(search.fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
+    least_more = max(
+        thresholds.second * search.least,
+        thresholds.known.more * _excess(first.misfit, evidence),
+    )
+    return [
+        pair
+        for pair in (*settled, *pairs[SETTLED_PAIRS:])
+        if first.misfit - pair.misfit > least_more
+        and not within_tolerance(pair, evidence, thresholds)
+    ]
+
+
+def _attribute_rough(
+    search: _Search, nothing: Fit, singles: Sequence[Fit], silent: tuple[Effect, ...]
+) -> Attribution:
+    """The same of a machine whose nominal values are only a start: what is named is what data held
+    out of the fit ask for."""
+    evidence, thresholds = search.fitter.evidence, search.thresholds
+    growth = Growth(
+        search.coarse, search.fitter, search.effects, search.least, thresholds.rough, thresholds
+    )
+    tried = [*singles]
+    if nothing.misfit - search.cost(singles[0]) > search.least:
+        tried += fit_stepwise(singles, growth, search.map_fits)
+    tried = [
+        fit
+        for fit in drop_needless(tried, search.least, thresholds)
+        if not within_tolerance(fit, evidence, thresholds)
+    ]
+    selection = select(
+        [nothing, *tried],
+        search.coarse,
+        search.fitter,
+        search.effects,
+        thresholds.selection,
+        search.map_fits,
+    )
+    return _conclude_rough(search, nothing, selection, silent)
 
 
 def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
@@ -227,7 +277,7 @@ def _conclude(
     thresholds: Thresholds,
     chain: Sequence[Fit],
 ) -> Attribution:
-    rules = thresholds.rough if evidence.machine.rough else thresholds.known
+    rules = thresholds.known
     cost = partial(penalised_cost, price=thresholds.price)
     gap = max(nothing.misfit - evidence.expected, 0.0)
     pool = sorted([*tried, nothing], key=cost)
@@ -235,11 +285,6 @@ def _conclude(
     expected = evidence.expected_misfit(best.plant)
     temper = thresholds.temper + thresholds.form_temper * max(best.misfit - expected, 0.0)
     apart = np.array([(cost(fit) - cost(best)) / (2.0 * temper) for fit in pool])
-    if evidence.machine.rough:
-        # What is left is no noise but the model's error: as many pieces of it as are independent
-        # speak for one against another.
-        relative = np.array([(cost(fit) + expected) / (cost(best) + expected) for fit in pool])
-        apart = 0.5 * _count_independent(evidence, best.plant) * np.log(relative)
     weights = np.exp(-np.minimum(apart, 700.0))
     weights /= weights.sum()
     ranking = tuple(
@@ -274,15 +319,62 @@ def _conclude(
     )
 
 
-def _count_independent(evidence: Evidence, plant: Plant) -> float:
-    """How many independent pieces what a plant leaves consists of: the lines that share its power,
-    twice, for real and imaginary parts."""
-    total = square = 0.0
-    for transform in evidence.transforms(evidence.differences(plant)):
-        power = np.abs(transform) ** 2
-        total, square = total + float(power.sum()), square + float((power**2).sum())
-    # The powers of white noise are spread as an exponential, of which this would count half.
-    return 4.0 * total**2 / max(square, 1e-300)
+def _conclude_rough(
+    search: _Search, nothing: Fit, selection: Selection, silent: tuple[Effect, ...]
+) -> Attribution:
+    evidence, thresholds = search.fitter.evidence, search.thresholds
+    rules, chosen = thresholds.selection, selection.chosen
+    best = chosen.fit
+    expected = evidence.expected_misfit(best.plant)
+    gap = max(nothing.misfit - evidence.expected, 0.0)
+    empty = next(each for each in selection.pool if not each.fit.effects)
+    more = max(best.misfit - expected, 0.0) / expected > thresholds.unexplained
+    found = (
+        bool(best.effects)
+        and nothing.misfit - best.misfit > search.least
+        and (not more or empty.score - chosen.score > rules.least)
+    )
+    # What adds to the chosen one is no rival of it.
+    rivals = [
+        each
+        for each in selection.pool
+        if each is not chosen and not set(best.effects) < set(each.fit.effects)
+    ]
+    behind = np.array([max(each.score - chosen.score, 0.0) for each in (chosen, *rivals)])
+    weights = np.exp(-behind / (rules.alike / 3.0))
+    weights /= weights.sum()
+    ranking = tuple(
+        Explanation(each.fit, each.score, float(weight))
+        for each, weight in zip((chosen, *rivals), weights, strict=True)
+    )
+    explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
+    return Attribution(
+        nothing=nothing,
+        expected=expected,
+        best=ranking[0] if found else None,
+        ranking=ranking,
+        explained=explained if found else 0.0,
+        left=max(best.misfit - expected, 0.0) / expected,
+        unknown=more,
+        shares=_shares(best, evidence, explained) if found else {},
+        silent=silent,
+        chain=tuple(_nest(search.fitter, selection)),
+        selection=selection,
+    )
+
+
+def _nest(fitter: Fitter, selection: Selection) -> list[Fit]:
+    """The chosen fit, and before it the best of one effect fewer each time."""
+    chain = [selection.chosen.fit]
+    known = {frozenset(each.fit.effects): each.fit for each in selection.pool}
+    while len(chain[0].effects) > 1:
+        fewer = [
+            known.get(frozenset(rest)) or fitter.refine(rest, values)
+            for _, rest, values in without_each(chain[0])
+            if is_possible(rest, fitter.plant)
+        ]
+        chain.insert(0, min(fewer, key=lambda fit: fit.misfit))
+    return [fit for fit in chain if fit.effects]
 
 
 def _shares(fit: Fit, evidence: Evidence, explained: float) -> dict[str, float]:

@@ -12,7 +12,9 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
-from rigtwin.diagnosis.fit import Fit, Fitter, Space, with_values
+from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -171,8 +173,6 @@ def validate(
     Validation
         How far the gap shrinks there, and which effects stay.
     """
-    # Where much is left, an effect must help to stay.
-    worse = thresholds.better if evidence.machine.rough else thresholds.worse
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
     if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
@@ -190,12 +190,13 @@ def validate(
         def blocks_with(kept: tuple[Effect, ...]) -> Blocks:
             return blocks_of(with_effects(evidence.plant, fit, kept))
 
-        kept, rejected = reject_worsening(fit.effects, blocks_with, worse)
-        if rejected and evidence.machine.rough:
-            values = [
-                own for effect, own in zip(fit.effects, fit.values, strict=True) if effect in kept
-            ]
-            fit = Fitter(evidence).refit_with_tolerances(Fitter(evidence).refine(kept, values))
+        if evidence.machine.rough:
+            whole_fit = fit
+            fit = _drop_unnecessary(evidence, fit, other, thresholds.selection.needed)
+            kept = fit.effects
+            rejected = tuple(effect for effect in whole_fit.effects if effect not in kept)
+        else:
+            kept, rejected = reject_worsening(fit.effects, blocks_with, thresholds.worse)
         apart = _fit_halves(evidence, fit)[1] if evidence.machine.rough else []
         return Validation(
             predicted=predicted,
@@ -224,7 +225,10 @@ def validate(
         ]
         return found[0].join(found[1])
 
-    kept, rejected = reject_worsening(fit.effects, blocks_across, worse)
+    kept, rejected = fit.effects, ()
+    if not evidence.machine.rough:
+        # Of a rough model the explanation was chosen by what is held out of its fit already.
+        kept, rejected = reject_worsening(fit.effects, blocks_across, thresholds.worse)
     data = "each half, fitted to the other"
     return Validation(
         float(np.mean(predictions)),
@@ -234,6 +238,51 @@ def validate(
         data,
         tuple(fits),
     )
+
+
+def relative_errors(evidence: Evidence, plant: Plant) -> Array:
+    """What a plant leaves of each recording.
+
+    Parameters
+    ----------
+    evidence
+        The recordings.
+    plant
+        Whose predictions are meant.
+
+    Returns
+    -------
+    array
+        rms of what is left, in units of the signals' own standard deviation, or of their noise
+        where that is larger; shape (recordings,).
+    """
+    found = []
+    for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        counts = each.fade.max(axis=0) > 0.5
+        own = np.maximum(np.std(each.measured, axis=1), each.noise)
+        left = (each.measured - predicted)[:, counts] / own[:, None]
+        found.append(float(np.sqrt(np.mean(left**2))))
+    return np.array(found)
+
+
+def _drop_unnecessary(evidence: Evidence, fit: Fit, other: Evidence, needed: float) -> Fit:
+    """The fit less the effects without which held-out recordings are predicted as well, the others
+    fitted again; every recording counts alike, and most of them must ask for an effect."""
+    fitter = Fitter(evidence)
+    while fit.effects:
+        own = np.log(relative_errors(other, fit.plant))
+        losses = []
+        for _, rest, values in without_each(fit):
+            if not is_possible(rest, evidence.plant):
+                continue
+            simpler = fitter.refine(rest, values)
+            lost = np.log(relative_errors(other, simpler.plant)) - own
+            if float(np.mean(lost)) < needed or float(np.mean(lost > 0.0)) < 0.5:
+                losses.append((float(np.mean(lost)), simpler))
+        if not losses:
+            return fit
+        fit = min(losses, key=lambda pair: pair[0])[1]
+    return fit
 
 
 def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:

@@ -8,6 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
+from rigtwin.components import ForceActuator
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.errors import RigtwinError
@@ -206,7 +207,11 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
             continue
         first, length = longest_run(signal, np.ones(len(signal), bool))
         if length == len(signal):
-            if name not in still and (component.element == "sensor" or machine.rough):
+            # A constant force is a test: what it acts on may be let go.
+            pushes = isinstance(getattr(machine.plant, name), ForceActuator)
+            if name not in still and (
+                component.element == "sensor" or (machine.rough and not pushes)
+            ):
                 yield Fault(
                     "dead",
                     where,

@@ -6,6 +6,7 @@ sensors' sampling) → where → judged on held-out data → the next test.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -33,7 +34,7 @@ from rigtwin.diagnosis.finding import (
     Verdict,
 )
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.leftover import leftovers, power_without_each, steps
+from rigtwin.diagnosis.leftover import leftovers, steps
 from rigtwin.diagnosis.levels import compute_levels
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
@@ -167,16 +168,9 @@ def _diagnose(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )
     attributed = _findings(found, validation, evidence, thresholds)
-    # A small part of a rough model's gap may be anything's; what closes it is said, but not claimed
-    # to be the cause.
-    lost = power_without_each(evidence, best) if evidence.machine.rough else {}
-    traces = tuple(
-        each
-        for each in attributed
-        if lost and each.share < thresholds.trace and lost[str(each.name)] < thresholds.noticed
-    )
+    traces = _traces(found, evidence, thresholds)
     effects = [
-        *(each for each in attributed if each not in traces),
+        *attributed,
         *(_sensor_finding(each, evidence, thresholds.sure) for each in sampled),
         *(
             _controller_finding(each, thresholds.sure)
@@ -190,9 +184,7 @@ def _diagnose(
         verdict = "partly explained" if something or odd_controller else "explained"
     else:
         verdict = "unknown" if something or odd_controller else "no gap"
-    small = {str(each.name) for each in traces}
-    claimed = tuple(effect for effect in validation.kept if effect.name not in small)
-    where = _places(evidence, found, plant, claimed, disturbed if something else (), best)
+    where = _places(evidence, found, plant, validation.kept, disturbed if something else (), best)
     if odd_controller:
         where.append(
             Place(
@@ -297,8 +289,9 @@ def _findings(
         else own
         for number, own in enumerate(fit.widths)
     ]
-    alone = len(fit.effects) == 1 and not found.unknown
-    surest = thresholds.sure if alone else thresholds.less_sure
+    surest = (
+        thresholds.sure if len(fit.effects) == 1 and not found.unknown else thresholds.less_sure
+    )
     return [
         Finding(
             Name(effect.component, effect.kind.name),
@@ -311,6 +304,30 @@ def _findings(
         for effect, values, spread in zip(fit.effects, fit.values, widths, strict=True)
         if effect in outcome.kept
     ]
+
+
+def _traces(found: Attribution, evidence: Evidence, thresholds: Thresholds) -> tuple[Finding, ...]:
+    """Of a rough model, the effects that the best explanation of all has beside those that are
+    named: what it gains by them is too little to claim them."""
+    if found.selection is None or found.best is None:
+        return ()
+    chosen, best = found.selection.chosen, found.selection.pool[0]
+    gained = max(1.0 - math.exp(2.0 * (best.score - chosen.score)), 0.0)
+    more = [effect for effect in best.fit.effects if effect not in chosen.fit.effects]
+    return tuple(
+        Finding(
+            Name(effect.component, effect.kind.name),
+            estimates(effect, values, widths, evidence, thresholds.wider),
+            0.0,
+            (Name(effect.component, effect.kind.name),),
+            gained / len(more),
+            effect.kind.title,
+        )
+        for effect, values, widths in zip(
+            best.fit.effects, best.fit.values, best.fit.widths, strict=True
+        )
+        if effect in more
+    )
 
 
 def estimates(

@@ -50,6 +50,10 @@ SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
+FEWEST_STEPS = 2
+"""Of integration a tick, of a rough model: half of them for a search."""
+STEPPED = 0.1
+"""Share of what a rough model is held to that twice the integration steps may change."""
 SMOOTHED = 8
 """Lines to either side over which a signal's spectrum is averaged."""
 WIDELY = 32
@@ -146,6 +150,31 @@ def lines(
     )
 
 
+def _model_with_enough_steps(
+    machine: Machine, recording: Recording, configuration: Configuration, most: int
+) -> Model[Any]:
+    """The model with so few integration steps that twice as many change little of what it is held
+    to."""
+    steps = FEWEST_STEPS
+    model = model_of(machine, recording, configuration, steps)
+    held = [
+        max(
+            white_noise(recording.column(*row.channel)),
+            machine.form_of(row) * float(np.std(recording.column(*row.channel))),
+        )
+        for row in machine.rows
+    ]
+    predicted = model.predict(configuration.plant)
+    while steps < most:
+        finer = model.double_steps()
+        following = finer.predict(configuration.plant)
+        change = np.sqrt(np.mean((following - predicted) ** 2, axis=1))
+        if bool(np.all(change <= STEPPED * np.array(held))):
+            break
+        model, predicted, steps = finer, following, 2 * steps
+    return model
+
+
 def _smooth(power: Array, lines: int = SMOOTHED) -> Array:
     """Averaged over neighbouring lines to either side."""
     return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
@@ -215,7 +244,10 @@ class Evidence:
         self.names = [row.name for row in machine.rows]
         self.plant: Plant = self.configurations[0].plant
         self.models = [
-            model_of(machine, r, c, steps) for r, c in zip(recordings, configurations, strict=True)
+            _model_with_enough_steps(machine, r, c, steps)
+            if machine.rough
+            else model_of(machine, r, c, steps)
+            for r, c in zip(recordings, configurations, strict=True)
         ]
         self.lines = [
             lines(machine, recording, model, c.plant, part)
@@ -231,7 +263,8 @@ class Evidence:
                 row -= (row - expected) - remove_mains(
                     row - expected, recording.period, self.plant.mains.frequency
                 )
-        self._loosen()
+        if not machine.rough:
+            self._loosen()
         self._round()
         self.expected = sum(
             float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines

@@ -9,7 +9,7 @@ import numpy as np
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Place, Step
-from rigtwin.diagnosis.fit import Fit, Fitter, is_possible, without_each
+from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit
@@ -54,19 +54,6 @@ def remaining_rms(evidence: Evidence, plant: Plant) -> dict[str, float]:
         ]
         rows[name] = rms(np.concatenate(parts))
     return rows
-
-
-def power_without_each(evidence: Evidence, fit: Fit) -> dict[str, float]:
-    """Effect → power of what is left without it, the others fitted again, as a multiple of what is
-    left with it."""
-    fitter = Fitter(evidence)
-    found = {}
-    for effect, others, values in without_each(fit):
-        there = is_possible(others, evidence.plant)
-        found[effect.name] = (
-            fitter.refine(others, values).misfit / max(fit.misfit, 1e-9) if there else np.inf
-        )
-    return found
 
 
 def leftovers(

@@ -13,7 +13,8 @@ from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
-from rigtwin.diagnosis.fit import Fit, Space
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.space import Space
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.runner import simulate, without_limits

@@ -1,8 +1,8 @@
-"""Effects found one after another: the best explanation gets one more, as long as that explains
+"""Effects found one after another: the best explanations get one more, as long as that explains
 enough of what is left.
 
-What is found first may only resemble what is there, so two leaders are followed: the best of all,
-and the best with dry friction, without which a play, a spring or a Stribeck peak is nothing.
+What is found first may only resemble what is there, so several leaders are followed: the best, and
+the best with dry friction, without which a play, a spring or a Stribeck peak is nothing.
 """
 
 from __future__ import annotations
@@ -12,121 +12,27 @@ from dataclasses import dataclass
 from itertools import product
 
 from rigtwin.components import Effect, Guide
-from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import (
-    Fit,
-    Fitter,
-    Values,
-    clashes,
-    is_possible,
-    with_values,
-    without_each,
-)
-from rigtwin.diagnosis.thresholds import STANDARD, NamingRules, Thresholds
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.proposals import propose_additions
+from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
+from rigtwin.diagnosis.thresholds import NamingRules, Thresholds
 
-CONTAINED = {"two_lags": "lag"}
-"""Kind → the simpler one that it becomes at the end of its range."""
-TRIED, SETTLED = 8, 3
+TRIED, SETTLED = 6, 3
 """Further effects that are fitted beside a leader, and those fitted again with the tolerances taken
 at them."""
-REPLACED = 6
-"""Explanations with one effect replaced that are settled at most."""
+LEADERS = 2
+"""Explanations of each number of effects that get one more."""
+REGULAR = ("coulomb", "viscous", "stiffness", "mass", "offset")
+"""Kinds that nearly every machine has more or less of."""
+GATEWAY_STARTS = 3
+"""Sizes of the gateway that they are fitted together from."""
 GATEWAY = "coulomb"
 """Kind without which others do nothing."""
 SECOND_ORDER = ("two_lags", "resonance")
 """Kinds that a lag and a delay may be taken for."""
 BEHIND = ("compliance", "backlash")
 """Kinds that hide their gateway."""
-
-
-def penalised_cost(fit: Fit, price: float) -> float:
-    """χ² of a fit with a price on its parameters.
-
-    Parameters
-    ----------
-    fit
-        Of any effects.
-    price
-        χ² for each parameter.
-
-    Returns
-    -------
-    float
-        What explanations are ranked by, the least first.
-    """
-    return fit.misfit + price * sum(len(effect.kind.parameters) for effect in fit.effects)
-
-
-def drop_needless(
-    tried: Sequence[Fit], least: float, thresholds: Thresholds = STANDARD
-) -> list[Fit]:
-    """The fits less those in which a simpler effect would do as well.
-
-    Parameters
-    ----------
-    tried
-        Fits of any effects.
-    least
-        χ² by which the less simple one must do better.
-    thresholds
-        What figures are held against.
-
-    Returns
-    -------
-    list of Fit
-        Those that stay, in their order.
-    """
-    misfits = {frozenset((e.kind.name, e.group) for e in fit.effects): fit.misfit for fit in tried}
-    most = max((fit.misfit for fit in tried), default=0.0)
-    found = []
-    for fit in tried:
-        names = {(e.kind.name, e.group) for e in fit.effects}
-        simpler = [
-            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)})
-            for kind, group in names
-            if kind in CONTAINED
-        ]
-        enough = max(least, thresholds.slight * (most - fit.misfit))
-        if not any(other in misfits and misfits[other] - fit.misfit < enough for other in simpler):
-            found.append(fit)
-    return found
-
-
-def within_tolerance(fit: Fit, evidence: Evidence, thresholds: Thresholds = STANDARD) -> bool:
-    """Whether one of the effects is no more than its declared tolerance.
-
-    Parameters
-    ----------
-    fit
-        Of any effects.
-    evidence
-        That it was fitted to.
-    thresholds
-        What figures are held against.
-
-    Returns
-    -------
-    bool
-        True if it explains nothing but a tolerance.
-    """
-    return any(
-        _is_tolerated(effect, values[0], evidence, thresholds.within_tolerance)
-        for effect, values in zip(fit.effects, fit.values, strict=True)
-    )
-
-
-def _is_tolerated(effect: Effect, value: float, evidence: Evidence, widths: float) -> bool:
-    """Whether a value is off nominal by at most so many tolerances."""
-    parameter = effect.kind.parameters[0]
-    tolerance = evidence.machine.tolerance_of(effect.group, parameter)
-    if tolerance is None:
-        return False
-    width = evidence.width(tolerance)
-    if tolerance.relative:
-        width = tolerance.half_width * abs(effect.nominal(evidence.plant)[parameter])
-    return abs(value - effect.nominal(evidence.plant)[parameter]) <= widths * width
-
-
 Start = tuple[tuple[Effect, ...], Values]
 """Effects, and values to start from."""
 MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
@@ -153,17 +59,13 @@ class Growth:
         return drop_needless(fits, self.least, self.thresholds)
 
 
-def fit_stepwise(
-    tried: Sequence[Fit], first: Fit, growth: Growth, map_fits: MapFits
-) -> tuple[list[Fit], list[Fit]]:
-    """Adds one effect after another to the best explanation, then replaces and removes each.
+def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> list[Fit]:
+    """Adds one effect after another to the best explanations.
 
     Parameters
     ----------
-    tried
-        Fits of one and of two effects.
-    first
-        The best of one.
+    singles
+        Fits of one effect.
     growth
         What the search needs.
     map_fits
@@ -171,50 +73,67 @@ def fit_stepwise(
 
     Returns
     -------
-    two lists of Fit
-        Further fits, and the chain of fits that leads to the best one.
+    list of Fit
+        Of two effects and more.
     """
-    found: list[Fit] = []
-    before: dict[int, Fit] = {id(fit): first for fit in tried if len(fit.effects) == 2}
-    level = sorted(
-        growth.drop_needless([fit for fit in tried if len(fit.effects) == 2]), key=growth.cost
-    )
-    while level and len(level[0].effects) < growth.rules.most:
+    found = _fit_regulars(growth, map_fits)
+    level = sorted(growth.drop_needless(singles), key=growth.cost)
+    while level:
         following: list[Fit] = []
         for leader in _leaders(level):
-            further = _extend(leader, growth, map_fits)
-            before |= {id(fit): leader for fit in further}
-            following += further
+            if len(leader.effects) < growth.rules.most:
+                following += _extend(leader, growth, map_fits)
         found += following
         level = sorted(growth.drop_needless(following), key=growth.cost)
-    best = min(growth.drop_needless([*tried, *found]), key=growth.cost)
-    if len(best.effects) > 1:
-        replaced = _replace_each(best, [*tried, *found], growth, map_fits)
-        # One that came of another's chain is no step of its own.
-        before |= {id(fit): before[id(best)] for fit in replaced if id(best) in before}
-        found += replaced
-        best = min(growth.drop_needless([best, *replaced]), key=growth.cost)
-        for fit in _prune(best, growth):
-            before[id(fit)] = best
-            found.append(fit)
-            best = fit
-    chain = [best]
-    while id(chain[0]) in before:
-        chain.insert(0, before[id(chain[0])])
-    return found, chain
+    return found
+
+
+def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
+    """What nearly every machine has, all of it together, and then without one after another: what
+    is found in turn may stand for several of them at once."""
+    chosen: list[Effect] = []
+    for effect in growth.effects:
+        if effect.kind.name in REGULAR and not clashes(effect, chosen):
+            chosen.append(effect)
+    if len(chosen) < 2:
+        return []
+    search = growth.search
+
+    def start_of(effect: Effect, number: int) -> tuple[float, ...]:
+        if effect.kind.name != GATEWAY:
+            return tuple(effect.nominal(growth.search.plant).values())
+        values = [v for v in search.starts(effect).values if v[0] > 0.0]
+        return values[min(number, len(values) - 1)]
+
+    tries = map_fits(
+        lambda number: search.refine(
+            tuple(chosen), [start_of(effect, int(number)) for effect in chosen]
+        ),
+        range(GATEWAY_STARTS),
+    )
+    found = [min(tries, key=growth.cost)]
+    while len(found[-1].effects) > 1:
+        fewer = [
+            (rest, values)
+            for _, rest, values in without_each(found[-1])
+            if is_possible(rest, search.plant)
+        ]
+        found.append(min(map_fits(lambda pair: search.refine(*pair), fewer), key=growth.cost))
+    return [fit for fit in found if not within_tolerance(fit, search.evidence, growth.thresholds)]
 
 
 def _leaders(level: Sequence[Fit]) -> list[Fit]:
-    """The best, and the best with a gateway effect if it has none."""
+    """The best of different effects, and the best with a gateway effect if none of them has it."""
+    distinct = list({frozenset(fit.effects): fit for fit in reversed(level)}.values())[::-1]
     through = [fit for fit in level if any(effect.kind.name == GATEWAY for effect in fit.effects)]
-    return list({id(fit): fit for fit in (level[0], *through[:1])}.values())
+    return list({id(fit): fit for fit in (*distinct[:LEADERS], *through[:1])}.values())
 
 
 def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
     """Fits of one effect more that explain enough of what a leader leaves."""
     evidence = growth.fitter.evidence
     hopes = sorted(
-        growth.search.propose_additions(leader, growth.effects, growth.least),
+        propose_additions(growth.search, leader, growth.effects, growth.least),
         key=lambda hope: hope.promised,
     )[:TRIED]
     found = map_fits(
@@ -289,39 +208,3 @@ def _unfold(leader: Fit, growth: Growth) -> list[Start]:
         ):
             found.append(_pair_start(growth.search, rest, values, (pair[0], pair[1])))
     return found
-
-
-def _prune(best: Fit, growth: Growth) -> list[Fit]:
-    """The fit with one effect after another taken out that explains nothing any more, now that the
-    others are there."""
-    found: list[Fit] = []
-    while len(best.effects) > 1:
-        fewer = [
-            (rest, values)
-            for _, rest, values in without_each(best)
-            if is_possible(rest, growth.fitter.plant)
-        ]
-        tries = [growth.fitter.refine(*each) for each in fewer]
-        simpler = min(tries, key=growth.cost, default=best)
-        if simpler is best or simpler.misfit - best.misfit > growth.least:
-            break
-        best = growth.fitter.refit_with_tolerances(simpler)
-        found.append(best)
-    return found
-
-
-def _replace_each(best: Fit, tried: Sequence[Fit], growth: Growth, map_fits: MapFits) -> list[Fit]:
-    """What may stand in each effect's place, now that the others are known."""
-    known = {frozenset(fit.effects) for fit in tried}
-    alike = [
-        pair
-        for pair in growth.search.propose_replacements(best, growth.effects)
-        if frozenset(pair[0]) not in known
-    ]
-    others = sorted(map_fits(lambda pair: growth.search.refine(*pair), alike), key=growth.cost)
-    far = best.misfit + growth.thresholds.near * max(
-        growth.fitter.nothing.misfit - best.misfit, 0.0
-    )
-    return map_fits(
-        growth.fitter.refit_with_tolerances, [fit for fit in others[:REPLACED] if fit.misfit < far]
-    )

@@ -25,6 +25,31 @@ class NamingRules:
 
 
 @dataclass(frozen=True)
+class SelectionRules:
+    """When an explanation of a rough model does as well as another on data held out of its fit.
+
+    Differences are of the logarithm of the error: 0.1 is 10 %.
+    """
+
+    price: float = 0.06
+    """That each parameter must gain, besides what its freedom gains by chance: ln N / N, with N
+    independent pieces of what is left."""
+    slack: float = 0.10
+    """The largest difference that is none."""
+    alike: float = 0.03
+    """Difference from the chosen one within which others are named beside it, or its standard
+    error, up to `slack`."""
+    steady: float = 4.0
+    """Standard errors by which a magnitude must be off nominal."""
+    undone: float = 0.5
+    """Share of either effect's own amplitude that two must leave together."""
+    needed: float = 0.03
+    """Difference on held-out recordings that an effect must bring to stay."""
+    least: float = 0.35
+    """Difference from the nominal machine that an explanation must bring to be named at all."""
+
+
+@dataclass(frozen=True)
 class Thresholds:
     """What the stages of a diagnosis hold their figures against."""
 
@@ -52,6 +77,8 @@ class Thresholds:
     )
     """Of one whose nominal values are only a start: something is always left; half the gap, in
     amplitude, must be explained."""
+    selection: SelectionRules = field(default=SelectionRules())
+    """Between explanations of a rough model."""
     price: float = 8.0
     """Of each parameter, in χ²: a simpler explanation is preferred."""
     within_tolerance: float = 1.5
@@ -64,8 +91,6 @@ class Thresholds:
     """Share of what is explained that an explanation with one effect replaced may lack."""
     worse: float = 1.05
     """Times the gap without it from which held-out data reject a correction."""
-    better: float = 0.995
-    """The same for a rough model, where an effect must help to stay."""
     sure: float = 0.98
     """Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
     less_sure: float = 0.88
@@ -75,11 +100,6 @@ class Thresholds:
     """Confidence below which another test is proposed."""
     wider: float = 2.5
     """Times the statistical interval that is reported: a model's form is never exact."""
-    trace: float = 0.01
-    """Share of a rough model's gap below which an effect is not claimed."""
-    noticed: float = 4.0
-    """Times the power that is left without an effect that is claimed all the same, all others
-    fitted again: twice the gap."""
     possible: float = 0.01
     """Probability from which on another explanation is kept beside the one named."""
     something: float = 0.03

@@ -17,7 +17,7 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Space
+from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
 PRICE = 20.0

@@ -1,9 +1,11 @@
 """One joint's equation of motion: pushed by a force, or moved as prescribed. Compiled.
 
 Dry friction acts through a play and a spring in series with it. Where the description gives no
-spring it is as stiff as the step allows, which holds a sticking joint where it is. The step is
-implicit in friction and viscous forces, so it neither chatters nor creeps; positions are taken at
-the steps, velocities midway between them.
+spring it is as stiff as the step allows, which holds a sticking joint where it is. Positions are
+taken at the steps, velocities midway between them. Viscous forces are those of the mean of two
+velocities, which is of second order, as a lightly damped resonance needs; where they would overcome
+the inertia within a step they become implicit. Dry friction is implicit, so it neither chatters nor
+creeps.
 """
 
 from __future__ import annotations
@@ -192,8 +194,10 @@ def integrate_pushed(
                 - position_force(guide, x, inertia.rest)
                 - (1.0 - share) * viscous
             )
-            total = inertia.mass + h * (share * coefficient + guide.drag * abs(v))
-            rhs = inertia.mass * v + h * load
+            damped = h * (share * coefficient + guide.drag * abs(v))
+            ahead = max(0.5, 1.0 - inertia.mass / damped) if damped > 0.0 else 0.5
+            total = inertia.mass + ahead * damped
+            rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
             forward, backward = dry_limits(dry_friction, v, 0.5 * (earlier + force))
             velocity = rhs / total
             apart = x + h * velocity - slider
@@ -204,6 +208,7 @@ def integrate_pushed(
                 if by != 0.0:
                     velocity = (rhs - h * dry) / total
                     slider = x + h * velocity - edge - dry / spring
-            viscous += share * (coefficient * velocity - viscous)
+            between = ahead * velocity + (1.0 - ahead) * v
+            viscous += share * (coefficient * between - viscous)
             v = velocity
             x += h * v

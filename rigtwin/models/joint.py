@@ -26,9 +26,10 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.model import Form
+from rigtwin.models.start import Start, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smooth, white_noise
+from rigtwin.signals.noise import rms, smallest_step, smooth, white_noise
 
 KEPT = 24
 """Motions that are kept."""
@@ -38,8 +39,8 @@ SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
 RUNAWAY = 1e6
 """In any unit of a joint: no machine goes there."""
-BEGINNING = 0.03
-"""s, from which a joint's motion at the start is estimated."""
+SHOWS = 0.5
+"""Share of what a signal is held to from which the error of a start shows."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
@@ -97,7 +98,10 @@ class JointModel:
             and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
         self._last: dict[tuple[object, ...], Array] = {}
-        self._start = self._estimate_start()
+        self._started_by = self._find_position_sensor()
+        self._start, self._start_error = self._read_start(), (0.0, 0.0)
+        self._starts: dict[tuple[object, ...], Start] = {}
+        self._held = self._find_held()
 
     def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
@@ -108,20 +112,70 @@ class JointModel:
     def _with_steps(self, steps: int) -> JointModel:
         return JointModel(self._machine, self._replay, self._recording, self._configuration, steps)
 
-    def _estimate_start(self) -> tuple[float, float]:
-        """Position and velocity at the start, as measured."""
-        measured = [row.channel for row in self.rows if row.kind == "position"]
-        for name in self._sensors:
-            channel = self._machine.components[name].channel
-            sensor = getattr(self._machine.plant, name)
-            if channel is not None and measures(sensor) == "position":
-                measured.append(channel)
-        for channel in measured:
-            ticks = min(max(8, round(BEGINNING / self._period)), self._recording.ticks)
-            time = np.arange(ticks) * self._period
-            curve = np.polynomial.Polynomial.fit(time, self._recording.column(*channel)[:ticks], 2)
-            return float(curve(0.0)), float(curve.deriv()(0.0))
-        return 0.0, 0.0
+    def _find_position_sensor(self) -> str | None:
+        """The sensor that says where the joint is at the start."""
+        rows = [row.name for row in self.rows if row.kind == "position"]
+        for name in (*rows, *self._sensors):
+            if measures(getattr(self._machine.plant, name)) == "position":
+                return name
+        return None
+
+    def _read_start(self) -> Start:
+        """As the first samples have it."""
+        if self._started_by is None:
+            return 0.0, 0.0
+        return read_start(self._recording.column(*self._start_channel), self._period)
+
+    @property
+    def _start_channel(self) -> tuple[str, str]:
+        assert self._started_by is not None
+        channel = self._machine.components[self._started_by].channel
+        assert channel is not None
+        return channel
+
+    def _start_of(self, plant: Plant) -> Start:
+        """Position and velocity at the start, where a sensor's zero is no place of the joint."""
+        if self._started_by is None:
+            return self._start
+        sensor = getattr(plant, self._started_by)
+        start = (self._start[0] - sensor.offset) / sensor.gain, self._start[1] / sensor.gain
+        if not self._held:
+            return start
+        key = self._key(plant)
+        if key not in self._starts:
+            measured = (self._recording.column(*self._start_channel) - sensor.offset) / sensor.gain
+            found = fit_start(
+                lambda start: self._position_from(plant, start),
+                measured,
+                start,
+                self._start_error,
+                self._held,
+            )
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
+        return self._starts[key]
+
+    def _position_from(self, plant: Plant, start: Start) -> Array:
+        mover = getattr(plant, self._mover.name)
+        out = self._integrate_pushed(plant, mover, np.zeros(len(self._command)), start=start)[0]
+        return np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+
+    def _find_held(self) -> float:
+        """To what the position is predicted at best where the start's error shows in it; 0 where it
+        does not, or where nobody asks for it."""
+        open_loop = self._free and self._control is None and self._machine.rough
+        row = next((row for row in self.rows if row.name == self._started_by), None)
+        if row is None or not open_loop:
+            return 0.0
+        measured = self._recording.column(*row.channel)
+        noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
+        self._start_error = start_error(noise, self._period, len(measured))
+        held = max(self._machine.form_of(row) * float(np.std(measured)), noise)
+        position, velocity = self._start
+        faster = (position, velocity + self._start_error[1])
+        change = self._position_from(self._machine.plant, faster) - self._position_from(
+            self._machine.plant, self._start
+        )
+        return held if rms(change) > SHOWS * held else 0.0
 
     def _parts(self, plant: Plant) -> tuple[Guide, Inertia]:
         replay = self._replay
@@ -139,6 +193,8 @@ class JointModel:
         names = [self._replay.guide, self._replay.mass, self._mover.name, "computer"]
         if self._control is not None:
             names += self._sensors
+        if self._started_by is not None and self._started_by not in names:
+            names.append(self._started_by)
         return tuple(getattr(plant, name) for name in names if name is not None)
 
     def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
@@ -168,7 +224,8 @@ class JointModel:
                 out[2] -= force
         # A plant that is not stable runs away; it must be a bad explanation, not an impossible
         # number.
-        out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+        if not float(np.abs(out).max()) <= RUNAWAY:
+            out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
@@ -217,10 +274,16 @@ class JointModel:
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _integrate_pushed(
-        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
+        self,
+        plant: Plant,
+        mover: ForceActuator,
+        besides: Array,
+        noise: Array | None = None,
+        start: Start | None = None,
     ) -> Array:
         """The joint under its force actuator. besides: another force on it, N, shape (ticks,);
-        noise: of what a controller reads, shape (ticks, inputs)."""
+        noise: of what a controller reads, shape (ticks, inputs); start: by default as the recording
+        shows it."""
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * max(inertia.mass, 1e-12) / h**2
@@ -238,7 +301,7 @@ class JointModel:
             dry_friction=friction(guide),
             inertia=inertia,
             spring=spring,
-            start=self._start,
+            start=self._start_of(plant) if start is None else start,
             constant=mover.constant,
             limit=min(mover.force_limit, UNLIMITED),
             drive=conditioning,
@@ -357,7 +420,12 @@ class JointModel:
 
     def motion(self, component: str, plant: Plant) -> Motion:  # noqa: ARG002
         moved = self.move(plant)
-        return Motion(moved[0], moved[1], moved[2])
+        force = moved[2]
+        if not force.any():
+            # It swings freely: what acts on it is what its inertia shows.
+            _, inertia = self._parts(plant)
+            force = inertia.mass * np.gradient(moved[1], self._period)
+        return Motion(moved[0], moved[1], force)
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors

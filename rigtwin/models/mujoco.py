@@ -21,6 +21,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import start_transducer, transduce, transducer
 from rigtwin.models.guided import Inertia
 from rigtwin.models.joint import JointModel
+from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array
 
 FIXED = 1e12
@@ -112,13 +113,18 @@ class MujocoModel(JointModel):
         return out
 
     def _integrate_pushed(
-        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
+        self,
+        plant: Plant,
+        mover: ForceActuator,
+        besides: Array,
+        noise: Array | None = None,
+        start: Start | None = None,
     ) -> Array:
         """The joint under its force actuator."""
         h = self._period / self._steps
         model, data, place, at = self._mechanics(plant, h)
         guide, inertia = self._parts(plant)
-        data.qpos[place], data.qvel[at] = self._start
+        data.qpos[place], data.qvel[at] = self._start_of(plant) if start is None else start
         passive = _Passive(guide, h, inertia, float(data.qpos[place]))
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))

@@ -1,0 +1,399 @@
+"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their
+prior beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigtwin.components import Effect, Scales, Starts
+from rigtwin.components.effect import Swing
+from rigtwin.components.plant import Plant
+from rigtwin.diagnosis.evidence import JUMPS, Evidence
+from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
+from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.swing import swings
+from rigtwin.numerics.arrays import Array
+
+SHAKES = (0.88, 0.95, 1.05, 1.12)
+"""Shares of a magnitude at which a fit is tried to be better yet."""
+SETTLING = 2
+"""Times that the tolerances are taken anew at a fit."""
+AT_BOUND = 1e-3
+"""Share of a bound within which a value stands at it."""
+ITERATIONS = 8
+GAINED, ROUGHLY = 0.2, 1e-3
+"""χ² that a step must gain to be followed by another, and share of a rough model's."""
+REFINED = 3
+"""Starts that are followed to their end at most."""
+WORTH = 0.5
+"""Share of the best start's gain that another may lack and still be followed."""
+LIMITS = ("saturation", "rate_limit", "resonance")
+"""Kinds whose magnitude is no measure of what they do."""
+KEPT = 64
+"""Responses beside a fit that are kept."""
+NOTHING = 1e-3
+"""χ² below which an effect does nothing at all."""
+Responses = list[tuple[tuple[float, ...], Array]]
+"""Of an effect: values that were tried, and what each changes, whitened."""
+
+
+class Fitter:
+    """Fits any effects to one body of evidence."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence, self.plant = evidence, evidence.plant
+        self.space = Space(evidence, evidence.plant)
+        self.swing = swings(evidence.machine, evidence.recordings)
+        self._scales: dict[str, Scales] = {}
+        self._nominal = evidence.residual(evidence.plant)
+        self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
+        self._responses: dict[Effect, Responses] = {}
+        self._beside: dict[tuple[Effect, tuple[Effect, ...], Values], Responses] = {}
+        self._residual: tuple[tuple[tuple[Effect, ...], Values], Array] = ((), ()), self._nominal
+
+    def starts(self, effect: Effect) -> Starts:
+        """Where a search for an effect starts."""
+        return self._starts_at(effect, self.plant)
+
+    def _starts_at(self, effect: Effect, plant: Plant) -> Starts:
+        own = self.swing.get(effect.component, Swing())
+        return effect.starts(plant, own, lambda: self._scale(effect.group))
+
+    def _scale(self, component: str) -> Scales:
+        """What a component goes through on these recordings, by the nominal plant and by what is
+        measured of the force."""
+        if component not in self._scales:
+            longest = max(
+                range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
+            )
+            measured = self.evidence.lines[longest].measured
+            forces = [
+                measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
+            ]
+            force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
+            motion = self.evidence.models[longest].motion(component, self.plant)
+            self._scales[component] = Scales.of(
+                motion, force, self.evidence.recordings[longest].period
+            )
+        return self._scales[component]
+
+    def fit_one(self, effect: Effect) -> Fit:
+        """The best fit of one effect.
+
+        Parameters
+        ----------
+        effect
+            One that is searched for.
+
+        Returns
+        -------
+        Fit
+            From the best of its starts.
+        """
+        if not is_possible((effect,), self.plant):
+            start = self.starts(effect).values
+            self._responses[effect] = [
+                (values, np.zeros_like(self._nominal, np.float32)) for values in start
+            ]
+            return Fit(
+                (effect,), (start[0],), self.nothing.misfit, ((0.0,) * len(start[0]),), self.plant
+            )
+        scored: list[tuple[float, tuple[float, ...]]] = []
+        responses = []
+        found = self.starts(effect)
+        for start in found.values:
+            residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
+            scored.append((self.space.misfit(residual), start))
+            responses.append((start, (self._nominal - residual).astype(np.float32)))
+        self._responses[effect] = responses
+        if found.quadrature:
+            scored += self._blend(effect, responses)
+        scored.sort()
+        # Another start is followed too where it comes near the best; where none helps, the best is
+        # followed alone.
+        enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
+        followed = [
+            start
+            for number, (misfit, start) in enumerate(scored[:REFINED])
+            if number == 0 or misfit < enough
+        ]
+        return min(
+            (self.refine((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit
+        )
+
+    def _blend(self, effect: Effect, responses: Responses) -> list[tuple[float, tuple[float, ...]]]:
+        """The blends of neighbouring quadratures that promise most, with their misfits."""
+        left = self.space.subtract_tolerances(self._nominal)
+        blends = []
+        for (start, one), (_, other) in zip(responses[::2], responses[1::2], strict=True):
+            apart = self.space.project_out(np.stack([one, other], axis=1).astype(np.float64))
+            strengths = np.linalg.lstsq(apart, left, rcond=None)[0]
+            gain = float(np.sum((apart @ strengths) ** 2))
+            amplitude = start[0] * float(np.hypot(*strengths))
+            blends.append(
+                (gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0]))))
+            )
+        blends.sort(reverse=True)
+        return [
+            (
+                self.space.misfit(
+                    self.evidence.residual(with_values(self.plant, (effect,), (start,)))
+                ),
+                start,
+            )
+            for _, start in blends[:REFINED]
+        ]
+
+    def largest_response(self, effect: Effect) -> float:
+        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up.
+
+        Parameters
+        ----------
+        effect
+            One that was fitted alone before.
+
+        Returns
+        -------
+        float
+            χ².
+        """
+        return max(
+            self.space.misfit(response.astype(np.float64))
+            for _, response in self._responses[effect]
+        )
+
+    def responses_beside(self, effect: Effect, first: Fit) -> Responses:
+        """What an effect changes, for every value that a search for it starts from.
+
+        Parameters
+        ----------
+        effect
+            One that was fitted alone before.
+        first
+            A fit of others.
+
+        Returns
+        -------
+        list of tuples
+            Values, and the response at the nominal plant; beside `first` if the nominal plant is
+            only a start, or if the effect does nothing without `first`, as a play does nothing
+            without friction.
+        """
+        rough = self.evidence.machine.rough and bool(first.effects)
+        if not rough and self.largest_response(effect) > NOTHING:
+            return self._responses[effect]
+        known = (effect, first.effects, first.values)
+        if known not in self._beside:
+            found = []
+            here = self.residual_at(first)
+            values = (
+                self._starts_at(effect, first.plant).values
+                if rough
+                else [start for start, _ in self._responses[effect]]
+            )
+            for start in values:
+                there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
+                found.append((start, (here - there).astype(np.float32)))
+            self._beside = {**dict(list(self._beside.items())[-KEPT:]), known: found}
+        return self._beside[known]
+
+    def responses_instead(self, effect: Effect, rest: Fit) -> Responses:
+        """What an effect would change in another's place.
+
+        Parameters
+        ----------
+        effect
+            One that was fitted alone before.
+        rest
+            The effects without that other one.
+
+        Returns
+        -------
+        list of tuples
+            Values, and the response at the nominal plant, or beside the rest if the nominal plant
+            is only a start.
+        """
+        if self.evidence.machine.rough:
+            return self.responses_beside(effect, rest)
+        return self._responses[effect]
+
+    def residual_at(self, fit: Fit) -> Array:
+        """The residual of a fit; that of the last one asked for is kept."""
+        known, residual = self._residual
+        if known != (fit.effects, fit.values):
+            known, residual = (fit.effects, fit.values), self.evidence.residual(fit.plant)
+            self._residual = known, residual
+        return residual
+
+    def scale_start(self, effect: Effect, start: tuple[float, ...], share: float) -> Values:
+        """A start with that share of its magnitude; limits, which nothing can be scaled from, as
+        they are. As the values of that one effect."""
+        nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+        if effect.kind.name in LIMITS:
+            return (start,)
+        return ((nominal + share * (start[0] - nominal), *start[1:]),)
+
+    def refit_with_tolerances(self, fit: Fit) -> Fit:
+        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant
+        itself.
+
+        Parameters
+        ----------
+        fit
+            To start from.
+
+        Returns
+        -------
+        Fit
+            Of the same effects.
+        """
+        tolerances = self.evidence.machine.tolerances
+        used = np.zeros(len(tolerances))
+        space = Space(self.evidence, fit.plant, used, fit.effects)
+        residual = self.evidence.residual(fit.plant)
+        rough = self.evidence.machine.rough
+        for _ in range(1 if rough else SETTLING):
+            found = space.estimate_tolerances(residual)
+            used = np.array(
+                [share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)]
+            )
+            base = self.evidence.shift(self.plant, used.tolist())
+            space = Space(
+                self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
+            )
+            fit = self.refine(fit.effects, fit.values, space, base)
+            if not rough:
+                # What a rough model leaves hides the steps that this would climb.
+                fit = self._perturb(fit, space, base)
+            residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
+        return fit
+
+    def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
+        """The fit, or a better one a little further away: where a stick begins or is missed, the
+        misfit has a step, and Gauss-Newton does not climb it."""
+        for number, effect in enumerate(fit.effects):
+            nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+            if effect.kind.name in LIMITS:
+                nominal = 0.0
+            for share in SHAKES:
+                magnitude = nominal + share * (fit.values[number][0] - nominal)
+                values = (
+                    *fit.values[:number],
+                    (magnitude, *fit.values[number][1:]),
+                    *fit.values[number + 1 :],
+                )
+                if (
+                    space.misfit(self.evidence.residual(with_values(base, fit.effects, values)))
+                    < fit.misfit
+                ):
+                    fit = min(
+                        fit,
+                        self.refine(fit.effects, values, space, base),
+                        key=lambda each: each.misfit,
+                    )
+        return fit
+
+    def bounds(self, effects: Sequence[Effect]) -> tuple[Array, Array]:
+        """Between which the values of effects are searched, shape (parameters,) each: their own
+        bounds, or narrower ones by what the recordings can show."""
+        low: list[float] = []
+        high: list[float] = []
+        for effect in effects:
+            own = [(quantity.low, quantity.high) for quantity in effect.quantities().values()]
+            narrower = self.starts(effect).bounds or own
+            low += [max(one[0], two[0]) for one, two in zip(own, narrower, strict=True)]
+            high += [min(one[1], two[1]) for one, two in zip(own, narrower, strict=True)]
+        return np.array(low), np.array(high)
+
+    def is_bounded(self, fit: Fit) -> bool:
+        """Whether a value stands at the end of the range that it is searched in. 0 is no end: what
+        is not there is not there."""
+        low, high = self.bounds(fit.effects)
+        values = np.concatenate([np.asarray(each) for each in fit.values])
+        return bool(
+            any(
+                np.any((end != 0.0) & (np.abs(values - end) <= AT_BOUND * np.abs(end)))
+                for end in (low, high)
+            )
+        )
+
+    def refine(
+        self,
+        effects: tuple[Effect, ...],
+        start: Sequence[Sequence[float]],
+        space: Space | None = None,
+        base: Plant | None = None,
+    ) -> Fit:
+        """Gauss-Newton with halved steps.
+
+        Parameters
+        ----------
+        effects
+            That are fitted together.
+        start
+            Values to start from, one tuple an effect.
+        space
+            The tolerances, by default those about the nominal plant.
+        base
+            The plant without the effects, by default the nominal one.
+
+        Returns
+        -------
+        Fit
+            Where no step gains any more.
+        """
+        space, base = space or self.space, base or self.plant
+        if not effects:
+            return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
+        sizes = [len(effect.kind.parameters) for effect in effects]
+        steps = np.concatenate([self.starts(effect).steps for effect in effects])
+        low, high = self.bounds(effects)
+
+        def split(vector: Array) -> Values:
+            cuts = np.cumsum(sizes)[:-1]
+            return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
+
+        def residual(vector: Array) -> Array:
+            return self.evidence.residual(with_values(base, effects, split(vector)))
+
+        here = np.clip(np.concatenate([np.asarray(values, float) for values in start]), low, high)
+        left = residual(here)
+        misfit = space.misfit(left)
+        normal = np.eye(len(here))
+        # Of a rough model something is always left; beside it small gains say nothing.
+        share = ROUGHLY if self.evidence.machine.rough else 0.0
+        for _ in range(ITERATIONS):
+            columns = []
+            for number in range(len(here)):
+                step = (
+                    steps[number]
+                    if here[number] + steps[number] <= high[number]
+                    else -steps[number]
+                )
+                beside = here.copy()
+                beside[number] += step
+                columns.append((residual(beside) - left) / (step / steps[number]))
+            jacobian = np.stack(columns, axis=1)
+            normal, gradient = space.normal_equations(jacobian, left)
+            damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
+            move = -np.linalg.solve(damped, gradient) * steps
+            gained = 0.0
+            for part in (1.0, 0.5, 0.2, 0.05):
+                there = np.clip(here + part * move, low, high)
+                tried = residual(there)
+                if (value := space.misfit(tried)) < misfit:
+                    gained = misfit - value
+                    here, left, misfit = there, tried, value
+                    break
+            if gained < max(GAINED, share * misfit):
+                break
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
+        return Fit(
+            effects,
+            split(here),
+            misfit,
+            split(spread),
+            with_values(self.plant, effects, split(here)),
+        )

@@ -1,0 +1,138 @@
+"""Which effects are worth a fit beside others, or in the place of one: by what they change, without
+fitting them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rigtwin.components import Effect
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.space import Space
+
+LOOKALIKES, RESEMBLES = 3, 0.6
+"""Effects that are tried in another's place at most, if they can explain this share of what it
+does."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start
+    from; space: tolerances."""
+
+    promised: float
+    effects: tuple[Effect, ...]
+    values: Values
+    space: Space = field(repr=False)
+
+
+def propose_additions(
+    fitter: Fitter, first: Fit, effects: Sequence[Effect], least: float
+) -> list[Proposal]:
+    """Further effects beside a fit, by how well their responses at the nominal plant, or beside
+    it, resemble what it leaves.
+
+    Parameters
+    ----------
+    fitter
+        Of the evidence.
+    first
+        The fit.
+    effects
+        Candidates, all fitted alone before.
+    least
+        χ² that one must promise to explain.
+
+    Returns
+    -------
+    list of Proposal
+        In the order of the candidates.
+    """
+    space = Space(fitter.evidence, first.plant)
+    left = space.subtract_tolerances(fitter.residual_at(first))
+    found = []
+    for effect in effects:
+        if clashes(effect, first.effects) or not is_possible(
+            (*first.effects, effect), fitter.plant
+        ):
+            continue
+        starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
+        apart = space.project_out(np.stack(responses, axis=1).astype(np.float64))
+        alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+        # A response may be too strong or too weak, but not the other way round.
+        share = np.clip(alike / power, 0.0, 3.0)
+        gains = 2.0 * share * alike - share**2 * power
+        best = int(np.argmax(gains))
+        if gains[best] > least:
+            promised = first.misfit - float(gains[best])
+            start = fitter.scale_start(effect, starts[best], float(share[best]))
+            found.append(
+                Proposal(promised, (*first.effects, effect), (*first.values, *start), space)
+            )
+    return found
+
+
+def propose_replacements(
+    fitter: Fitter, fit: Fit, effects: Sequence[Effect]
+) -> list[tuple[tuple[Effect, ...], Values]]:
+    """The effects of a fit with each in turn replaced by those whose response is most like its
+    own: what was found first may only resemble what is there.
+
+    Parameters
+    ----------
+    fitter
+        Of the evidence.
+    fit
+        The fit.
+    effects
+        Candidates, all fitted alone before.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and values to start from.
+    """
+    found = []
+    here = fitter.evidence.residual(fit.plant)
+    for number in range(len(fit.effects)):
+        rest = [place for place in range(len(fit.effects)) if place != number]
+        kept = tuple(fit.effects[place] for place in rest)
+        values_kept = tuple(fit.values[place] for place in rest)
+        plant = with_values(fitter.plant, kept, values_kept)
+        own = fitter.space.project_out((fitter.evidence.residual(plant) - here)[:, None])[:, 0]
+        without = Fit(kept, values_kept, fit.misfit, (), plant)
+        scored = []
+        for other in effects:
+            if (
+                other in fit.effects
+                or clashes(other, kept)
+                or not is_possible((*kept, other), fitter.plant)
+            ):
+                continue
+            starts, responses = zip(*fitter.responses_instead(other, without), strict=True)
+            apart = fitter.space.project_out(np.stack(responses, axis=1).astype(np.float64))
+            along, power = apart.T @ own, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+            resemblance = np.maximum(along, 0.0) ** 2 / power
+            best = int(np.argmax(resemblance))
+            share = min(float(along[best] / power[best]), 3.0)
+            scored.append(
+                (
+                    float(resemblance[best]),
+                    number,
+                    other,
+                    fitter.scale_start(other, starts[best], share),
+                )
+            )
+        scored.sort(key=lambda item: -item[0])
+        kind, rough = fit.effects[number].kind.name, fitter.evidence.machine.rough
+        for rank, (gain, place, other, start) in enumerate(scored):
+            resembles = rank < LOOKALIKES and gain > RESEMBLES * float(own @ own)
+            # The same at another component is the first thing to be asked about.
+            if resembles or (rough and other.kind.name == kind):
+                changed, values = list(fit.effects), list(fit.values)
+                changed[place], values[place] = other, start[0]
+                found.append((tuple(changed), tuple(values)))
+    return found

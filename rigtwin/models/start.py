@@ -1,0 +1,110 @@
+"""Where a joint is and how fast it goes when a recording starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rigtwin.numerics.arrays import Array
+
+STEPS, LIKELY = 2, 10.0
+"""Gauss-Newton steps, and errors of the first samples within which a start lies."""
+BEGINNING = 0.03
+"""s, from which a start is read."""
+FEWEST = 8
+"""Samples that it is read from at least."""
+ERRORS, OF_END = 3.0, 14.0
+"""Of a parabola through n samples of noise σ: its end is off by up to 3 σ, its slope there by up to
+14 σ / (√n · n · period)."""
+Start = tuple[float, float]
+"""Position m and velocity m/s."""
+
+
+def read_start(measured: Array, period: float) -> Start:
+    """The start by a parabola through the first samples.
+
+    Parameters
+    ----------
+    measured
+        Position, shape (ticks,).
+    period
+        s, of a tick.
+
+    Returns
+    -------
+    tuple
+        Position and velocity.
+    """
+    ticks = _ticks(period, len(measured))
+    curve = np.polynomial.Polynomial.fit(np.arange(ticks) * period, measured[:ticks], 2)
+    return float(curve(0.0)), float(curve.deriv()(0.0))
+
+
+def start_error(noise: float, period: float, count: int) -> Start:
+    """How far `read_start` may be off.
+
+    Parameters
+    ----------
+    noise
+        Standard deviation of a sample.
+    period
+        s, of a tick.
+    count
+        Samples there are.
+
+    Returns
+    -------
+    tuple
+        Of position and velocity.
+    """
+    ticks = _ticks(period, count)
+    return ERRORS * noise, OF_END * noise / (np.sqrt(ticks) * ticks * period)
+
+
+def _ticks(period: float, count: int) -> int:
+    return min(max(FEWEST, round(BEGINNING / period)), count)
+
+
+def fit_start(
+    predict: Callable[[Start], Array], measured: Array, first: Start, error: Start, held: float
+) -> Start:
+    """The start with which a joint goes as measured.
+
+    Parameters
+    ----------
+    predict
+        The position, shape (ticks,), from a start.
+    measured
+        The same as it was, shape (ticks,).
+    first
+        The start as it was read.
+    error
+        Of that, for position and velocity.
+    held
+        To what the position is predicted at best.
+
+    Returns
+    -------
+    tuple
+        Position and velocity; `first` if the prediction runs away.
+    """
+    width = np.array(error)
+    start = np.array(first)
+    for _ in range(STEPS):
+        here = predict((float(start[0]), float(start[1])))
+        columns = np.stack(
+            [
+                predict((float(start[0] + move[0]), float(start[1] + move[1]))) - here
+                for move in np.diag(width)
+            ],
+            axis=1,
+        )
+        columns /= held
+        normal = columns.T @ columns + np.eye(2) / LIKELY**2
+        gradient = columns.T @ ((measured - here) / held)
+        gradient -= (start - np.array(first)) / width / LIKELY**2
+        start = start + width * np.linalg.solve(normal, gradient)
+        if not np.isfinite(start).all():
+            return first
+    return float(start[0]), float(start[1])
