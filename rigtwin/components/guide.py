@@ -164,6 +164,14 @@ def breakaway(
     return forward, backward
 
 
+def resists(of: Guide) -> bool:
+    """Whether friction resists the motion in both directions: it differs between them by no more
+    than there is of it."""
+    if of.load_coefficient == 0.0 and abs(of.asymmetry) > 2.0 * (of.coulomb + abs(of.stribeck)):
+        return False
+    return abs(of.viscous_asymmetry) <= 2.0 * of.viscous
+
+
 @compilable
 def stretch(apart: float, half: float) -> float:
     """How far the spring behind a play of 2·half is stretched."""

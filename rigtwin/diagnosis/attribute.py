@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
@@ -53,8 +53,8 @@ class Attribution:
     named, None for none; ranking: all tried, the likeliest first; explained: share of the gap;
     left: χ² per degree of freedom above 1 after it; unknown: whether what is left is a gap; shares:
     of the gap, of each effect named; silent: effects that no size tried makes noticeable on this
-    evidence; chain: nested fits, the best of one effect first; selection: of a rough model, what was
-    judged on held-out data."""
+    evidence; chain: nested fits, the best of one effect first; selection: of a rough model, what
+    was judged on held-out data."""
 
     nothing: Fit
     expected: float
@@ -115,7 +115,9 @@ class _Search:
             + 2.0 * self.least
         )
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        tried = self.map_fits(self.fitter.refit_with_tolerances, close) + singles[len(close) :]
+        rough = self.fitter.evidence.machine.rough
+        settle = self.fitter.settle if rough else self.fitter.refit_with_tolerances
+        tried = self.map_fits(settle, close) + singles[len(close) :]
         tried.sort(key=self.cost)
         return self.fitter.refit_with_tolerances(self.fitter.nothing), tried
 
@@ -236,6 +238,9 @@ def _attribute_rough(
         thresholds.selection,
         search.map_fits,
     )
+    if selection.chosen.fit.effects:
+        settled = search.fitter.refit_with_tolerances(selection.chosen.fit)
+        selection = selection.replace_chosen(settled)
     return _conclude_rough(search, nothing, selection, silent)
 
 
@@ -360,6 +365,48 @@ def _conclude_rough(
         silent=silent,
         chain=tuple(_nest(search.fitter, selection)),
         selection=selection,
+    )
+
+
+def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) -> Attribution:
+    """Of explanations of a rough model that do equally well, the one that does best on recordings
+    that none of them was chosen by.
+
+    Parameters
+    ----------
+    found
+        What was chosen.
+    evidence
+        By which.
+    held_out
+        Other recordings.
+
+    Returns
+    -------
+    Attribution
+        With that one in the place of the chosen one.
+    """
+    if found.selection is None or found.best is None:
+        return found
+    best = min(
+        (found.selection.chosen, *found.selection.alike),
+        key=lambda each: float(np.mean(np.log(relative_errors(held_out, each.fit.plant)))),
+    )
+    if best is found.selection.chosen:
+        return found
+    own = {each.fit: each for each in found.ranking}
+    ahead = [own.get(best.fit, found.best), *(e for e in found.ranking if e.fit is not best.fit)]
+    likely = sorted((each.probability for each in ahead), reverse=True)
+    ranking = tuple(
+        replace(each, probability=probability)
+        for each, probability in zip(ahead, likely, strict=True)
+    )
+    return replace(
+        found,
+        best=ranking[0],
+        ranking=ranking,
+        shares=_shares(best.fit, evidence, found.explained),
+        selection=found.selection.prefer(best),
     )
 
 

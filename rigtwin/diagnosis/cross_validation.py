@@ -10,7 +10,7 @@ import numpy as np
 
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
@@ -238,31 +238,6 @@ def validate(
         data,
         tuple(fits),
     )
-
-
-def relative_errors(evidence: Evidence, plant: Plant) -> Array:
-    """What a plant leaves of each recording.
-
-    Parameters
-    ----------
-    evidence
-        The recordings.
-    plant
-        Whose predictions are meant.
-
-    Returns
-    -------
-    array
-        rms of what is left, in units of the signals' own standard deviation, or of their noise
-        where that is larger; shape (recordings,).
-    """
-    found = []
-    for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
-        counts = each.fade.max(axis=0) > 0.5
-        own = np.maximum(np.std(each.measured, axis=1), each.noise)
-        left = (each.measured - predicted)[:, counts] / own[:, None]
-        found.append(float(np.sqrt(np.mean(left**2))))
-    return np.array(found)
 
 
 def _drop_unnecessary(evidence: Evidence, fit: Fit, other: Evidence, needed: float) -> Fit:

@@ -17,7 +17,7 @@ from rigtwin.components import Effect, find, title, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
-from rigtwin.diagnosis.attribute import Attribution, Explanation, attribute
+from rigtwin.diagnosis.attribute import Attribution, Explanation, attribute, prefer_held_out
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
@@ -141,6 +141,8 @@ def _diagnose(
     started: float,
 ) -> Diagnosis:
     found = attribute(evidence, lambda steps: progress("fitting effects", steps), thresholds)
+    if held_out is not None:
+        found = prefer_held_out(found, evidence, held_out)
     best = (
         found.best.fit
         if found.best is not None

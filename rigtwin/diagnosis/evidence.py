@@ -52,7 +52,7 @@ COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
 FEWEST_STEPS = 2
 """Of integration a tick, of a rough model: half of them for a search."""
-STEPPED = 0.1
+STEPPED = 0.05
 """Share of what a rough model is held to that twice the integration steps may change."""
 SMOOTHED = 8
 """Lines to either side over which a signal's spectrum is averaged."""
@@ -460,3 +460,28 @@ class Evidence:
                 self.whiten([scale * (b - a) for a, b in zip(start, after, strict=True)])
             )
         return np.stack(columns, axis=1)
+
+
+def relative_errors(evidence: Evidence, plant: Plant) -> Array:
+    """What a plant leaves of each recording.
+
+    Parameters
+    ----------
+    evidence
+        The recordings.
+    plant
+        Whose predictions are meant.
+
+    Returns
+    -------
+    array
+        rms of what is left, in units of the signals' own standard deviation, or of their noise
+        where that is larger; shape (recordings,).
+    """
+    found = []
+    for each, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        counts = each.fade.max(axis=0) > 0.5
+        own = np.maximum(np.std(each.measured, axis=1), each.noise)
+        left = (each.measured - predicted)[:, counts] / own[:, None]
+        found.append(float(np.sqrt(np.mean(left**2))))
+    return np.array(found)

@@ -3,12 +3,13 @@ prior beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from rigtwin.components import Effect, Scales, Starts
+from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
+from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
@@ -22,6 +23,8 @@ SETTLING = 2
 """Times that the tolerances are taken anew at a fit."""
 AT_BOUND = 1e-3
 """Share of a bound within which a value stands at it."""
+WIDER = 5.0
+"""Times the step of a derivative at which a rough model's fit is tried to go on."""
 ITERATIONS = 8
 GAINED, ROUGHLY = 0.2, 1e-3
 """χ² that a step must gain to be followed by another, and share of a rough model's."""
@@ -249,12 +252,18 @@ class Fitter:
         Fit
             Of the same effects.
         """
+        return self._settle(fit, SETTLING, self._perturb)
+
+    def settle(self, fit: Fit) -> Fit:
+        """The same once, and not tried to be better further away: for a search."""
+        return self._settle(fit, 1, lambda fit, *_: fit)
+
+    def _settle(self, fit: Fit, rounds: int, improve: Callable[[Fit, Space, Plant], Fit]) -> Fit:
         tolerances = self.evidence.machine.tolerances
         used = np.zeros(len(tolerances))
         space = Space(self.evidence, fit.plant, used, fit.effects)
         residual = self.evidence.residual(fit.plant)
-        rough = self.evidence.machine.rough
-        for _ in range(1 if rough else SETTLING):
+        for _ in range(rounds):
             found = space.estimate_tolerances(residual)
             used = np.array(
                 [share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)]
@@ -263,10 +272,7 @@ class Fitter:
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
             )
-            fit = self.refine(fit.effects, fit.values, space, base)
-            if not rough:
-                # What a rough model leaves hides the steps that this would climb.
-                fit = self._perturb(fit, space, base)
+            fit = improve(self.refine(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
         return fit
 
@@ -308,8 +314,11 @@ class Fitter:
         return np.array(low), np.array(high)
 
     def is_bounded(self, fit: Fit) -> bool:
-        """Whether a value stands at the end of the range that it is searched in. 0 is no end: what
-        is not there is not there."""
+        """Whether a value stands at the end of the range that it is searched in, or a guide's
+        friction would push. 0 is no end: what is not there is not there."""
+        guides = {effect.group for effect in fit.effects if effect.of is Guide}
+        if not all(resists(getattr(fit.plant, name)) for name in guides):
+            return True
         low, high = self.bounds(fit.effects)
         values = np.concatenate([np.asarray(each) for each in fit.values])
         return bool(
@@ -364,14 +373,12 @@ class Fitter:
         normal = np.eye(len(here))
         # Of a rough model something is always left; beside it small gains say nothing.
         share = ROUGHLY if self.evidence.machine.rough else 0.0
+        wide, widest = 1.0, WIDER if self.evidence.machine.rough else 1.0
         for _ in range(ITERATIONS):
             columns = []
             for number in range(len(here)):
-                step = (
-                    steps[number]
-                    if here[number] + steps[number] <= high[number]
-                    else -steps[number]
-                )
+                reach = wide * steps[number]
+                step = reach if here[number] + reach <= high[number] else -reach
                 beside = here.copy()
                 beside[number] += step
                 columns.append((residual(beside) - left) / (step / steps[number]))
@@ -388,7 +395,10 @@ class Fitter:
                     here, left, misfit = there, tried, value
                     break
             if gained < max(GAINED, share * misfit):
-                break
+                if wide >= widest:
+                    break
+                # Sticking and slipping make small steps of the misfit: wide ones see over them.
+                wide *= WIDER
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
         return Fit(
             effects,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ FLOOR = 1.0 / 3.0
 """Share of what no model is held to below which an error counts no more."""
 USUAL = 4
 """Places that an effect of one parameter is looked for at."""
+SHAKES, SHAKEN, PRICE = (0.6, 1.6), 2, 0.1
+"""Shares of a magnitude from which explanations are fitted again, how many of them, and at what
+price of a parameter they are the foremost."""
 ROUNDS = 5
 """Times that an explanation is chosen and its neighbours are judged too."""
 JUDGED = 4
@@ -45,14 +48,15 @@ JUDGED = 4
 
 @dataclass(frozen=True)
 class Judged:
-    """An explanation, and how it does on data held out of its fit. power: of what is left in each
-    block, in units of the signals' own, shape (recordings, blocks); widths: standard errors of its
-    values by the jackknife over stretches of the recordings; floor: error
-    below which no model is better than another; pieces: independent ones that what is
-    left consists of; size: number of parameters, and of bits
-    that say which of the places looked at they were found from; cancels: whether two of its effects
-    undo each other; bounded: whether a value stands at the end of the range that it is searched
-    in."""
+    """An explanation, and how it does on data held out of its fit.
+
+    power: of what is left in each block, in units of the signals' own, shape (recordings, blocks);
+    widths: standard errors of its values by the jackknife over stretches of the recordings; floor:
+    error below which no model is better than another; pieces: independent ones that what is left
+    consists of; size: number of parameters, and of bits that say which of the places looked at they
+    were found from; cancels: whether two of its effects undo each other, or cannot be told apart;
+    bounded: whether a value stands at the end of the range that it is searched in.
+    """
 
     fit: Fit
     power: Array = field(repr=False)
@@ -176,13 +180,15 @@ class HeldOutJudge:
             self._floor,
             count_independent(evidence, fit),
             sum(self._size(effect) for effect in fit.effects),
-            self._cancels(fit),
+            self._resemble(fit, jacobian) or self._cancels(fit),
             self._fitter.is_bounded(fit),
         )
 
     def _size(self, effect: Effect) -> float:
-        places = len(self._fitter.starts(effect).values)
-        return len(effect.kind.parameters) + max(math.log2(places / USUAL), 0.0)
+        starts = self._fitter.starts(effect)
+        # Of a wave each pitch is a place of its own, looked at in two phases.
+        places = len(starts.values) / (2.0 if starts.quadrature else USUAL)
+        return len(effect.kind.parameters) + max(math.log2(places), 0.0)
 
     def _jackknife(self, jacobian: Sequence[Array], here: Sequence[Array]) -> Array:
         """Standard errors in units of the steps: how far the values move, to first order, when one
@@ -243,20 +249,39 @@ class HeldOutJudge:
             )
         return found / self._own[:, None]
 
+    def _resemble(self, fit: Fit, jacobian: Sequence[Array]) -> bool:
+        """Whether the responses of two magnitudes can hardly be told apart: then only their sum
+        is known, or their difference."""
+        first = np.cumsum([0, *(len(values) for values in fit.values[:-1])])
+        gram = sum(
+            (flat := columns[first].reshape(len(first), -1)) @ flat.T for columns in jacobian
+        )
+        size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        alike = np.abs(gram / np.outer(size, size)) - np.eye(len(first))
+        return bool(np.max(alike, initial=0.0) > self._rules.collinear)
+
     def _cancels(self, fit: Fit) -> bool:
         """Whether two effects do much more each than together."""
         evidence, plant = self._fitter.evidence, self._fitter.plant
         whole = evidence.residual(fit.plant)
-        alone = {}
-        for effect, others, values in without_each(fit):
-            residual = evidence.residual(with_values(plant, others, values))
-            alone[effect] = residual - whole
-        for first, one in alone.items():
-            for second, other in alone.items():
+
+        def change(left_out: set[int]) -> Array:
+            kept = [number for number in range(len(fit.effects)) if number not in left_out]
+            without = with_values(
+                plant, [fit.effects[n] for n in kept], [fit.values[n] for n in kept]
+            )
+            return evidence.residual(without) - whole
+
+        # What takes the place of a nominal value that is too high undoes nothing; two that are both
+        # new may undo each other.
+        new = [effect.nominal(plant)[effect.kind.parameters[0]] == 0.0 for effect in fit.effects]
+        alone = [change({number}) for number in range(len(fit.effects))]
+        for first, one in enumerate(alone):
+            for second, other in enumerate(alone[:first]):
                 size = min(float(one @ one), float(other @ other))
-                if first != second and float(one @ other) < 0.0:
-                    together = float(np.sum((one + other) ** 2))
-                    if together < self._rules.undone**2 * size:
+                if new[first] and new[second] and float(one @ other) < 0.0:
+                    together = change({first, second})
+                    if float(together @ together) < self._rules.undone**2 * size:
                         return True
         return False
 
@@ -300,6 +325,17 @@ class Selection:
     chosen: Judged
     alike: tuple[Judged, ...]
     pool: tuple[Judged, ...]
+
+    def replace_chosen(self, fit: Fit) -> Selection:
+        """The same with other values of the chosen effects."""
+        chosen = replace(self.chosen, fit=fit)
+        pool = tuple(chosen if each is self.chosen else each for each in self.pool)
+        return Selection(chosen, self.alike, pool)
+
+    def prefer(self, other: Judged) -> Selection:
+        """The same with one that does as well in the place of the chosen one."""
+        alike = (self.chosen, *(each for each in self.alike if each is not other))
+        return Selection(other, alike, self.pool)
 
 
 def count_independent(evidence: Evidence, fit: Fit) -> float:
@@ -397,7 +433,9 @@ def select(
     for _ in range(ROUNDS):
         chosen = choose(list(pool.values()), fitter, rules)
         best = min(pool.values(), key=lambda each: each.score)
-        near = [
+        simple = sorted(pool.values(), key=lambda each: each.score + PRICE * each.size)
+        near = [pair for each in simple[:SHAKEN] for pair in _shake(each.fit, fitter)]
+        near += [
             (rest, values)
             for each in (chosen, best)
             for _, rest, values in without_each(each.fit)
@@ -423,6 +461,17 @@ def select(
         and _is_as_good(each, chosen, rules.alike, rules.slack)
     )
     return Selection(chosen, alike, tuple(ranked))
+
+
+def _shake(fit: Fit, fitter: Fitter) -> list[tuple[tuple[Effect, ...], Values]]:
+    """A fit from other magnitudes: what sticks and slips has more than one best place."""
+    found = []
+    for number, (effect, values) in enumerate(zip(fit.effects, fit.values, strict=True)):
+        nominal = effect.nominal(fitter.plant)[effect.kind.parameters[0]]
+        for share in SHAKES:
+            moved = (nominal + share * (values[0] - nominal), *values[1:])
+            found.append((fit.effects, (*fit.values[:number], moved, *fit.values[number + 1 :])))
+    return found
 
 
 def _foremost(tried: Sequence[Fit]) -> list[Fit]:

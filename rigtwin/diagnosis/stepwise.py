@@ -21,8 +21,8 @@ from rigtwin.diagnosis.thresholds import NamingRules, Thresholds
 TRIED, SETTLED = 6, 3
 """Further effects that are fitted beside a leader, and those fitted again with the tolerances taken
 at them."""
-LEADERS = 2
-"""Explanations of each number of effects that get one more."""
+FIRST, LEADERS = 4, 2
+"""Single effects that get one more, and explanations of any greater number."""
 REGULAR = ("coulomb", "viscous", "stiffness", "mass", "offset")
 """Kinds that nearly every machine has more or less of."""
 GATEWAY_STARTS = 3
@@ -93,7 +93,7 @@ def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
     is found in turn may stand for several of them at once."""
     chosen: list[Effect] = []
     for effect in growth.effects:
-        if effect.kind.name in REGULAR and not clashes(effect, chosen):
+        if effect.kind.name in REGULAR and effect.kind not in {each.kind for each in chosen}:
             chosen.append(effect)
     if len(chosen) < 2:
         return []
@@ -126,7 +126,15 @@ def _leaders(level: Sequence[Fit]) -> list[Fit]:
     """The best of different effects, and the best with a gateway effect if none of them has it."""
     distinct = list({frozenset(fit.effects): fit for fit in reversed(level)}.values())[::-1]
     through = [fit for fit in level if any(effect.kind.name == GATEWAY for effect in fit.effects)]
-    return list({id(fit): fit for fit in (*distinct[:LEADERS], *through[:1])}.values())
+    return list(
+        {
+            id(fit): fit
+            for fit in (
+                *distinct[: FIRST if len(distinct[0].effects) == 1 else LEADERS],
+                *through[:1],
+            )
+        }.values()
+    )
 
 
 def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
@@ -143,7 +151,7 @@ def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
         lambda start: growth.search.refine(*start),
         [*_gateway_starts(leader, growth), *_unfold(leader, growth)],
     )
-    found = map_fits(growth.fitter.refit_with_tolerances, sorted(found, key=growth.cost)[:SETTLED])
+    found = map_fits(growth.fitter.settle, sorted(found, key=growth.cost)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
     left = max(leader.misfit - evidence.expected_misfit(leader.plant), 0.0)
     enough = max(growth.thresholds.second * growth.least, growth.rules.more * left)

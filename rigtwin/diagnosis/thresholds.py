@@ -36,13 +36,15 @@ class SelectionRules:
     independent pieces of what is left."""
     slack: float = 0.10
     """The largest difference that is none."""
-    alike: float = 0.03
+    alike: float = 0.07
     """Difference from the chosen one within which others are named beside it, or its standard
     error, up to `slack`."""
     steady: float = 4.0
     """Standard errors by which a magnitude must be off nominal."""
     undone: float = 0.5
     """Share of either effect's own amplitude that two must leave together."""
+    collinear: float = 0.95
+    """Cosine of two responses from which only one of them is claimed."""
     needed: float = 0.03
     """Difference on held-out recordings that an effect must bring to stay."""
     least: float = 0.35

@@ -29,7 +29,7 @@ from rigtwin.models.model import Form
 from rigtwin.models.start import Start, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import rms, smallest_step, smooth, white_noise
+from rigtwin.signals.noise import smallest_step, smooth, white_noise
 
 KEPT = 24
 """Motions that are kept."""
@@ -39,8 +39,9 @@ SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
 RUNAWAY = 1e6
 """In any unit of a joint: no machine goes there."""
-SHOWS = 0.5
-"""Share of what a signal is held to from which the error of a start shows."""
+SHOWS, FORGOTTEN = 10.0, 0.02
+"""χ² from which the error of a start shows, and share of its greatest effect below which it does no
+more."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
@@ -101,6 +102,7 @@ class JointModel:
         self._started_by = self._find_position_sensor()
         self._start, self._start_error = self._read_start(), (0.0, 0.0)
         self._starts: dict[tuple[object, ...], Start] = {}
+        self._remembered = recording.ticks
         self._held = self._find_held()
 
     def halve_steps(self) -> JointModel:
@@ -143,7 +145,8 @@ class JointModel:
             return start
         key = self._key(plant)
         if key not in self._starts:
-            measured = (self._recording.column(*self._start_channel) - sensor.offset) / sensor.gain
+            measured = self._recording.column(*self._start_channel)[: self._remembered]
+            measured = (measured - sensor.offset) / sensor.gain
             found = fit_start(
                 lambda start: self._position_from(plant, start),
                 measured,
@@ -155,8 +158,8 @@ class JointModel:
         return self._starts[key]
 
     def _position_from(self, plant: Plant, start: Start) -> Array:
-        mover = getattr(plant, self._mover.name)
-        out = self._integrate_pushed(plant, mover, np.zeros(len(self._command)), start=start)[0]
+        mover, besides = getattr(plant, self._mover.name), np.zeros(self._remembered)
+        out = self._integrate_pushed(plant, mover, besides, start=start)[0]
         return np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
 
     def _find_held(self) -> float:
@@ -172,10 +175,12 @@ class JointModel:
         held = max(self._machine.form_of(row) * float(np.std(measured)), noise)
         position, velocity = self._start
         faster = (position, velocity + self._start_error[1])
-        change = self._position_from(self._machine.plant, faster) - self._position_from(
-            self._machine.plant, self._start
+        change = self._position_from(self._configuration.plant, faster) - self._position_from(
+            self._configuration.plant, self._start
         )
-        return held if rms(change) > SHOWS * held else 0.0
+        size = np.abs(change)
+        self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
+        return held if float(change @ change) > SHOWS * held**2 else 0.0
 
     def _parts(self, plant: Plant) -> tuple[Guide, Inertia]:
         replay = self._replay
@@ -294,7 +299,7 @@ class JointModel:
         models = tuple(transducer(part, self._period) for part in parts)
         states = tuple(start_transducer(model) for model in models)
         kinds = np.array([int(measures(part) == "velocity") for part in parts])
-        command = self._command.copy()
+        command = self._command[: len(besides)].copy()
         out = np.zeros((4, len(command)))
         integrate_pushed(
             guide=guide,

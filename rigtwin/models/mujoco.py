@@ -129,9 +129,9 @@ class MujocoModel(JointModel):
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))
         limit = min(mover.force_limit, UNLIMITED)
-        out, force = np.zeros((4, len(self._command))), 0.0
+        out, force = np.zeros((4, len(besides))), 0.0
         loop = self._reader(plant)
-        for tick in range(len(self._command)):
+        for tick in range(len(besides)):
             out[0, tick], out[1, tick], out[2, tick] = data.qpos[place], data.qvel[at], force
             command = loop(tick, float(data.qpos[place]), float(data.qvel[at]))
             out[3, tick] = command

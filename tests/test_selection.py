@@ -1,0 +1,69 @@
+"""Which explanation of a rough model is named: the simplest that predicts what it was not fitted
+to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rigtwin.components import Guide
+from rigtwin.components.guide import resists
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.selection import Judged
+from rigtwin.models.start import fit_start, read_start
+
+TIME = np.arange(400) * 5e-3
+
+
+def judged(error: float, width: float = 0.0) -> Judged:
+    fit = Fit((), ((2.0,),), 0.0, (), None)  # type: ignore[arg-type]
+    return Judged(fit, np.full((2, 40), error**2), ((width,),))
+
+
+def test_the_score_is_the_logarithm_of_the_error_whatever_the_noise():
+    assert judged(0.2).score - judged(0.1).score == pytest.approx(np.log(2.0))
+    quiet, loud = np.full(40, 0.01), np.full(40, 100.0)
+    both = Judged(judged(1.0).fit, np.stack([quiet, loud]))
+    assert both.score == pytest.approx(0.0)
+
+
+def test_an_error_that_lies_in_one_block_says_little():
+    one, other = np.full((1, 40), 1.0), np.full((1, 40), 1.0)
+    other[0, 0] = 20.0
+    spread = np.full((1, 40), float(other.mean()))
+    plain = Judged(judged(1.0).fit, one)
+    apart = Judged(judged(1.0).fit, other).uncertainty_against(plain)
+    assert apart > 10.0 * Judged(judged(1.0).fit, spread).uncertainty_against(plain)
+
+
+@pytest.mark.parametrize(("width", "stable"), [(0.1, True), (0.6, False)])
+def test_a_magnitude_must_be_known(width: float, stable: bool):
+    assert judged(0.1, width).is_stable([0.0], 4.0) is stable
+
+
+@pytest.mark.parametrize(
+    ("guide", "holds"),
+    [
+        (Guide(coulomb=2.0, asymmetry=3.0), True),
+        (Guide(coulomb=1.0, asymmetry=-3.0), False),
+        (Guide(viscous=2.0, viscous_asymmetry=-5.0), False),
+    ],
+)
+def test_friction_resists(guide: Guide, holds: bool):
+    assert resists(guide) is holds
+
+
+def swing(start: tuple[float, float]) -> np.ndarray:
+    position, velocity = start
+    return np.exp(-TIME) * (
+        position * np.cos(7.0 * TIME) + (velocity + position) / 7.0 * np.sin(7.0 * TIME)
+    )
+
+
+def test_a_free_swings_start_is_found_beneath_coarse_bits():
+    truth = (0.6, 0.3)
+    measured = np.round(swing(truth) / 1.5e-3) * 1.5e-3
+    first = read_start(measured, 5e-3)
+    found = fit_start(swing, measured, first, (1.5e-3, 0.1), 1e-3)
+    assert found == pytest.approx(truth, abs=2e-3)
+    assert abs(found[1] - truth[1]) < abs(first[1] - truth[1])
