@@ -14,6 +14,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.held_out_judge import HeldOutJudge
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.selection import Selection, select
@@ -144,7 +145,8 @@ def attribute(
         Everything tried, and the explanation to be named.
     """
     effects = library(evidence)
-    coarse = Fitter(evidence.halve_steps())
+    searched = evidence.thin() if evidence.machine.rough else evidence
+    coarse = Fitter(searched.halve_steps())
     with ThreadPoolExecutor(THREADS) as pool:
 
         def map_fits(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
@@ -160,13 +162,14 @@ def attribute(
             return results
 
         least = detection_limit(evidence, thresholds)
-        search = _Search(coarse, Fitter(evidence), effects, least, thresholds, map_fits)
+        search = _Search(coarse, Fitter(searched), effects, least, thresholds, map_fits)
         nothing, tried = search.fit_singles()
         silent = tuple(
             effect for effect in effects if coarse.largest_response(effect) < thresholds.detected
         )
         if evidence.machine.rough:
-            return _attribute_rough(search, nothing, tried, silent)
+            final = search.fitter if searched is evidence else Fitter(evidence)
+            return _attribute_rough(search, final, nothing, tried, silent)
         if nothing.misfit - search.cost(tried[0]) > least:
             tried += _fit_pairs(search, nothing, tried)
     chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
@@ -214,14 +217,17 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
 
 
 def _attribute_rough(
-    search: _Search, nothing: Fit, singles: Sequence[Fit], silent: tuple[Effect, ...]
+    search: _Search,
+    final: Fitter,
+    nothing: Fit,
+    singles: Sequence[Fit],
+    silent: tuple[Effect, ...],
 ) -> Attribution:
     """The same of a machine whose nominal values are only a start: what is named is what data held
-    out of the fit ask for."""
+    out of the fit ask for. final: on all ticks."""
     evidence, thresholds = search.fitter.evidence, search.thresholds
-    growth = Growth(
-        search.coarse, search.fitter, search.effects, search.least, thresholds.rough, thresholds
-    )
+    judge = HeldOutJudge(search.fitter, thresholds.selection)
+    growth = Growth(search.coarse, judge, search.effects, search.least, thresholds)
     tried = [*singles]
     if nothing.misfit - search.cost(singles[0]) > search.least:
         tried += fit_stepwise(singles, growth, search.map_fits)
@@ -233,15 +239,15 @@ def _attribute_rough(
     selection = select(
         [nothing, *tried],
         search.coarse,
-        search.fitter,
+        judge,
         search.effects,
-        thresholds.selection,
         search.map_fits,
     )
     if selection.chosen.fit.effects:
-        settled = search.fitter.refit_with_tolerances(selection.chosen.fit)
+        settled = final.refit_with_tolerances(selection.chosen.fit)
         selection = selection.replace_chosen(settled)
-    return _conclude_rough(search, nothing, selection, silent)
+    chain = _nest(search.fitter, selection)
+    return _conclude_rough(final, search.least, thresholds, selection, chain, silent)
 
 
 def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
@@ -325,9 +331,14 @@ def _conclude(
 
 
 def _conclude_rough(
-    search: _Search, nothing: Fit, selection: Selection, silent: tuple[Effect, ...]
+    final: Fitter,
+    least: float,
+    thresholds: Thresholds,
+    selection: Selection,
+    chain: Sequence[Fit],
+    silent: tuple[Effect, ...],
 ) -> Attribution:
-    evidence, thresholds = search.fitter.evidence, search.thresholds
+    evidence, nothing = final.evidence, final.refit_with_tolerances(final.nothing)
     rules, chosen = thresholds.selection, selection.chosen
     best = chosen.fit
     expected = evidence.expected_misfit(best.plant)
@@ -336,7 +347,7 @@ def _conclude_rough(
     more = max(best.misfit - expected, 0.0) / expected > thresholds.unexplained
     found = (
         bool(best.effects)
-        and nothing.misfit - best.misfit > search.least
+        and nothing.misfit - best.misfit > least
         and (not more or empty.score - chosen.score > rules.least)
     )
     # What adds to the chosen one is no rival of it.
@@ -363,7 +374,7 @@ def _conclude_rough(
         unknown=more,
         shares=_shares(best, evidence, explained) if found else {},
         silent=silent,
-        chain=tuple(_nest(search.fitter, selection)),
+        chain=tuple(chain),
         selection=selection,
     )
 
@@ -394,8 +405,9 @@ def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) 
     )
     if best is found.selection.chosen:
         return found
-    own = {each.fit: each for each in found.ranking}
-    ahead = [own.get(best.fit, found.best), *(e for e in found.ranking if e.fit is not best.fit)]
+    fit = Fitter(evidence).refit_with_tolerances(best.fit)
+    foremost = replace(found.best, fit=fit, price=best.score)
+    ahead = [foremost, *(each for each in found.ranking if each.fit is not best.fit)]
     likely = sorted((each.probability for each in ahead), reverse=True)
     ranking = tuple(
         replace(each, probability=probability)
@@ -405,8 +417,8 @@ def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) 
         found,
         best=ranking[0],
         ranking=ranking,
-        shares=_shares(best.fit, evidence, found.explained),
-        selection=found.selection.prefer(best),
+        shares=_shares(fit, evidence, found.explained),
+        selection=found.selection.prefer(best, fit),
     )
 
 

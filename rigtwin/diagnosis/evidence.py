@@ -50,6 +50,8 @@ SPIKE = 4.0
 """Times its noise by which a sample stands out of those about it to be a spike."""
 COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
+SEARCHED = 2.5e-3
+"""s, between ticks in a search."""
 FEWEST_STEPS = 2
 """Of integration a tick, of a rough model: half of them for a search."""
 STEPPED = 0.05
@@ -66,7 +68,7 @@ class Lines:
     difference's transform is multiplied by, shape (rows, lines); spread: variance of noise alone in
     each line, shape (rows, lines); fade: what a difference is multiplied by before, shape (rows,
     ticks); measured: shape (rows, ticks); noise: rms of each signal's, shape (rows,); bit: size of
-    one of each signal, shape (rows,)."""
+    one of each signal, shape (rows,); period: s, from tick to tick."""
 
     frequency: Array
     weight: Array
@@ -76,6 +78,7 @@ class Lines:
     noise: Array
     bit: Array
     length: int
+    period: float
 
 
 def lines(
@@ -101,18 +104,23 @@ def lines(
     Lines
         The recording in the frequency domain.
     """
-    measured = np.stack([recording.column(*row.channel) for row in machine.rows])
+    whole = np.stack([recording.column(*row.channel) for row in machine.rows])
+    measured = whole[:, :: model.every].copy()
     rows, ticks = measured.shape
+    period = model.every * recording.period
     length = int(next_fast_len(ticks, real=True) or ticks)
-    frequency = rfftfreq(length, recording.period)
-    kept = frequency <= min(HIGHEST, 0.4 / recording.period)
-    width = max(MAINS_WIDTH, 2.0 / (ticks * recording.period))
+    frequency = rfftfreq(length, period)
+    kept = frequency <= min(HIGHEST, 0.4 / period)
+    width = max(MAINS_WIDTH, 2.0 / (ticks * period))
     off_mains = np.abs(frequency[kept] - plant.mains.frequency) > width
-    noise = np.array([white_noise(row) for row in measured])
-    resolution = np.array([smallest_step(row) for row in measured])
+    noise = np.array([white_noise(row) for row in whole])
+    resolution = np.array([smallest_step(row) for row in whole])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     fade = np.stack(
-        [_fade(ticks, recording.period) * counted * ~find_cut_off(row) for row in measured]
+        [
+            (_fade(len(row), recording.period) * counted * ~find_cut_off(row))[:: model.every]
+            for row in whole
+        ]
     )
     if (carried := model.propagated_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
@@ -147,6 +155,7 @@ def lines(
         noise=floor,
         bit=resolution,
         length=length,
+        period=period,
     )
 
 
@@ -235,7 +244,7 @@ class Evidence:
     ) -> None:
         """configurations: of the twin, one for each recording, alike in their plant; counted: how
         much each tick counts, 0 to 1; steps: of integration a tick."""
-        counted = counted or [np.ones(recording.ticks) for recording in recordings]
+        self._counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.machine, self.recordings, self.configurations = (
             machine,
             tuple(recordings),
@@ -249,19 +258,22 @@ class Evidence:
             else model_of(machine, r, c, steps)
             for r, c in zip(recordings, configurations, strict=True)
         ]
+        self._transform()
+
+    def _transform(self) -> None:
+        """Takes the recordings to the frequency domain, as the models predict them."""
+        machine = self.machine
         self.lines = [
             lines(machine, recording, model, c.plant, part)
             for recording, model, c, part in zip(
-                recordings, self.models, configurations, counted, strict=True
+                self.recordings, self.models, self.configurations, self._counted, strict=True
             )
         ]
         # The line's foot reaches beyond the lines left out, so it is taken out of the signals too.
-        for each, recording, predicted in zip(
-            self.lines, self.recordings, self.predict(self.plant), strict=True
-        ):
+        for each, predicted in zip(self.lines, self.predict(self.plant), strict=True):
             for row, expected in zip(each.measured, predicted, strict=True):
                 row -= (row - expected) - remove_mains(
-                    row - expected, recording.period, self.plant.mains.frequency
+                    row - expected, each.period, self.plant.mains.frequency
                 )
         if not machine.rough:
             self._loosen()
@@ -272,7 +284,6 @@ class Evidence:
         if machine.rough:
             # What such a model is not held to is no gap either.
             self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
-        self._counted = counted
 
     def expected_misfit(self, plant: Plant) -> float:
         """χ² of noise alone about a plant: what drives the model may carry more noise there.
@@ -303,6 +314,15 @@ class Evidence:
         """The same with half as many integration steps: for a search, not for its result."""
         like = copy(self)
         like.models = [model.halve_steps() for model in self.models]
+        return like
+
+    def thin(self) -> Evidence:
+        """The same with ticks left out, as far as the models can do without: for a search."""
+        like = copy(self)
+        like.models = [model.thin(SEARCHED) for model in self.models]
+        if all(model is own for model, own in zip(like.models, self.models, strict=True)):
+            return self
+        like._transform()
         return like
 
     def _loosen(self) -> None:

@@ -13,6 +13,7 @@ from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
+from rigtwin.diagnosis.gauss_newton import CLOSELY, ROUGHLY, minimise
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -23,11 +24,6 @@ SETTLING = 2
 """Times that the tolerances are taken anew at a fit."""
 AT_BOUND = 1e-3
 """Share of a bound within which a value stands at it."""
-WIDER = 5.0
-"""Times the step of a derivative at which a rough model's fit is tried to go on."""
-ITERATIONS = 8
-GAINED, ROUGHLY = 0.2, 1e-3
-"""χ² that a step must gain to be followed by another, and share of a rough model's."""
 REFINED = 3
 """Starts that are followed to their end at most."""
 WORTH = 0.5
@@ -53,7 +49,7 @@ class Fitter:
         self._nominal = evidence.residual(evidence.plant)
         self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
         self._responses: dict[Effect, Responses] = {}
-        self._beside: dict[tuple[Effect, tuple[Effect, ...], Values], Responses] = {}
+        self._beside: dict[tuple[object, ...], Responses] = {}
         self._residual: tuple[tuple[tuple[Effect, ...], Values], Array] = ((), ()), self._nominal
 
     def starts(self, effect: Effect) -> Starts:
@@ -78,7 +74,7 @@ class Fitter:
             force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
             self._scales[component] = Scales.of(
-                motion, force, self.evidence.recordings[longest].period
+                motion, force, self.evidence.lines[longest].period
             )
         return self._scales[component]
 
@@ -187,7 +183,9 @@ class Fitter:
         rough = self.evidence.machine.rough and bool(first.effects)
         if not rough and self.largest_response(effect) > NOTHING:
             return self._responses[effect]
-        known = (effect, first.effects, first.values)
+        # A wave along the stroke changes much the same whatever else is there.
+        wave = rough and self.starts(effect).quadrature
+        known = (effect, len(first.effects) > 0) if wave else (effect, first.effects, first.values)
         if known not in self._beside:
             found = []
             here = self.residual_at(first)
@@ -358,7 +356,6 @@ class Fitter:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
         sizes = [len(effect.kind.parameters) for effect in effects]
         steps = np.concatenate([self.starts(effect).steps for effect in effects])
-        low, high = self.bounds(effects)
 
         def split(vector: Array) -> Values:
             cuts = np.cumsum(sizes)[:-1]
@@ -367,43 +364,19 @@ class Fitter:
         def residual(vector: Array) -> Array:
             return self.evidence.residual(with_values(base, effects, split(vector)))
 
-        here = np.clip(np.concatenate([np.asarray(values, float) for values in start]), low, high)
-        left = residual(here)
-        misfit = space.misfit(left)
-        normal = np.eye(len(here))
-        # Of a rough model something is always left; beside it small gains say nothing.
-        share = ROUGHLY if self.evidence.machine.rough else 0.0
-        wide, widest = 1.0, WIDER if self.evidence.machine.rough else 1.0
-        for _ in range(ITERATIONS):
-            columns = []
-            for number in range(len(here)):
-                reach = wide * steps[number]
-                step = reach if here[number] + reach <= high[number] else -reach
-                beside = here.copy()
-                beside[number] += step
-                columns.append((residual(beside) - left) / (step / steps[number]))
-            jacobian = np.stack(columns, axis=1)
-            normal, gradient = space.normal_equations(jacobian, left)
-            damped = normal + np.diag(1e-6 * np.diag(normal) + 1e-12)
-            move = -np.linalg.solve(damped, gradient) * steps
-            gained = 0.0
-            for part in (1.0, 0.5, 0.2, 0.05):
-                there = np.clip(here + part * move, low, high)
-                tried = residual(there)
-                if (value := space.misfit(tried)) < misfit:
-                    gained = misfit - value
-                    here, left, misfit = there, tried, value
-                    break
-            if gained < max(GAINED, share * misfit):
-                if wide >= widest:
-                    break
-                # Sticking and slipping make small steps of the misfit: wide ones see over them.
-                wide *= WIDER
-        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
+        found = minimise(
+            residual,
+            space,
+            np.concatenate([np.asarray(values, float) for values in start]),
+            steps,
+            self.bounds(effects),
+            ROUGHLY if self.evidence.machine.rough else CLOSELY,
+        )
+        values = split(found.values)
         return Fit(
             effects,
-            split(here),
-            misfit,
-            split(spread),
-            with_values(self.plant, effects, split(here)),
+            values,
+            found.misfit,
+            split(found.widths),
+            with_values(self.plant, effects, values),
         )

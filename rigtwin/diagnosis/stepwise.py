@@ -14,15 +14,20 @@ from itertools import product
 from rigtwin.components import Effect, Guide
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.held_out_judge import HeldOutJudge
 from rigtwin.diagnosis.proposals import propose_additions
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.thresholds import NamingRules, Thresholds
 
-TRIED, SETTLED = 6, 3
+TRIED, SETTLED = 4, 2
 """Further effects that are fitted beside a leader, and those fitted again with the tolerances taken
 at them."""
 FIRST, LEADERS = 4, 2
 """Single effects that get one more, and explanations of any greater number."""
+PATIENCE = 2
+"""Effects that may be added without a gain on what is held out."""
+BEHIND_BEST = 0.5
+"""Share of what the best explains that another leader may lack."""
 REGULAR = ("coulomb", "viscous", "stiffness", "mass", "offset")
 """Kinds that nearly every machine has more or less of."""
 GATEWAY_STARTS = 3
@@ -40,15 +45,24 @@ MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
 
 @dataclass(frozen=True)
 class Growth:
-    """What a search needs. search, fitter: on coarse and on fine evidence; least: χ² of a
-    finding; rules: when further effects are taken."""
+    """What a search needs. search: on coarse evidence; judge: of fits to fine evidence; least: χ²
+    of a finding."""
 
     search: Fitter
-    fitter: Fitter
+    judge: HeldOutJudge
     effects: Sequence[Effect]
     least: float
-    rules: NamingRules
     thresholds: Thresholds
+
+    @property
+    def rules(self) -> NamingRules:
+        """When further effects are taken."""
+        return self.thresholds.rough
+
+    @property
+    def fitter(self) -> Fitter:
+        """On fine evidence."""
+        return self.judge.fitter
 
     def cost(self, fit: Fit) -> float:
         """What the fits are ranked by."""
@@ -78,9 +92,14 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> l
     """
     found = _fit_regulars(growth, map_fits)
     level = sorted(growth.drop_needless(singles), key=growth.cost)
+    costs: list[float] = []
     while level:
+        costs.append(min(growth.judge.cost(fit) for fit in level[:LEADERS]))
+        if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
+            # What is held out asks for no more.
+            break
         following: list[Fit] = []
-        for leader in _leaders(level):
+        for leader in _leaders(level, growth.fitter.nothing.misfit):
             if len(leader.effects) < growth.rules.most:
                 following += _extend(leader, growth, map_fits)
         found += following
@@ -122,9 +141,12 @@ def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
     return [fit for fit in found if not within_tolerance(fit, search.evidence, growth.thresholds)]
 
 
-def _leaders(level: Sequence[Fit]) -> list[Fit]:
-    """The best of different effects, and the best with a gateway effect if none of them has it."""
+def _leaders(level: Sequence[Fit], nothing: float) -> list[Fit]:
+    """The best of different effects, and the best with a gateway effect if none of them has it.
+    nothing: misfit without effects."""
     distinct = list({frozenset(fit.effects): fit for fit in reversed(level)}.values())[::-1]
+    best = distinct[0].misfit
+    distinct = [fit for fit in distinct if fit.misfit - best <= BEHIND_BEST * (nothing - best)]
     through = [fit for fit in level if any(effect.kind.name == GATEWAY for effect in fit.effects)]
     return list(
         {
@@ -157,12 +179,16 @@ def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
     enough = max(growth.thresholds.second * growth.least, growth.rules.more * left)
     accepted = []
     for fit in found:
-        further = len(fit.effects) - len(leader.effects)
+        further = _count_parameters(fit) - _count_parameters(leader)
         if leader.misfit - fit.misfit > further * enough and not within_tolerance(
             fit, evidence, growth.thresholds
         ):
             accepted.append(fit)
     return accepted
+
+
+def _count_parameters(fit: Fit) -> int:
+    return sum(len(effect.kind.parameters) for effect in fit.effects)
 
 
 def _gateway_starts(leader: Fit, growth: Growth) -> list[Start]:

@@ -50,6 +50,10 @@ class SelectionRules:
     least: float = 0.35
     """Difference from the nominal machine that an explanation must bring to be named at all."""
 
+    def price_of(self, pieces: float) -> float:
+        """Of a parameter, where what is left consists of so many independent pieces."""
+        return self.price + math.log(pieces) / pieces
+
 
 @dataclass(frozen=True)
 class Thresholds:

@@ -58,6 +58,7 @@ class Joints:
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)
+        self.every = joints[0].every
 
     def predict(self, plant: Plant) -> Array:
         return np.concatenate([each.predict(plant) for each in self._joints])
@@ -114,3 +115,9 @@ class Joints:
 
     def double_steps(self) -> Joints:
         return Joints([each.double_steps() for each in self._joints])
+
+    def thin(self, longest: float) -> Joints:
+        thinned = [each.thin(longest) for each in self._joints]
+        # Rows of one recording have ticks in common.
+        alike = len({each.every for each in thinned}) == 1
+        return Joints(thinned) if alike else self

@@ -70,7 +70,10 @@ def gravity(inertia: Inertia, position: float) -> float:
         N.
     """
     place = (position - inertia.first) / inertia.spacing
-    place = min(max(place, 0.0), len(inertia.load) - 1.000001)
+    if not place > 0.0:
+        # Of what ran away there is no place.
+        place = 0.0
+    place = min(place, len(inertia.load) - 1.000001)
     whole = int(place)
     part = place - whole
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
@@ -169,6 +172,7 @@ def integrate_pushed(
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0
     half = 0.5 * guide.backlash
+    neutral = np.array([sensor.neutral for sensor in sensors])
     share = h / (guide.relaxation + h)
     for tick in range(len(command)):
         out[0, tick], out[1, tick], out[2, tick] = x, v, force
@@ -176,11 +180,11 @@ def integrate_pushed(
             for number in range(len(loop.sensor)):
                 which = loop.sensor[number]
                 loop.registers[number] = loop.recorded[tick, number]
-                for each in range(len(sensors)):
-                    if each == which:
-                        true = x if kinds[each] == 0 else v
-                        sensed = transduce(sensors[each], states[each], true)
-                        loop.registers[number] = sensed + loop.noise[tick, number]
+                if which >= 0:
+                    true = x if kinds[which] == 0 else v
+                    # To take a sensor out of the tuple costs more than the rest of a tick.
+                    sensed = true if neutral[which] else transduce(sensors[which], states[which], true)
+                    loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
             earlier = force

@@ -3,6 +3,8 @@ actuator."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from controllers.formula import formula
@@ -37,6 +39,8 @@ ELASTIC = 0.3
 """Times a measured motion's error over which friction that reverses builds up at least."""
 SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
+LIGHTEST = 1e-12
+"""kg or kg m², of what still moves under a finite force."""
 RUNAWAY = 1e6
 """In any unit of a joint: no machine goes there."""
 SHOWS, FORGOTTEN = 10.0, 0.02
@@ -45,6 +49,14 @@ more."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
+
+
+def _contain(signals: Array) -> Array:
+    """Signals within what is possible: a plant that is not stable runs away; it must be a bad
+    explanation, not an impossible number."""
+    if float(np.abs(signals).max()) <= RUNAWAY:
+        return signals
+    return np.clip(np.nan_to_num(signals, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
 
 
 class JointModel:
@@ -57,14 +69,17 @@ class JointModel:
         recording: Recording,
         configuration: Configuration,
         steps: int,
+        every: int = 1,
     ) -> None:
-        """Raises RigtwinError if a channel is missing."""
+        """every: ticks from one that is predicted to the next, of a prescribed motion. Raises
+        RigtwinError if a channel is missing."""
         self._machine, self._replay, self._recording, self._steps = (
             machine,
             replay,
             recording,
             steps,
         )
+        self.every = every
         self._configuration = configuration
         self._settings = dict(configuration.controller._asdict())
         self._period = recording.period
@@ -112,7 +127,23 @@ class JointModel:
         return self._with_steps(2 * self._steps)
 
     def _with_steps(self, steps: int) -> JointModel:
-        return JointModel(self._machine, self._replay, self._recording, self._configuration, steps)
+        return JointModel(
+            self._machine, self._replay, self._recording, self._configuration, steps, self.every
+        )
+
+    def thin(self, longest: float) -> JointModel:
+        """With fewer ticks if a sensor prescribes the motion."""
+        every = max(int(longest / self._period), 1)
+        if self._motion is None or every == 1:
+            return self
+        return JointModel(
+            self._machine, self._replay, self._recording, self._configuration, self._steps, every
+        )
+
+    @property
+    def _apart(self) -> float:
+        """s, from one tick that is predicted to the next."""
+        return self.every * self._period
 
     def _find_position_sensor(self) -> str | None:
         """The sensor that says where the joint is at the start."""
@@ -148,7 +179,7 @@ class JointModel:
             measured = self._recording.column(*self._start_channel)[: self._remembered]
             measured = (measured - sensor.offset) / sensor.gain
             found = fit_start(
-                lambda start: self._position_from(plant, start),
+                self._predict_from_starts(plant),
                 measured,
                 start,
                 self._start_error,
@@ -157,10 +188,11 @@ class JointModel:
             self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
         return self._starts[key]
 
-    def _position_from(self, plant: Plant, start: Start) -> Array:
-        mover, besides = getattr(plant, self._mover.name), np.zeros(self._remembered)
-        out = self._integrate_pushed(plant, mover, besides, start=start)[0]
-        return np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+    def _predict_from_starts(self, plant: Plant) -> Callable[[Start], Array]:
+        """The position from any start, for as long as a start is remembered."""
+        integrate = self._prepare_pushed(plant, getattr(plant, self._mover.name))
+        besides = np.zeros(self._remembered)
+        return lambda start: _contain(integrate(start, besides)[0])
 
     def _find_held(self) -> float:
         """To what the position is predicted at best where the start's error shows in it; 0 where it
@@ -175,9 +207,8 @@ class JointModel:
         held = max(self._machine.form_of(row) * float(np.std(measured)), noise)
         position, velocity = self._start
         faster = (position, velocity + self._start_error[1])
-        change = self._position_from(self._configuration.plant, faster) - self._position_from(
-            self._configuration.plant, self._start
-        )
+        predict = self._predict_from_starts(self._configuration.plant)
+        change = predict(faster) - predict(self._start)
         size = np.abs(change)
         self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
         return held if float(change @ change) > SHOWS * held**2 else 0.0
@@ -191,7 +222,8 @@ class JointModel:
         load = share * np.array(joint.gravity)
         spacing = (joint.positions[-1] - joint.positions[0]) / max(len(joint.gravity) - 1, 1)
         guide = Guide(*(float(value) for value in guide))
-        return guide, Inertia(float(mass), joint.positions[0], spacing, load, joint.rest)
+        mass = max(float(mass), LIGHTEST)
+        return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest)
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """What the motion depends on."""
@@ -220,17 +252,14 @@ class JointModel:
                 )
                 error = 0.0
             else:
-                position = self._undo_sensor(mover)
+                position = self._undo_sensor(mover)[:: self.every]
                 error = 0.0 if self._integrated else self._error / max(mover.gain, 1e-9)
             out = self._inverse_dynamics(
                 plant, position if shift is None else position + shift, error
             )
             if force is not None:
                 out[2] -= force
-        # A plant that is not stable runs away; it must be a bad explanation, not an impossible
-        # number.
-        if not float(np.abs(out).max()) <= RUNAWAY:
-            out = np.clip(np.nan_to_num(out, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+        out = _contain(out)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
@@ -250,18 +279,20 @@ class JointModel:
 
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
-        velocity = np.gradient(position, self._period)
-        acceleration = np.gradient(velocity, self._period)
+        velocity = np.gradient(position, self._apart)
+        acceleration = np.gradient(velocity, self._apart)
+        out = np.zeros((4, len(position)))
+        out[0], out[1] = position, velocity
+        if all(row.kind in ("position", "velocity") for row in self.rows):
+            return out
         motion = np.ascontiguousarray(np.stack([position, velocity, acceleration]))
         softest = self._softest(guide, inertia, position, acceleration, error)
-        out = np.zeros((4, len(position)))
-        out[:2] = motion[:2]
         inverse_dynamics(
             guide=guide,
             dry_friction=friction(guide),
             inertia=inertia,
             spring=1.0 / softest,
-            period=self._period,
+            period=self._apart,
             motion=motion,
             out=out[2],
         )
@@ -279,50 +310,52 @@ class JointModel:
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _integrate_pushed(
-        self,
-        plant: Plant,
-        mover: ForceActuator,
-        besides: Array,
-        noise: Array | None = None,
-        start: Start | None = None,
+        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
     ) -> Array:
-        """The joint under its force actuator. besides: another force on it, N, shape (ticks,);
-        noise: of what a controller reads, shape (ticks, inputs); start: by default as the recording
-        shows it."""
+        """The joint under its force actuator, from where it starts. besides: another force on it,
+        N, shape (ticks,); noise: of what a controller reads, shape (ticks, inputs)."""
+        return self._prepare_pushed(plant, mover, noise)(self._start_of(plant), besides)
+
+    def _prepare_pushed(
+        self, plant: Plant, mover: ForceActuator, noise: Array | None = None
+    ) -> Callable[[Start, Array], Array]:
+        """The same from any start, as a function of it and the other force."""
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
-        rigid = RIGID * max(inertia.mass, 1e-12) / h**2
+        rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
-        conditioning = actuator(mover, plant.computer, h)
-        first = float(self._command[0])
+        dry_friction, conditioning = friction(guide), actuator(mover, plant.computer, h)
         parts = [getattr(plant, name) for name in self._sensors] or [PositionSensor()]
         models = tuple(transducer(part, self._period) for part in parts)
-        states = tuple(start_transducer(model) for model in models)
         kinds = np.array([int(measures(part) == "velocity") for part in parts])
-        command = self._command[: len(besides)].copy()
-        out = np.zeros((4, len(command)))
-        integrate_pushed(
-            guide=guide,
-            dry_friction=friction(guide),
-            inertia=inertia,
-            spring=spring,
-            start=self._start_of(plant) if start is None else start,
-            constant=mover.constant,
-            limit=min(mover.force_limit, UNLIMITED),
-            drive=conditioning,
-            held=hold(conditioning, first),
-            sensors=models,
-            states=states,
-            kinds=kinds,
-            loop=self._loop(noise),
-            command=command,
-            besides=np.ascontiguousarray(besides),
-            period=self._period,
-            steps=self._steps,
-            out=out,
-        )
-        out[3] = command
-        return out
+
+        def integrate(start: Start, besides: Array) -> Array:
+            command = self._command[: len(besides)].copy()
+            out = np.zeros((4, len(command)))
+            integrate_pushed(
+                guide=guide,
+                dry_friction=dry_friction,
+                inertia=inertia,
+                spring=spring,
+                start=start,
+                constant=mover.constant,
+                limit=min(mover.force_limit, UNLIMITED),
+                drive=conditioning,
+                held=hold(conditioning, float(self._command[0])),
+                sensors=models,
+                states=tuple(start_transducer(model) for model in models),
+                kinds=kinds,
+                loop=self._loop(noise),
+                command=command,
+                besides=np.ascontiguousarray(besides),
+                period=self._period,
+                steps=self._steps,
+                out=out,
+            )
+            out[3] = command
+            return out
+
+        return integrate
 
     def _loop(self, noise: Array | None) -> Loop:
         control = self._control
@@ -373,7 +406,7 @@ class JointModel:
         found = true.copy()
         for number, row in enumerate(self.rows):
             if row.kind != "command":
-                found[number] = apply_sensor(getattr(plant, row.name), true[number], self._period)
+                found[number] = apply_sensor(getattr(plant, row.name), true[number], self._apart)
         return found
 
     def predict(self, plant: Plant) -> Array:
@@ -414,7 +447,7 @@ class JointModel:
             )
         elif component == self._replay.mass:
             role = "mass"
-        return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._period))
+        return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._apart))
 
     def disturbance_size(self, entry: str) -> float:
         moved = self.move(self._machine.plant)
@@ -429,7 +462,7 @@ class JointModel:
         if not force.any():
             # It swings freely: what acts on it is what its inertia shows.
             _, inertia = self._parts(plant)
-            force = inertia.mass * np.gradient(moved[1], self._period)
+            force = inertia.mass * np.gradient(moved[1], self._apart)
         return Motion(moved[0], moved[1], force)
 
     def propagated_noise(self, plant: Plant) -> Array | None:
@@ -441,9 +474,8 @@ class JointModel:
             assert self._mover.channel is not None
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
-            return self._rows(self.move(plant, shift=again - self._motion)) - self._rows(
-                self.move(plant)
-            )
+            shift = (again - self._motion)[:: self.every]
+            return self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
         control = self._control
         if control is None or not self._sensors:
             return None

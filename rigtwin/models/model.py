@@ -28,6 +28,9 @@ class Model(Protocol[P]):
     """A machine's model under one recording's inputs. Rows are the machine's observed signals, in
     their order."""
 
+    every: int
+    """Ticks of the recording from one that is predicted to the next."""
+
     def predict(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
         ...
@@ -67,4 +70,9 @@ class Model(Protocol[P]):
 
     def double_steps(self) -> Model[P]:
         """With twice the integration steps."""
+        ...
+
+    def thin(self, longest: float) -> Model[P]:
+        """With ticks left out where nothing is integrated from one to the next: those that stay are
+        at most so many s apart."""
         ...

@@ -355,6 +355,8 @@ class QuarterCarModel:
     """The plant under the commands of one test. Plates' motions are kept: most candidates leave
     them as they are."""
 
+    every = 1
+
     def __init__(
         self,
         ground: Array,
@@ -400,6 +402,10 @@ class QuarterCarModel:
         return QuarterCarModel(
             self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
         )
+
+    def thin(self, longest: float) -> QuarterCarModel:  # noqa: ARG002
+        """The same: it is integrated from tick to tick."""
+        return self
 
     def _plate(
         self,

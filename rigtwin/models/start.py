@@ -89,21 +89,20 @@ def fit_start(
     tuple
         Position and velocity; `first` if the prediction runs away.
     """
-    width = np.array(error)
-    start = np.array(first)
-    for _ in range(STEPS):
-        here = predict((float(start[0]), float(start[1])))
-        columns = np.stack(
-            [
-                predict((float(start[0] + move[0]), float(start[1] + move[1]))) - here
-                for move in np.diag(width)
-            ],
-            axis=1,
-        )
-        columns /= held
-        normal = columns.T @ columns + np.eye(2) / LIKELY**2
+    width, beginning = np.array(error), np.array(first)
+    here = predict(first)
+    columns = np.stack(
+        [predict((first[0] + a, first[1] + b)) - here for a, b in np.diag(width)], axis=1
+    )
+    columns /= held
+    # A start is known well enough to begin with that the derivatives there do for all steps.
+    normal = columns.T @ columns + np.eye(2) / LIKELY**2
+    start = beginning
+    for step in range(STEPS):
+        if step:
+            here = predict((float(start[0]), float(start[1])))
         gradient = columns.T @ ((measured - here) / held)
-        gradient -= (start - np.array(first)) / width / LIKELY**2
+        gradient -= (start - beginning) / width / LIKELY**2
         start = start + width * np.linalg.solve(normal, gradient)
         if not np.isfinite(start).all():
             return first
