@@ -42,7 +42,7 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def _share(measure: str, hits: Sequence[bool], goal: str) -> Row:
+def share_of(measure: str, hits: Sequence[bool], goal: str) -> Row:
     if not len(hits):
         return Row(measure, "no case", goal)
     low, high = wilson(sum(hits), len(hits))
@@ -124,15 +124,15 @@ def rows(result: Result) -> list[Row]:
     seconds = [a["seconds"] for _, a in pairs]
     size = f"{np.mean(sizes):.2f}" if sizes else "no case"
     return [
-        _share("top-1 right, material single effects", right, ">= 95 %"),
-        _share("truth inside the reported class", inside, ">= 97 %"),
+        share_of("top-1 right, material single effects", right, ">= 95 %"),
+        share_of("truth inside the reported class", inside, ">= 97 %"),
         Row("mean class size", size, "<= 1.3"),
-        _share("component right", component, ">= 97 %"),
-        _share("false alarms on nulls", [a["verdict"] != "no gap" for a in null], "<= 2 in 60"),
-        _share("effect not in the library: flagged", flagged, ">= 90 %"),
-        _share("effect not in the library: component right", placed, ">= 90 %"),
-        _share("both of two effects", both, ">= 80 %"),
-        _share("a wrong name among them", wrong, "<= 5 %"),
+        share_of("component right", component, ">= 97 %"),
+        share_of("false alarms on nulls", [a["verdict"] != "no gap" for a in null], "<= 2 in 60"),
+        share_of("effect not in the library: flagged", flagged, ">= 90 %"),
+        share_of("effect not in the library: component right", placed, ">= 90 %"),
+        share_of("both of two effects", both, ">= 80 %"),
+        share_of("a wrong name among them", wrong, "<= 5 %"),
         Row("magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"),
         Row(
             "predicted - achieved shrinkage, median / 90th percentile",
@@ -140,8 +140,8 @@ def rows(result: Result) -> list[Row]:
             "<= 0.03 / <= 0.10",
         ),
         Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(judged)}", "0"),
-        _share(f"right when confidence >= {CONFIDENT}", sure, ">= 97 %"),
-        _share(
+        share_of(f"right when confidence >= {CONFIDENT}", sure, ">= 97 %"),
+        share_of(
             "immaterial single effects: no wrong name",
             [not set(names(a)) - set(truths(k)) for k, a in traces],
             "none set",
@@ -171,8 +171,8 @@ def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]
             if k["sort"] == "single" and k["effects"][0]["material"]
         ]
         alarms = [name != "none" for k, name in tried if k["sort"] == "null"]
-        found.append(_share("baseline, black box: top-1 right", hits, ""))
-        found.append(_share("baseline, black box: false alarms on nulls", alarms, ""))
+        found.append(share_of("baseline, black box: top-1 right", hits, ""))
+        found.append(share_of("baseline, black box: false alarms on nulls", alarms, ""))
     return found
 
 

@@ -9,7 +9,7 @@ import pytest
 from rigtwin.components import Guide
 from rigtwin.components.guide import resists
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.selection import Judged
+from rigtwin.diagnosis.held_out_judge import Judged
 from rigtwin.models.start import fit_start, read_start
 
 TIME = np.arange(400) * 5e-3

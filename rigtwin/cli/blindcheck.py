@@ -20,7 +20,12 @@ CASES = 200
 SUMMARY = "check the diagnosis on recordings of another rig, whose defects are withheld from it"
 MORE = """\
 A referee in a process of its own draws rigs and their defects and records tests; the diagnosis sees
-the files alone; then the key is opened, checked against its digest, and every answer is scored."""
+the files alone; then the key is opened, checked against its digest, and every answer is scored.
+
+With --wild the machines are others than the rig, and their physics have forms that the library
+does not have: friction with a memory or a smooth change of sign, a second mass on a hidden spring,
+a frame that yields, drift, eccentric encoders. What a person would accept as an answer is in the
+referee's table."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tune",
         metavar="STUDY",
         help="instead: is a controller tuned on the diagnosed twin better on the rig itself?",
+    )
+    parser.add_argument(
+        "--wild",
+        action="store_true",
+        help="instead: other machines, whose physics have forms that the library does not have",
     )
     parser.add_argument(
         "--seed", type=int, default=2026, help="of the referee's draws (default 2026)"
@@ -56,7 +66,11 @@ def execute(parsed: argparse.Namespace) -> int:
 
     if parsed.json is not None:
         writable(parsed.json)
+    if parsed.wild and (parsed.tune is not None or parsed.baselines):
+        raise RigtwinError("--wild: expected without --tune and --baselines")
     with open_workers(parsed.workers, parsed.cluster) as workers:
+        if parsed.wild:
+            return _wild(parsed, workers)
         return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
 
 
@@ -73,6 +87,20 @@ def _diagnoses(parsed: argparse.Namespace, workers: Workers) -> int:
     print(table(result))
     if parsed.json is not None:
         write_json(parsed.json, document(result))
+    return 0
+
+
+def _wild(parsed: argparse.Namespace, workers: Workers) -> int:
+    from tqdm import tqdm
+
+    from referee.wild import check_wild, wild_document, wild_table
+
+    cases = CASES if parsed.cases is None else parsed.cases
+    with tqdm(total=cases, disable=None, unit="machine", desc="wild machines", leave=False) as bar:
+        result = check_wild(parsed.folder, cases, parsed.seed, workers, bar.update)
+    print(wild_table(result))
+    if parsed.json is not None:
+        write_json(parsed.json, wild_document(result))
     return 0
 
 

@@ -149,7 +149,9 @@ class Machine:
         changes: dict[str, dict[str, object]] = {
             "timing": {"period": period, "duration": duration, "timestep": period / steps},
         }
-        given = {name: value for name, value in recording.controller.items() if name != OWN}
+        # Settings of another machine say nothing of this one; that it is another is said elsewhere.
+        own = recording.machine == self.name
+        given = {n: value for n, value in recording.controller.items() if own and n != OWN}
         if given and self.control is not None:
             changes["controller"] = given
         for parameter, setting in self.told.items():

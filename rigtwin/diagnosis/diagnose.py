@@ -6,32 +6,35 @@ sensors' sampling) → where → judged on held-out data → the next test.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from rigtwin.components import Effect, find, title, with_parameters
+from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
-from rigtwin.diagnosis.attribute import Attribution, Explanation, attribute, prefer_held_out
+from rigtwin.diagnosis.attribute import Attribution, attribute, prefer_held_out
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import (
     Answer,
-    Estimate,
     Finding,
     Gap,
-    Name,
     NextTest,
     Place,
-    Unobservable,
     Verdict,
+)
+from rigtwin.diagnosis.findings import (
+    describe_attributed,
+    describe_controller,
+    describe_sensor,
+    find_traces,
+    list_unobservable,
 )
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.leftover import leftovers, steps
@@ -169,13 +172,13 @@ def _diagnose(
     sampled = find_outstanding(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )
-    attributed = _findings(found, validation, evidence, thresholds)
-    traces = _traces(found, evidence, thresholds)
+    attributed = describe_attributed(found, validation, evidence, thresholds)
+    traces = find_traces(found, evidence, thresholds)
     effects = [
         *attributed,
-        *(_sensor_finding(each, evidence, thresholds.sure) for each in sampled),
+        *(describe_sensor(each, evidence, thresholds.sure) for each in sampled),
         *(
-            _controller_finding(each, thresholds.sure)
+            describe_controller(each, thresholds.sure)
             for each in deviations
             if each.kind != "unknown"
         ),
@@ -214,7 +217,7 @@ def _diagnose(
             (" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]
         ),
         next_test=suggestion,
-        not_observable=_unobservable_effects(found, attributed),
+        not_observable=list_unobservable(found, attributed),
         notes=tuple(notes),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
@@ -270,148 +273,6 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
         if deviation is not None:
             found[deviation.kind, deviation.name] = deviation
     return list(found.values())
-
-
-def _findings(
-    found: Attribution, outcome: Validation, evidence: Evidence, thresholds: Thresholds
-) -> list[Finding]:
-    if found.best is None:
-        return []
-    fit = outcome.fit or found.best.fit
-    widths = [
-        tuple(
-            # A rough model's error is no noise: how far it leads astray shows between one half of
-            # the data and the other.
-            max(width, abs(one - other) / thresholds.wider) if evidence.machine.rough else width
-            for width, one, other in zip(
-                own, *(half.values[number] for half in outcome.halves), strict=True
-            )
-        )
-        if len(outcome.halves) == 2
-        else own
-        for number, own in enumerate(fit.widths)
-    ]
-    surest = (
-        thresholds.sure if len(fit.effects) == 1 and not found.unknown else thresholds.less_sure
-    )
-    return [
-        Finding(
-            Name(effect.component, effect.kind.name),
-            estimates(effect, values, spread, evidence, thresholds.wider),
-            min(surest, _probability(found.ranking, effect)),
-            _equivalence_class(found.ranking, found.best, effect, thresholds.member),
-            min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
-            effect.kind.title,
-        )
-        for effect, values, spread in zip(fit.effects, fit.values, widths, strict=True)
-        if effect in outcome.kept
-    ]
-
-
-def _traces(found: Attribution, evidence: Evidence, thresholds: Thresholds) -> tuple[Finding, ...]:
-    """Of a rough model, the effects that the best explanation of all has beside those that are
-    named: what it gains by them is too little to claim them."""
-    if found.selection is None or found.best is None:
-        return ()
-    chosen, best = found.selection.chosen, found.selection.pool[0]
-    gained = max(1.0 - math.exp(2.0 * (best.score - chosen.score)), 0.0)
-    more = [effect for effect in best.fit.effects if effect not in chosen.fit.effects]
-    return tuple(
-        Finding(
-            Name(effect.component, effect.kind.name),
-            estimates(effect, values, widths, evidence, thresholds.wider),
-            0.0,
-            (Name(effect.component, effect.kind.name),),
-            gained / len(more),
-            effect.kind.title,
-        )
-        for effect, values, widths in zip(
-            best.fit.effects, best.fit.values, best.fit.widths, strict=True
-        )
-        if effect in more
-    )
-
-
-def estimates(
-    effect: Effect,
-    values: Sequence[float],
-    widths: Sequence[float],
-    evidence: Evidence,
-    wider: float = STANDARD.wider,
-) -> dict[str, Estimate]:
-    """The parameters of an effect as fitted, with their intervals.
-
-    Parameters
-    ----------
-    effect
-        That was fitted.
-    values, widths
-        Of its parameters, and their standard deviations.
-    evidence
-        That it was fitted to.
-    wider
-        Standard deviations to either side.
-
-    Returns
-    -------
-    dict
-        Parameter → estimate.
-    """
-    nominal = effect.nominal(evidence.plant)
-    # A delay cannot be known better than when in a tick the samples were taken.
-    timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
-    least = {"delay": timing / wider}
-    return {
-        name: Estimate(
-            value,
-            max(value - wider * max(width, least.get(name, 0.0)), quantity.low),
-            min(value + wider * max(width, least.get(name, 0.0)), quantity.high),
-            nominal[name],
-            evidence.machine.unit(effect.group, quantity),
-        )
-        for (name, quantity), value, width in zip(
-            effect.quantities().items(), values, widths, strict=True
-        )
-    }
-
-
-def _probability(ranking: Sequence[Explanation], effect: Effect) -> float:
-    return float(sum(each.probability for each in ranking if effect in each.fit.effects))
-
-
-def _equivalence_class(
-    ranking: Sequence[Explanation], best: Explanation, effect: Effect, least: float
-) -> tuple[Name, ...]:
-    """Effects that stand in this one's place in other likely explanations."""
-    names = [Name(effect.component, effect.kind.name)]
-    rest = [other for other in best.fit.effects if other != effect]
-    for each in ranking:
-        if (
-            each.probability < least
-            or len(each.fit.effects) != len(best.fit.effects)
-            or effect in each.fit.effects
-        ):
-            continue
-        for other in each.fit.effects:
-            if other not in rest and len([e for e in each.fit.effects if e in rest]) == len(rest):
-                names.append(Name(other.component, other.kind.name))
-    return tuple(dict.fromkeys(names))
-
-
-def _sensor_finding(each: SensorProperty, evidence: Evidence, sure: float) -> Finding:
-    effect = find(f"{each.kind}@{each.component}", evidence.plant)
-    unit = evidence.machine.unit(effect.group, effect.quantities()[each.parameter])
-    spread = 0.05 * each.value
-    estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
-    name = Name(each.component, each.kind)
-    return Finding(name, {each.parameter: estimate}, sure, (name,), 1.0, effect.kind.title)
-
-
-def _controller_finding(each: Deviation, sure: float) -> Finding:
-    name = Name("controller", each.kind)
-    spread = 1e-3 * abs(each.used)
-    estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
-    return Finding(name, {each.name: estimate}, sure, (name,), 1.0, title(each.kind))
 
 
 def _places(
@@ -496,12 +357,3 @@ def _next_test(
     return propose_test(
         machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests
     )
-
-
-def _unobservable_effects(
-    found: Attribution, effects: Sequence[Finding]
-) -> tuple[Unobservable, ...]:
-    why = "no size tried changes these data by more than their noise"
-    named = {(effect.name.component, effect.name.kind) for effect in effects}
-    unseen = [Unobservable(effect.component, effect.kind.name, why) for effect in found.silent]
-    return tuple(each for each in unseen if (each.component, each.kind) not in named)

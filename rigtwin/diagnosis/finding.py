@@ -31,11 +31,23 @@ class Name:
 
 
 @dataclass(frozen=True)
+class Support:
+    """What speaks for an effect of a rough model. margin: by how much the best explanation without
+    it does worse on held-out data, as a difference of the logarithms of the errors, with a price on
+    parameters; steadiness: standard errors by which its magnitude is off nominal; left: error of
+    what is held out, in units of the signals' own."""
+
+    margin: float
+    steadiness: float
+    left: float
+
+
+@dataclass(frozen=True)
 class Finding:
     """One effect. confidence: probability that it is this one; alternatives: the effects that these
     data cannot tell from it, itself first (`class` in JSON); share: of the gap, what would come
     back without it; for an effect read off a sensor or the controller alone, of that one's own gap;
-    title: its kind in a sentence."""
+    title: its kind in a sentence; support: of a rough model, what speaks for it."""
 
     name: Name
     parameters: dict[str, Estimate]
@@ -43,6 +55,7 @@ class Finding:
     alternatives: tuple[Name, ...]
     share: float
     title: str = ""
+    support: Support | None = None
 
 
 @dataclass(frozen=True)
@@ -185,4 +198,5 @@ def _finding(effect: Finding) -> dict[str, Any]:
         "confidence": effect.confidence,
         "class": [asdict(name) for name in effect.alternatives],
         "share": effect.share,
+        "support": None if effect.support is None else asdict(effect.support),
     }

@@ -73,9 +73,7 @@ class Fitter:
             ]
             force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
-            self._scales[component] = Scales.of(
-                motion, force, self.evidence.lines[longest].period
-            )
+            self._scales[component] = Scales.of(motion, force, self.evidence.lines[longest].period)
         return self._scales[component]
 
     def fit_one(self, effect: Effect) -> Fit:

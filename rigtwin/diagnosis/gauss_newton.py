@@ -115,4 +115,3 @@ def _derivatives(
         beside[number] += sign * step
         columns.append(sign * (residual(beside) - left))
     return np.stack(columns, axis=1)
-

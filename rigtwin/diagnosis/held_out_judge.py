@@ -104,8 +104,7 @@ class HeldOutJudge:
         self._floor = FLOOR * float(np.sqrt(np.mean(np.square(forms))))
         self._folds, self._pieces = _folds(evidence), _stretches(evidence)
         self._blocks = [
-            np.minimum(np.arange(ticks) * BLOCKS // ticks, BLOCKS - 1)
-            for ticks in _ticks(evidence)
+            np.minimum(np.arange(ticks) * BLOCKS // ticks, BLOCKS - 1) for ticks in _ticks(evidence)
         ]
         self._judged: dict[frozenset[Effect], Judged] = {}
 

@@ -8,10 +8,13 @@ do as well as the best, the one with the fewest parameters is taken.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from rigtwin.components import Effect
+from rigtwin.components import Effect, measures
+from rigtwin.components.plant import Plant
+from rigtwin.diagnosis.finding import Support
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
@@ -27,25 +30,64 @@ JUDGED = 4
 """Explanations of each number of parameters that are judged at first."""
 
 
+RARE = ("backlash", "compliance", "cogging", "relaxation", "drag", "load_friction")
+"""Kinds that few guides have; what is left of other friction may be taken for them."""
+LATE = ("lag", "delay", "two_lags", "resonance")
+"""Kinds that make a signal late, each in its own way."""
+
+
 @dataclass(frozen=True)
 class Selection:
     """What was chosen of everything judged. alike: others that do as well, of the same number of
-    effects, the best first; pool: all judged, the best first."""
+    effects, the best first; pool: all judged, the best first; price: of a parameter; nominal: the
+    plant without any effect."""
 
     chosen: Judged
     alike: tuple[Judged, ...]
     pool: tuple[Judged, ...]
+    price: float
+    nominal: Plant
+    rules: SelectionRules
+
+    def support(self, effect: Effect) -> Support:
+        """What speaks for one of the chosen effects."""
+        place = self.chosen.fit.effects.index(effect)
+        there = effect.nominal(self.nominal)[effect.kind.parameters[0]]
+        width = max(self.chosen.widths[place][0], 1e-300)
+        return Support(
+            margin=_margin(
+                effect,
+                self.chosen,
+                drop_unlikely(self.pool, self.rules),
+                self.price,
+                self.rules,
+            ),
+            steadiness=abs(self.chosen.fit.values[place][0] - there) / width,
+            left=math.exp(self.chosen.score),
+        )
+
+    def half_widths(self, effect: Effect) -> tuple[float, ...]:
+        """What the interval of each parameter of a chosen effect has to either side at least: by
+        the jackknife, and by the share of the signals that is left unexplained."""
+        place = self.chosen.fit.effects.index(effect)
+        left = math.exp(self.chosen.score)
+        return tuple(
+            max(self.rules.jackknifed * width, left * abs(value))
+            for width, value in zip(
+                self.chosen.widths[place], self.chosen.fit.values[place], strict=True
+            )
+        )
 
     def replace_chosen(self, fit: Fit) -> Selection:
         """The same with other values of the chosen effects."""
         chosen = replace(self.chosen, fit=fit)
         pool = tuple(chosen if each is self.chosen else each for each in self.pool)
-        return Selection(chosen, self.alike, pool)
+        return replace(self, chosen=chosen, pool=pool)
 
     def prefer(self, other: Judged, fit: Fit) -> Selection:
         """The same with one that does as well, fitted again, in the place of the chosen one."""
         alike = (self.chosen, *(each for each in self.alike if each is not other))
-        return Selection(other, alike, self.pool).replace_chosen(fit)
+        return replace(self, chosen=other, alike=alike).replace_chosen(fit)
 
 
 def choose(pool: Sequence[Judged], fitter: Fitter, rules: SelectionRules) -> Judged:
@@ -75,7 +117,96 @@ def choose(pool: Sequence[Judged], fitter: Fitter, rules: SelectionRules) -> Jud
         )
     ]
     price = rules.price_of(max(each.pieces for each in fair))
-    return min(fair, key=lambda each: each.score + price * each.size)
+    likely = drop_unlikely(pool, rules)
+    necessary = [
+        each
+        for each in fair
+        if each in likely
+        and all(
+            _margin(effect, each, likely, price, rules) >= rules.necessary
+            for effect in each.fit.effects
+        )
+    ]
+    return min(necessary, key=lambda each: _cost(each, price))
+
+
+def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]:
+    """The explanations that can be rivals of each other.
+
+    Parameters
+    ----------
+    pool
+        All that were judged, the empty one among them.
+    rules
+        What is possible, and likely.
+
+    Returns
+    -------
+    list of Judged
+        Those whose effects do not undo each other or stand at a bound, and in which everything that
+        few machines have accounts for a good share of the signals.
+    """
+    possible = [each for each in pool if not each.cancels and not each.bounded]
+
+    def is_likely(effect: Effect, each: Judged) -> bool:
+        others = set(each.fit.effects) - {effect}
+        rival = min(
+            other.score
+            for other in possible
+            if all(own in others or not _is_rare(own) for own in other.fit.effects)
+        )
+        return math.exp(2.0 * rival) - math.exp(2.0 * each.score) >= rules.rarely**2
+
+    return [
+        each
+        for each in possible
+        if all(is_likely(effect, each) for effect in each.fit.effects if _is_rare(effect))
+    ]
+
+
+def _cost(each: Judged, price: float) -> float:
+    return each.score + price * each.size
+
+
+def _margin(
+    effect: Effect,
+    explanation: Judged,
+    rivals: Sequence[Judged],
+    price: float,
+    rules: SelectionRules,
+) -> float:
+    """By how much everything without an effect, and without what it may be taken for, does worse
+    than an explanation with it, price included."""
+    own = set(explanation.fit.effects)
+
+    def stands_in(each: Judged) -> bool:
+        other = set(each.fit.effects)
+        return (
+            len(own - other) == len(other - own) == 1
+            and abs(each.score - explanation.score) <= rules.alike
+        )
+
+    costs = (
+        _cost(each, price)
+        for each in rivals
+        if not any(_is_one_of_a_sort(effect, other) for other in each.fit.effects)
+        and not stands_in(each)
+    )
+    return min(costs) - _cost(explanation, price)
+
+
+def _is_one_of_a_sort(effect: Effect, other: Effect) -> bool:
+    """Whether one is the other, or both make a signal late."""
+    return effect == other or (
+        effect.component == other.component and effect.kind.name in LATE and other.kind.name in LATE
+    )
+
+
+def _is_rare(effect: Effect) -> bool:
+    """Whether few machines have it."""
+    if measures(effect.of()):
+        return effect.kind.name != "offset"
+    return effect.kind.name in RARE
 
 
 def _is_as_good(each: Judged, best: Judged, slack: float, most: float) -> bool:
@@ -143,7 +274,8 @@ def select(
         and not each.bounded
         and _is_as_good(each, chosen, rules.alike, rules.slack)
     )
-    return Selection(chosen, alike, tuple(ranked))
+    price = rules.price_of(max(each.pieces for each in ranked))
+    return Selection(chosen, alike, tuple(ranked), price, fitter.plant, rules)
 
 
 def _shake(fit: Fit, fitter: Fitter) -> list[tuple[tuple[Effect, ...], Values]]:

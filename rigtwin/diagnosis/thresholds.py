@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class NamingRules:
@@ -45,10 +47,28 @@ class SelectionRules:
     """Share of either effect's own amplitude that two must leave together."""
     collinear: float = 0.95
     """Cosine of two responses from which only one of them is claimed."""
+    necessary: float = 0.05
+    """Price included, by how much every explanation without an effect must do worse,"""
+    rarely: float = 0.08
+    """and what one of those that few machines have must account for, as a share of the signals."""
+    calibration: tuple[tuple[float, float], ...] = (
+        (0.05, 0.75),
+        (0.25, 0.85),
+        (0.5, 0.95),
+        (1.0, 0.97),
+    )
+    """Margin of an effect, and how often one of such a margin was right, or one of its class, on
+    machines of other physics than the library's (docs/confidence.md)."""
+    jackknifed: float = 4.0
+    """Standard errors by the jackknife to either side that an interval has at least."""
     needed: float = 0.03
     """Difference on held-out recordings that an effect must bring to stay."""
     least: float = 0.35
     """Difference from the nominal machine that an explanation must bring to be named at all."""
+
+    def confidence(self, margin: float) -> float:
+        """Of an effect without which everything does worse by a margin."""
+        return float(np.interp(margin, *zip(*self.calibration, strict=True)))
 
     def price_of(self, pieces: float) -> float:
         """Of a parameter, where what is left consists of so many independent pieces."""

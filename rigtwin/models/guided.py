@@ -183,7 +183,9 @@ def integrate_pushed(
                 if which >= 0:
                     true = x if kinds[which] == 0 else v
                     # To take a sensor out of the tuple costs more than the rest of a tick.
-                    sensed = true if neutral[which] else transduce(sensors[which], states[which], true)
+                    sensed = (
+                        true if neutral[which] else transduce(sensors[which], states[which], true)
+                    )
                     loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
