@@ -14,7 +14,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.held_out_judge import HeldOutJudge
+from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.selection import Selection, select
@@ -399,10 +399,13 @@ def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) 
     """
     if found.selection is None or found.best is None:
         return found
-    best = min(
-        (found.selection.chosen, *found.selection.alike),
-        key=lambda each: float(np.mean(np.log(relative_errors(held_out, each.fit.plant)))),
-    )
+    selection = found.selection
+
+    def cost(each: Judged) -> float:
+        power = relative_errors(held_out, each.fit.plant) ** 2 + each.floor**2
+        return float(0.5 * np.mean(np.log(power))) + selection.price * each.size
+
+    best = min((selection.chosen, *selection.alike), key=cost)
     if best is found.selection.chosen:
         return found
     fit = Fitter(evidence).refit_with_tolerances(best.fit)

@@ -29,10 +29,6 @@ STEPS = (1.0, 0.4, 0.0)
 """Shares of the step to a fold's own values that are tried."""
 WIDE = 5.0
 """Times the steps of the derivatives at which responses are compared again."""
-FLOOR = 1.0 / 3.0
-"""Share of what no model is held to below which an error counts no more."""
-USUAL = 4
-"""Places that an effect is looked for at for each of its parameters."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +97,8 @@ class HeldOutJudge:
             ]
         )
         forms = [evidence.machine.form_of(row) for row in evidence.machine.rows]
-        self._floor = FLOOR * float(np.sqrt(np.mean(np.square(forms))))
+        # Below what no model is held to an error counts no more.
+        self._floor = float(np.sqrt(np.mean(np.square(forms))))
         self._folds, self._pieces = _folds(evidence), _stretches(evidence)
         self._blocks = [
             np.minimum(np.arange(ticks) * BLOCKS // ticks, BLOCKS - 1) for ticks in _ticks(evidence)
@@ -172,17 +169,15 @@ class HeldOutJudge:
             _split(widths, fit.effects),
             self._floor,
             count_independent(evidence, fit),
-            sum(self._size(effect) for effect in fit.effects),
-            self._are_collinear(fit, jacobian, here) or self._cancels(fit),
+            float(sum(self._size(effect) for effect in fit.effects)),
+            self._are_collinear(fit, jacobian, here, widths) or self._cancels(fit),
             self.fitter.is_bounded(fit),
         )
 
     def _size(self, effect: Effect) -> float:
-        starts = self.fitter.starts(effect)
+        starts, count = self.fitter.starts(effect), len(effect.kind.parameters)
         # Of a wave each pitch is a place of its own, looked at in two phases.
-        count = len(effect.kind.parameters)
-        places = len(starts.values) / (2.0 if starts.quadrature else USUAL * count)
-        return count + max(math.log2(places), 0.0)
+        return count + (math.log2(len(starts.values) / 2) if starts.quadrature else 0.0)
 
     def _jackknife(self, jacobian: Sequence[Array], here: Sequence[Array]) -> Array:
         """Standard errors in units of the steps: how far the values move, to first order, when one
@@ -245,9 +240,19 @@ class HeldOutJudge:
             )
         return found / self._own[:, None]
 
-    def _are_collinear(self, fit: Fit, jacobian: Sequence[Array], here: Sequence[Array]) -> bool:
+    def _are_collinear(
+        self, fit: Fit, jacobian: Sequence[Array], here: Sequence[Array], widths: Array
+    ) -> bool:
         """Whether the responses of two magnitudes can hardly be told apart: then only their sum
-        is known, or their difference. What sticks and slips may say so of small steps by chance."""
+        is known, or their difference, unless both are known very well. What sticks and slips may
+        say so of small steps by chance."""
+        nominal = np.array(
+            [e.nominal(self.fitter.plant)[e.kind.parameters[0]] for e in fit.effects]
+        )
+        sizes = np.abs(np.array([values[0] for values in fit.values]) - nominal)
+        errors = np.array([own[0] for own in _split(widths, fit.effects)])
+        if np.all(sizes >= self.rules.surely * errors):
+            return False
         return self._alike(fit, jacobian) > self.rules.collinear and (
             self._alike(fit, self._jacobian(fit, here, WIDE)[0]) > self.rules.collinear
         )

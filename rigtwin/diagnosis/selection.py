@@ -155,7 +155,8 @@ def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]
             for other in possible
             if all(own in others or not _is_rare(own) for own in other.fit.effects)
         )
-        return math.exp(2.0 * rival) - math.exp(2.0 * each.score) >= rules.rarely**2
+        share = math.exp(2.0 * rival) - math.exp(2.0 * each.score)
+        return share >= rules.rarely**2 or rival - each.score >= rules.far
 
     return [
         each

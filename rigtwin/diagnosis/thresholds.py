@@ -46,11 +46,15 @@ class SelectionRules:
     undone: float = 0.5
     """Share of either effect's own amplitude that two must leave together."""
     collinear: float = 0.95
-    """Cosine of two responses from which only one of them is claimed."""
+    """Cosine of two responses from which only one of them is claimed,"""
+    surely: float = 100.0
+    """unless both magnitudes are off nominal by that many standard errors."""
     necessary: float = 0.05
     """Price included, by how much every explanation without an effect must do worse,"""
     rarely: float = 0.08
-    """and what one of those that few machines have must account for, as a share of the signals."""
+    """and what one of those that few machines have must account for, as a share of the signals,"""
+    far: float = 1.0
+    """unless it does that much better."""
     calibration: tuple[tuple[float, float], ...] = (
         (0.05, 0.75),
         (0.25, 0.85),
