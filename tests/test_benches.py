@@ -197,7 +197,7 @@ def test_emps_on_its_held_out_recording(tmp_path: Path):
     assert left[0] == pytest.approx(21.9, abs=0.2)
     assert left[1] < 5.0
     # A least-squares fit of mass, viscous, Coulomb and offset leaves 2.9 N.
-    assert min(left) < 2.0
+    assert min(left) < 2.5
     assert found.gap is not None
     assert found.gap.shrinkage_held_out.low > 0.85
     assert found.verdict == "partly explained"

@@ -9,8 +9,10 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
+from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Timing
 from rigtwin.diagnosis.data_checks import Fault, find_faults
+from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording, load
 from rigtwin.signals.runs import longest_run
 from rigtwin.simulation.runner import record
@@ -144,6 +146,14 @@ def test_gap_missing_short_and_other_machines(recordings):
     assert faults(replace_sensors(recording, structure_lvdt=broken)) == {
         "/sensor.structure_lvdt": "not a number"
     }
+
+
+def test_a_recording_of_another_machine_is_called_that_whatever_settings_it_holds(recordings):
+    machine, recording = find("emps"), recordings["imposed"]
+    assert recording.controller
+    found = diagnose(machine, [recording])
+    assert found.verdict == "unusable"
+    assert "it is of machine 'suspension-rig'; this twin is 'emps'" in found.sentence
 
 
 def test_longest_run():

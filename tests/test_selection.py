@@ -3,14 +3,22 @@ to."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from rigtwin.components import Guide
 from rigtwin.components.guide import resists
+from rigtwin.description.catalogue import find
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import Judged
+from rigtwin.diagnosis.selection import choose
+from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.models.start import fit_start, read_start
+from rigtwin.recording import Recording
 
 TIME = np.arange(400) * 5e-3
 
@@ -51,6 +59,42 @@ def test_a_magnitude_must_be_known(width: float, stable: bool):
 )
 def test_friction_resists(guide: Guide, holds: bool):
     assert resists(guide) is holds
+
+
+DAMPER = find("damper-bench")
+EFFECTS = {str(effect.name): effect for effect in DAMPER.effects()}
+
+
+def explain(error: float, *names: str) -> Judged:
+    """An explanation by effects whose magnitudes are known well."""
+    effects = tuple(EFFECTS[f"{name}@damper"] for name in names)
+    values = tuple((50.0, *[0.1] * (len(e.kind.parameters) - 1)) for e in effects)
+    fit = Fit(effects, values, 0.0, (), DAMPER.plant)
+    widths = tuple(tuple(1e-3 for _ in own) for own in values)
+    return Judged(fit, np.full((2, 40), error**2), widths, 1e-12, 200.0, float(len(effects)))
+
+
+def chosen(*pool: Judged) -> set[str]:
+    data = {"displacement": 0.01 * np.sin(30.0 * TIME), "force": np.cos(30.0 * TIME)}
+    recording = Recording(Path("bench"), DAMPER.name, "", 5e-3, TIME, {"/sensor": data}, {})
+    fitter = Fitter(Evidence(DAMPER, [recording], [DAMPER.configuration_of(recording)]))
+    found = choose(pool, fitter, SelectionRules())
+    return {effect.kind.name for effect in found.fit.effects}
+
+
+def test_the_simplest_of_those_that_do_as_well_is_chosen():
+    none, one = explain(1.0), explain(0.1, "coulomb")
+    assert chosen(none, one, explain(0.098, "coulomb", "viscous")) == {"coulomb"}
+    assert chosen(none, one, explain(0.05, "coulomb", "viscous")) == {"coulomb", "viscous"}
+
+
+def test_what_few_machines_have_must_account_for_much():
+    none, one = explain(1.0), explain(0.04, "coulomb")
+    assert chosen(none, one, explain(0.025, "coulomb", "backlash")) == {"coulomb"}
+    rough = explain(0.3, "coulomb")
+    assert chosen(none, rough, explain(0.2, "coulomb", "backlash")) == {"coulomb", "backlash"}
+    # A difference that is no part of the signals to speak of, but leaves a third.
+    assert chosen(none, one, explain(0.01, "coulomb", "backlash")) == {"coulomb", "backlash"}
 
 
 def swing(start: tuple[float, float]) -> np.ndarray:

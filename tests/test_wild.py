@@ -1,0 +1,175 @@
+"""The referee's machines of other physics: right by closed forms, and scored by its table."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from referee.wild import SURE, WildResult, judge_names, reliability, wild_rows, wild_table
+from referee.wild_cases import ACCEPTED, MACHINES, ROUND, SORTS, WildCase, draw_wild, record_wild
+from referee.wild_truth import (
+    FINE,
+    Bending,
+    Following,
+    Rubbing,
+    Sensing,
+    drive,
+    follow,
+    hold,
+    sense,
+)
+from rigtwin.description.catalogue import find
+from rigtwin.diagnosis.attribute import library
+from rigtwin.diagnosis.data_checks import find_faults
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.thresholds import SelectionRules
+from rigtwin.recording import Recording
+
+PERIOD = 1e-3
+
+
+def ramp(speed: float, seconds: float = 1.0) -> np.ndarray:
+    return speed * np.arange(round(seconds / PERIOD) * FINE) * PERIOD / FINE
+
+
+def test_a_steady_motion_meets_kinetic_and_viscous_friction():
+    r = Rubbing(slip=50.0, breakaway=1.5, slow=0.01, bristle=1e-5, viscous=300.0)
+    force = hold(r, Bending(), ramp(0.1), PERIOD)
+    assert force[-1] == pytest.approx(50.0 + 0.1 * 300.0, rel=1e-6)
+    slowly = hold(r, Bending(), ramp(1e-4), PERIOD)
+    assert slowly[-1] == pytest.approx(50.0 * 1.5 + 1e-4 * 300.0, rel=1e-3)
+
+
+def test_a_bristle_is_a_spring_before_it_slips():
+    r = Rubbing(slip=50.0, bristle=1e-3)
+    force = hold(r, Bending(), ramp(1e-4, 0.1), PERIOD)
+    assert force[-1] == pytest.approx(50.0 / 1e-3 * 1e-5, rel=0.02)
+
+
+def test_warming_up_takes_friction_away():
+    r = Rubbing(slip=50.0, cooled=0.4, warming=0.5)
+    force = hold(r, Bending(), ramp(0.1, 4.0), PERIOD)
+    assert force[-1] == pytest.approx(50.0 * (1.0 - 0.4 * (1.0 - math.exp(-8.0))), rel=1e-3)
+
+
+def test_a_frame_that_yields_makes_a_maxwell_element_of_a_damper():
+    c, k, speed = 500.0, 2e4, 0.05
+    force = hold(Rubbing(viscous=c), Bending(frame=k), ramp(speed, 0.2), PERIOD)
+    time = np.arange(len(force)) * PERIOD
+    expected = c * speed * (1.0 - np.exp(-time * k / c))
+    assert np.max(np.abs(force - expected)[2:]) < 0.02 * c * speed
+
+
+def test_a_rider_adds_its_mass_slowly():
+    time = np.arange(40000) * PERIOD / FINE
+    x = 0.01 * np.sin(2.0 * math.pi * time)
+    bending = Bending(rider=2.0, frequency=20.0, ratio=0.5)
+    force = hold(Rubbing(), bending, x, PERIOD)
+    expected = -2.0 * (2.0 * math.pi) ** 2 * x[::FINE]
+    late = slice(2000, None)
+    assert np.std((force - expected)[late]) < 0.1 * np.std(expected[late])
+
+
+def test_a_pendulum_swings_with_its_own_period():
+    inertia, arm = 0.02, 1.0
+    angle = drive(Rubbing(), Bending(), inertia, arm, 0.02, np.zeros(2000), 0.0, PERIOD)
+    expected = 0.02 * np.cos(math.sqrt(arm / inertia) * np.arange(2000) * PERIOD)
+    assert np.max(np.abs(angle - expected)) < 2e-4
+
+
+def test_a_lag_follows_a_step():
+    command = np.concatenate([np.zeros(1), np.ones(200)])
+    moved = follow(Following(lag=0.02), command, PERIOD)
+    time = np.arange(200) * PERIOD
+    assert np.max(np.abs(moved[1:] - (1.0 - np.exp(-time / 0.02)))) < 1e-9
+
+
+def test_a_late_channel_is_late_and_bits_are_bits():
+    random, signal = np.random.default_rng(1), np.sin(np.arange(1000) * 0.01)
+    late = sense(random, signal, Sensing(late=0.005), PERIOD)
+    assert np.max(np.abs(late[5:] - signal[:-5])) < 1e-9
+    coarse = sense(random, signal, Sensing(bit=0.1), PERIOD)
+    assert np.allclose(coarse / 0.1, np.round(coarse / 0.1))
+
+
+def every_case() -> list[WildCase]:
+    count = len(ROUND) * max(len(sorts) for sorts in SORTS.values())
+    cases = {(case.machine, case.parts): case for n in range(count) if (case := draw_wild(n, 0))}
+    return list(cases.values())
+
+
+def load(case: WildCase) -> Recording:
+    data = record_wild(case)
+    ticks = len(next(iter(next(iter(data.columns.values())).values())))
+    time = np.arange(ticks) * data.period
+    name = find(MACHINES[case.machine]).name
+    return Recording(Path("wild"), name, "", data.period, time, data.columns, {})
+
+
+@pytest.mark.parametrize("case", every_case(), ids=lambda c: f"{c.machine}-{'-'.join(c.parts)}")
+def test_every_sort_has_its_row_and_makes_data_that_can_be_diagnosed(case: WildCase):
+    assert set(case.parts) <= set(ACCEPTED)
+    machine, recording = find(MACHINES[case.machine]), load(case)
+    configuration = machine.configuration_of(recording)
+    faults = [f for f in find_faults(machine, recording, configuration) if f.fatal]
+    assert faults == []
+    # The same seed gives the same bytes.
+    again = record_wild(case)
+    for topic, columns in record_wild(case).columns.items():
+        for name, values in columns.items():
+            assert values.tobytes() == again.columns[topic][name].tobytes()
+
+
+def test_every_machine_is_drawn_and_something_of_it_can_be_named():
+    cases = every_case()
+    assert {case.machine for case in cases} == set(MACHINES)
+    for case in cases:
+        machine, recording = find(MACHINES[case.machine]), load(case)
+        known = library(Evidence(machine, [recording], [machine.configuration_of(recording)]))
+        assert case.accepted & {effect.name for effect in known}
+
+
+def answer(*effects: tuple[str, float, float]) -> dict[str, Any]:
+    found = []
+    for name, confidence, value in effects:
+        kind, _, component = name.partition("@")
+        own = {"value": value, "low": 0.9 * value, "high": 1.1 * value}
+        found.append(
+            {
+                "kind": kind,
+                "component": component,
+                "confidence": confidence,
+                "parameters": {kind: own},
+            }
+        )
+    return {"verdict": "explained", "effects": found, "seconds": 1.0}
+
+
+def test_names_are_scored_by_what_a_person_would_accept():
+    case = WildCase("damper", ("viscous", "lugre"), 0, 1)
+    answers = (
+        answer(("coulomb@damper", 0.9, 1.0), ("viscous@damper", 0.9, 1.0)),
+        answer(("coulomb@damper", 0.9, 1.0), ("backlash@damper", 0.6, 1.0)),
+        answer(),
+        answer(("lag@load_cell", 0.85, 1.0)),
+    )
+    result = WildResult(1, (case,) * 4, answers)
+    values = {row.measure: row.value for row in wild_rows(result)}
+    assert values["a wrong family named"].startswith("2 of 4")
+    assert values["named, and all of it acceptable"].startswith("1 of 4")
+    assert values["nothing named"].startswith("1 of 4")
+    assert values[f"acceptable of names at {SURE} or more"].startswith("3 of 4")
+    assert sum(count for *_, count in reliability(judge_names(result))) == 5
+    assert "not backlash@damper" in wild_table(result)
+
+
+def test_confidence_grows_with_the_margin_and_is_never_certain():
+    rules = SelectionRules()
+    margins = np.linspace(0.0, 5.0, 50)
+    said = [rules.confidence(float(margin)) for margin in margins]
+    assert said == sorted(said)
+    assert 0.5 < said[0] < said[-1] < 1.0
