@@ -43,13 +43,20 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
             "/sensor.load_cell",
             marks=pytest.mark.slow,
         ),
-        ("emps", "positioning", "coulomb@guide", 20.0, "/sensor.position"),
+        pytest.param(
+            "emps",
+            "positioning",
+            "coulomb@guide",
+            20.0,
+            "/sensor.position",
+            marks=pytest.mark.slow,
+        ),
         ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
     ],
 )
 def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, magnitude, channel):
     machine = folder_machine(tmp_path) if sort == "folder" else rigtwin.machine(sort)
-    settings = {"timing": {"duration": 6.0}}
+    settings = {"timing": {"duration": 4.0 if sort == "folder" else 6.0}}
     recording = rigtwin.run(
         machine, experiment, seed=1, effects={effect: magnitude}, settings=settings
     )

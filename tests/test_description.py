@@ -227,12 +227,12 @@ def test_a_new_machine_takes_no_python(
     answer."""
     machine = described(tmp_path)
     random = np.random.default_rng(3)
-    time = np.arange(8000) * 1e-3
+    time = np.arange(5000) * 1e-3
     command = sum(
         8.0 * np.sin(2 * np.pi * f * time + random.uniform(0, 6))
         for f in (0.23, 0.61, 1.13, 1.9, 3.1)
     )
-    position = truth(np.asarray(command), viscous, slip) + 1e-5 * random.standard_normal(8000)
+    position = truth(np.asarray(command), viscous, slip) + 1e-5 * random.standard_normal(5000)
     found = diagnose(machine, [recording_of(machine, np.asarray(command), position)])
     if kind is None:
         assert found.verdict == "no gap"

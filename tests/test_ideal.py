@@ -52,6 +52,7 @@ def test_single_mass():
     assert at_rest.force[-1] == pytest.approx(25 * 9.81, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_semi_active_quarter_car():
     settings = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
 

@@ -81,6 +81,7 @@ STUDY = {
 }
 
 
+@pytest.mark.slow
 def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, monkeypatch):
     """What a diagnosis would say is taken as given: the rig has more friction than nominal."""
     import referee.tuning as module

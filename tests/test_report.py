@@ -46,7 +46,8 @@ def test_the_document_has_every_field(explained):
     document = json.loads(json.dumps(explained.document()))
     assert document["verdict"] == "explained"
     (effect,) = document["effects"]
-    assert set(effect) == {"component", "kind", "parameters", "confidence", "class", "share"}
+    fields = {"component", "kind", "parameters", "confidence", "class", "share", "support"}
+    assert set(effect) == fields
     assert set(effect["parameters"]["coulomb"]) == {"value", "low", "high", "nominal", "unit"}
     assert effect["class"][0] == {"component": "rail", "kind": "coulomb"}
     assert set(document["where"][0]) >= {"component", "share", "band_hz", "region"}

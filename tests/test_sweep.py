@@ -320,6 +320,7 @@ minimise = "ride"
 """
 
 
+@pytest.mark.slow
 def test_tune_says_the_same_on_a_cluster(cluster, tmp_path, capsys):
     address, _ = cluster
     (tmp_path / "study.toml").write_text(STUDY)

@@ -199,6 +199,7 @@ def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
     assert imread(picture).std() > 0.05
 
 
+@pytest.mark.slow
 def test_what_the_thesis_sees_in_the_drop():
     """Statements of section 6.3 that the twin shows, of one run each."""
     results = {key: job() for key, job in quarter_car_tests.jobs(1).items()}

@@ -589,6 +589,7 @@ def runs(folder: Path) -> int:
         return base.execute("SELECT COUNT(*) FROM results").fetchone()[0]
 
 
+@pytest.mark.slow
 def test_a_study_of_a_calibrated_twin_says_what_it_is_worth(tmp_path, capsys):
     text = SMALL.replace('"ride"', '["ride", "road_holding"]')
     text = text.replace('report = ["heave", "road_holding"]', "points = 3")
