@@ -33,6 +33,7 @@ from rigtwin.diagnosis.findings import (
     describe_attributed,
     describe_controller,
     describe_sensor,
+    find_nearest,
     find_traces,
     list_unobservable,
 )
@@ -228,6 +229,7 @@ def _diagnose(
         if rough and not gone
         else (),
         traces=traces,
+        nearest=find_nearest(found) if verdict == "unknown" else None,
     )
     return Diagnosis(
         answer,

@@ -127,6 +127,17 @@ class Unobservable:
 
 
 @dataclass(frozen=True)
+class Nearest:
+    """The explanation that comes nearest where none is good enough to be named. left: what it
+    leaves, and without it, in units of the noise, or of the signals of a rough model (`of`)."""
+
+    names: tuple[Name, ...]
+    left: float
+    without: float
+    of: Literal["noise", "signals"]
+
+
+@dataclass(frozen=True)
 class Step:
     """One effect more. added: its name, or of all that changed; values: of its parameters then;
     left: rms of what each signal has left, in its unit, on the data that it is judged on."""
@@ -141,7 +152,8 @@ class Answer:
     """The whole answer. ranking: explanations with their probability, the likeliest first; notes:
     what people should know; steps: what each effect changed as they were found one after another,
     the nominal machine first; units: of their signals; leftovers: where what is still left lies;
-    traces: effects that close a little more of the gap, too small to be claimed."""
+    traces: effects that close a little more of the gap, too small to be claimed; nearest: of an
+    unknown, what comes nearest to it."""
 
     verdict: Verdict
     sentence: str
@@ -160,6 +172,7 @@ class Answer:
     units: dict[str, str] = field(default_factory=dict)
     leftovers: tuple[Place, ...] = ()
     traces: tuple[Finding, ...] = ()
+    nearest: Nearest | None = None
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -185,6 +198,7 @@ class Answer:
             "steps": [asdict(step) for step in self.steps],
             "units": dict(self.units),
             "leftovers": [asdict(place) for place in self.leftovers],
+            "nearest": None if self.nearest is None else asdict(self.nearest),
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }

@@ -11,9 +11,13 @@ from rigtwin.diagnosis.attribute import Attribution, Explanation
 from rigtwin.diagnosis.controller import Deviation
 from rigtwin.diagnosis.cross_validation import Validation
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Estimate, Finding, Name, Unobservable
+from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Unobservable
+from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+
+SHOWN = 0.01
+"""Share of what is left that traces must gain to be mentioned."""
 
 
 def describe_attributed(
@@ -64,10 +68,9 @@ def describe_attributed(
     surest = (
         thresholds.sure if len(fit.effects) == 1 and not found.unknown else thresholds.less_sure
     )
-    supports = {
-        effect: selection.support(effect)
-        for effect in (fit.effects if selection is not None else ())
-    }
+    supports = (
+        {} if selection is None else {effect: selection.support(effect) for effect in fit.effects}
+    )
 
     def confidence(effect: Effect) -> float:
         if effect in supports:
@@ -98,7 +101,14 @@ def find_traces(
         return ()
     chosen, best = found.selection.chosen, found.selection.pool[0]
     gained = max(1.0 - math.exp(2.0 * (best.score - chosen.score)), 0.0)
-    more = [effect for effect in best.fit.effects if effect not in chosen.fit.effects]
+    more = [
+        effect
+        for effect, values in zip(best.fit.effects, best.fit.values, strict=True)
+        if effect not in chosen.fit.effects
+        and values[0] != effect.nominal(evidence.plant)[effect.kind.parameters[0]]
+    ]
+    if gained < SHOWN:
+        return ()
     return tuple(
         Finding(
             Name(effect.component, effect.kind.name),
@@ -113,6 +123,40 @@ def find_traces(
         )
         if effect in more
     )
+
+
+def find_nearest(found: Attribution) -> Nearest | None:
+    """What comes nearest to something that has no name.
+
+    Parameters
+    ----------
+    found
+        Everything that was tried.
+
+    Returns
+    -------
+    Nearest or None
+        The best explanation, with what it leaves; None if none was tried.
+    """
+    if found.selection is not None:
+        empty = next(each for each in found.selection.pool if not each.fit.effects)
+        tried = [each for each in found.selection.pool if each.fit.effects and not each.bounded]
+        if not tried:
+            return None
+        price = found.selection.price
+        best = min(tried, key=lambda each: each.score + price * each.size)
+        return Nearest(_names(best.fit), math.exp(best.score), math.exp(empty.score), "signals")
+    explained = [each.fit for each in found.ranking if each.fit.effects]
+    if not explained:
+        return None
+    left, without = (
+        math.sqrt(fit.misfit / found.expected) for fit in (explained[0], found.nothing)
+    )
+    return Nearest(_names(explained[0]), left, without, "noise")
+
+
+def _names(fit: Fit) -> tuple[Name, ...]:
+    return tuple(Name(effect.component, effect.kind.name) for effect in fit.effects)
 
 
 def estimates(

@@ -35,6 +35,13 @@ def describe(diagnosis: Answer) -> str:
                 "    these data cannot tell it from "
                 f"{', '.join(str(name) for name in effect.alternatives[1:])}"
             )
+    if (nearest := diagnosis.nearest) is not None:
+        names = " + ".join(str(name) for name in nearest.names)
+        if nearest.of == "noise":
+            left = f"{nearest.left:.3g} times what noise leaves, {nearest.without:.3g} without"
+        else:
+            left = f"{100 * nearest.left:.2g} % of the signals, {100 * nearest.without:.2g} without"
+        lines.append(f"  nearest: {names}, not enough to be named; it leaves {left}")
     for effect in diagnosis.traces:
         values = ", ".join(
             f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items()

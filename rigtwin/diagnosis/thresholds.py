@@ -72,7 +72,8 @@ class SelectionRules:
 
     def confidence(self, margin: float) -> float:
         """Of an effect without which everything does worse by a margin."""
-        return float(np.interp(margin, *zip(*self.calibration, strict=True)))
+        margins, shares = zip(*self.calibration, strict=True)
+        return float(np.interp(margin, margins, shares))
 
     def price_of(self, pieces: float) -> float:
         """Of a parameter, where what is left consists of so many independent pieces."""
