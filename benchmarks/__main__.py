@@ -20,7 +20,8 @@ from controllers import Compensator, Structure
 from controllers.beam import AT_REST, Modes, Six, beam, centre, modes
 from experiments import EXPERIMENTS
 from rigtwin.description.catalogue import find
-from rigtwin.description.configuration import Safety, Timing, apply_effects
+from rigtwin.description.effects import apply_effects
+from rigtwin.description.settings import Safety, Timing
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.numerics.compiling import kernel, step

@@ -12,7 +12,7 @@ from google.protobuf.message import Message
 
 from controllers import Commands, Measurements
 from experiments import EXPERIMENTS
-from rigtwin.description.configuration import from_assignments
+from rigtwin.description.changes import from_assignments
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table

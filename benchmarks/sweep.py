@@ -19,7 +19,7 @@ import numpy as np
 
 from experiments import EXPERIMENTS
 from rigtwin.console import table
-from rigtwin.description.configuration import override
+from rigtwin.description.changes import override
 from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
 from rigtwin.studies.tuning.run import Run, run
 

@@ -6,7 +6,8 @@ from __future__ import annotations
 from controllers import Settings, Skyhook, Structure
 from experiments.experiment import flat_ground, road_ground
 from rigtwin.components import GasSpring, RigPlant
-from rigtwin.description.configuration import Configuration, Road, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Road, Timing
 from rigtwin.simulation.experiment import Experiment
 
 PASSIVE = Settings()

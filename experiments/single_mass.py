@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from controllers import Settings, Travel
 from experiments.experiment import flat_ground, road_ground
-from rigtwin.description.configuration import Configuration, Road, Safety, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Road, Safety, Timing
 from rigtwin.simulation.experiment import Experiment
 
 CHAPTER_3 = Settings(

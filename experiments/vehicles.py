@@ -8,8 +8,14 @@ from typing import NamedTuple
 from controllers import Settings
 from experiments.experiment import flat_ground
 from rigtwin.components import Carriage, RigPlant, Tyre
-from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
+from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
+from rigtwin.studies.stability.vehicle import QuarterCar
+
+TABLE_6_2 = "quarter-car"
+"""The name of the vehicle of thesis Table 6.2."""
 
 
 class Vehicle(NamedTuple):
@@ -59,3 +65,34 @@ EXPERIMENTS = tuple(
     )
     for name, vehicle in VEHICLES.items()
 )
+
+
+def find_vehicle(name: str) -> QuarterCar:
+    """A vehicle as a linear quarter car.
+
+    Parameters
+    ----------
+    name
+        Of thesis Table 6.1, or `quarter-car` for that of Table 6.2.
+
+    Raises
+    ------
+    RigtwinError
+        With what there is.
+    """
+    tyre, settings = Tyre(), Settings()
+    found = {
+        TABLE_6_2: QuarterCar(
+            tyre.stiffness,
+            tyre.damping,
+            Carriage().mass,
+            settings.suspension_stiffness,
+            settings.suspension_damping,
+            settings.sprung_mass,
+        )
+    }
+    for each, vehicle in VEHICLES.items():
+        found[each] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
+    if name not in found:
+        raise RigtwinError(f"unknown vehicle {name!r}; there are {', '.join(found)}")
+    return found[name]

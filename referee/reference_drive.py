@@ -20,7 +20,8 @@ from controllers import (
 )
 from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
 from referee.reference_rig import draw_noise
-from rigtwin.description.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.runner import SimulationResult

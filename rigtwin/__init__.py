@@ -18,54 +18,120 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rigtwin.api import (
+    from rigtwin.api.answers import (
         Comparison,
-        Configuration,
         Diagnosis,
-        Effect,
-        Experiment,
-        Machine,
-        Recording,
-        RigtwinError,
         calibrate,
         compare,
         compare_recordings,
         diagnose,
+    )
+    from rigtwin.api.machines import (
+        Configuration,
+        Effect,
+        Experiment,
+        Machine,
+        RigtwinError,
         effects,
         experiments,
-        import_data,
-        load,
         machine,
         machines,
-        run,
+    )
+    from rigtwin.api.recordings import Recording, import_data, load
+    from rigtwin.api.rig import Campaign, faults
+    from rigtwin.api.running import run
+    from rigtwin.api.studies import (
+        ModelStability,
+        Reproduction,
+        Stability,
+        TuningResult,
+        blindcheck,
+        blindcheck_wild,
+        reproduce,
+        stability,
+        tune,
     )
 
 __all__ = [
+    "Campaign",
     "Comparison",
     "Configuration",
     "Diagnosis",
     "Effect",
     "Experiment",
     "Machine",
+    "ModelStability",
     "Recording",
+    "Reproduction",
     "RigtwinError",
+    "Stability",
+    "TuningResult",
+    "blindcheck",
+    "blindcheck_wild",
     "calibrate",
     "compare",
     "compare_recordings",
     "diagnose",
     "effects",
     "experiments",
+    "faults",
     "import_data",
     "load",
     "machine",
     "machines",
+    "reproduce",
     "run",
+    "stability",
+    "tune",
 ]
+_MODULES = {
+    "machines": (
+        "Configuration",
+        "Effect",
+        "Experiment",
+        "Machine",
+        "RigtwinError",
+        "effects",
+        "experiments",
+        "machine",
+        "machines",
+    ),
+    "recordings": (
+        "Recording",
+        "import_data",
+        "load",
+    ),
+    "running": ("run",),
+    "answers": (
+        "Comparison",
+        "Diagnosis",
+        "calibrate",
+        "compare",
+        "compare_recordings",
+        "diagnose",
+    ),
+    "rig": (
+        "Campaign",
+        "faults",
+    ),
+    "studies": (
+        "ModelStability",
+        "Reproduction",
+        "Stability",
+        "TuningResult",
+        "blindcheck",
+        "blindcheck_wild",
+        "reproduce",
+        "stability",
+        "tune",
+    ),
+}
+_WHERE = {name: module for module, names in _MODULES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    if name in __all__:
-        value = getattr(import_module("rigtwin.api"), name)
+    if name in _WHERE:
+        value = getattr(import_module(f"rigtwin.api.{_WHERE[name]}"), name)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'rigtwin' has no attribute {name!r}; it has {', '.join(__all__)}")

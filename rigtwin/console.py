@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
-    from rigtwin.description.configuration import from_assignments, from_toml
+    from rigtwin.description.changes import from_assignments, from_toml
 
     if parsed.config is not None:
         configuration = from_toml(configuration, parsed.config)
@@ -27,7 +27,7 @@ def configured(configuration: Configuration, parsed: Namespace) -> Configuration
 
 def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
     """The changes of `--set`. Raises RigtwinError for what is none."""
-    from rigtwin.description.configuration import parse_assignments
+    from rigtwin.description.changes import parse_assignments
 
     return list(parse_assignments(texts))
 

@@ -12,6 +12,7 @@ import pytest
 
 import rigtwin
 from controllers import Commands, Demand, Measurements
+from rigtwin.cli import COMMANDS
 from tests.helpers.described import TOML, described
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -206,3 +207,81 @@ def test_the_notebook_runs(tmp_path):
         if "text/html" in o.get("data", {})
     ]
     assert any("viscous" in "".join(o["data"]["text/html"]) for o in shown)
+
+
+FUNCTIONS = {
+    "list": ("machines", "experiments"),
+    "run": ("run",),
+    "faults": ("faults",),
+    "effects": ("effects",),
+    "info": ("load", "Recording"),
+    "plot": ("Recording.plot",),
+    "video": ("Recording.video",),
+    "export": ("Recording.export",),
+    "import": ("import_data",),
+    "calibrate": ("calibrate",),
+    "compare": ("compare", "compare_recordings"),
+    "diagnose": ("diagnose", "Diagnosis.report"),
+    "machines": ("machines",),
+    "machine": ("machine",),
+    "blindcheck": ("blindcheck", "blindcheck_wild"),
+    "reproduce": ("reproduce",),
+    "tune": ("tune",),
+    "stability": ("stability",),
+}
+"""What does a command's work. A rig is armed by a person at a terminal only: `session` and `card`
+have none."""
+
+
+def test_what_a_command_can_do_a_function_can():
+    assert set(COMMANDS) == {*FUNCTIONS, "session", "card"}
+    for names in FUNCTIONS.values():
+        for name in names:
+            first, _, rest = name.partition(".")
+            assert first in rigtwin.__all__
+            found = getattr(rigtwin, first)
+            assert callable(getattr(found, rest) if rest else found)
+            assert found.__doc__
+
+
+def test_stability_is_what_the_poles_say():
+    plain = rigtwin.stability("quarter-car").models["rig"]
+    assert plain.critical_lag is not None
+    below, above = (
+        rigtwin.stability("quarter-car", tau=share * plain.critical_lag).models["rig"]
+        for share in (0.99, 1.01)
+    )
+    assert below.stable
+    assert below.real < 0.0 < above.real
+    stiffer = rigtwin.stability("quarter-car", changes={"suspension_damping": 500.0})
+    assert stiffer.models["rig"].real != plain.real
+    with pytest.raises(rigtwin.RigtwinError, match="unknown vehicle 'tank'"):
+        rigtwin.stability("tank")
+    with pytest.raises(rigtwin.RigtwinError, match="unknown parameter 'damping'"):
+        rigtwin.stability(changes={"damping": 1.0})
+
+
+def test_a_table_of_the_thesis_beside_ours(tmp_path):
+    told = list[tuple[int, int]]()
+    found = rigtwin.reproduce(
+        "table-6.2",
+        folder=tmp_path,
+        workers=1,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert told[-1][0] == told[-1][1] > 0
+    assert "Table 6.2" in found.text()
+    assert found.page(tmp_path / "t.html").read_text().startswith("<!")
+    with pytest.raises(rigtwin.RigtwinError, match="nothing to reproduce"):
+        rigtwin.reproduce("table-99", folder=tmp_path)
+
+
+def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
+    for check in (rigtwin.blindcheck, rigtwin.blindcheck_wild):
+        with pytest.raises(rigtwin.RigtwinError, match="at least 1"):
+            check(0, folder=tmp_path)
+    with pytest.raises(rigtwin.RigtwinError, match="0 to 1000"):
+        rigtwin.faults(each=2000)
+    with pytest.raises(rigtwin.RigtwinError, match="unknown study"):
+        rigtwin.tune("nonsense", out=tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
-from rigtwin.description.configuration import Configuration, Safety, read_toml
+from rigtwin.description.changes import read_toml
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card, CardFault, connect

@@ -11,9 +11,13 @@ import pytest
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
-from rigtwin.description.configuration import Configuration, Timing, apply_effects, from_assignments
+from rigtwin.description.changes import from_assignments
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.effects import apply_effects
+from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.compare import compare, compare_recordings
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
+from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
@@ -116,14 +120,12 @@ ALSO_EFFECTS = ("rail.coulomb=80", "carriage.mass=40", "motor.constant=196")
         for fault in OWN_FAULTS
     ],
 )
-def test_a_fault_of_the_twin_stands_out_where_it_is(tmp_path, fault):
+def test_a_fault_of_the_twin_stands_out_where_it_is(fault):
     experiment = EXPERIMENTS["imposed"]
     faulty = from_assignments(
         experiment.configuration._replace(timing=Timing(duration=10.0)), [fault]
     )
-    path = tmp_path / "f.mcap"
-    record(path, "imposed", faulty, experiment.demands(faulty, 11), 11)
-    recording = load(path)
+    recording = record_on_twin(RIG, "imposed", faulty, experiment.demands(faulty, 11), 11)
     replays = ComponentReplays(recording, RIG.configuration_of(recording))
     found = {component: ratio(replays, component) for component in COMPONENTS}
     for component in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder"):
@@ -211,21 +213,14 @@ LEFT_OVER = {
     "name",
     once_a_sort([e.name for e in candidates(RigPlant()) if e.kind.name != "quantisation"]),
 )
-def test_a_twin_with_the_effect_explains_a_rig_with_it(tmp_path, name):
+def test_a_twin_with_the_effect_explains_a_rig_with_it(name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise
     is left."""
     experiment = EXPERIMENTS["imposed"]
-    configuration = experiment.configuration._replace(timing=Timing(duration=6.0))
-    path = tmp_path / "e.mcap"
-    record(
-        path,
-        "imposed",
-        configuration,
-        experiment.demands(configuration, 5),
-        5,
-        effects=[text(name)],
-    )
-    recording = load(path)
+    nothing = experiment.configuration._replace(timing=Timing(duration=6.0))
+    configuration = apply_effects(nothing, [text(name)])
+    demands = experiment.demands(nothing, 5)
+    recording = record_on_twin(RIG, "imposed", configuration, demands, 5)
     nominal = ComponentReplays(recording, RIG.configuration_of(recording))
     known = ComponentReplays(
         recording, RIG.configuration_of(recording, apply_effects(Configuration(), [text(name)]))

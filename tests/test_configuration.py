@@ -7,15 +7,8 @@ import pytest
 from controllers import Mode, Settings, Skyhook
 from controllers.quantity import Quantity, fields
 from experiments import EXPERIMENTS
-from rigtwin.description.configuration import (
-    Configuration,
-    flatten,
-    from_assignments,
-    from_toml,
-    groups,
-    override,
-    parameters,
-)
+from rigtwin.description.changes import from_assignments, from_toml, override
+from rigtwin.description.configuration import Configuration, flatten, groups, parameters
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import RECORD
 

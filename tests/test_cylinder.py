@@ -11,7 +11,8 @@ from scipy.signal import lsim
 from controllers import Mode, Settings
 from rigtwin.components import Cylinder
 from rigtwin.components.cylinder import state_space
-from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.component import replay_cylinder
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import run_compiled

@@ -10,7 +10,7 @@ import pytest
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
 from rigtwin.description.catalogue import find
-from rigtwin.description.configuration import Timing
+from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording, load

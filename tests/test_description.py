@@ -13,8 +13,9 @@ from rigtwin.components import RigPlant, Scales, Swing
 from rigtwin.components import find as effect_of
 from rigtwin.components.effect import SHARES
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.configuration import from_assignments, override, without_effect
+from rigtwin.description.changes import from_assignments, override
 from rigtwin.description.document import examine, load
+from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import is_possible
 from tests.helpers.described import MJCF, TOML, described, recording_of

@@ -11,7 +11,8 @@ import pytest
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.components import Motion, RigPlant
-from rigtwin.description.configuration import Configuration, without_effect
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
 from rigtwin.diagnosis.fitter import Fitter
@@ -278,7 +279,9 @@ def test_regions_are_told_apart():
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",)))
     fitter = Fitter(evidence)
-    fits = [fitter.fit_one(rig_effect("delay@motor")), fitter.fit_one(rig_effect("lag@motor"))]
+    fits = [
+        fitter.fit_one(fitter.screen(rig_effect(name))) for name in ("delay@motor", "lag@motor")
+    ]
     tests = [EXPERIMENTS["imposed-fast"], EXPERIMENTS["drop"]]
     found = propose_test(RIG, fits, tests)
     assert found is not None

@@ -26,7 +26,9 @@ from rigtwin.components import (
 )
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import breakaway, friction, gap_at
-from rigtwin.description.configuration import Configuration, Timing, apply_effects, with_effect
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.effects import apply_effects, with_effect
+from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.converters import build_sensing, sample_sensors

@@ -11,7 +11,8 @@ from dm_env import StepType, test_utils
 
 from experiments import find
 from experiments.environment import environment
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.description.configuration import Road
+from rigtwin.description.settings import Road
 from rigtwin.errors import RigtwinError
 from rigtwin.signals.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
 

@@ -73,7 +73,7 @@ def test_an_effect_is_found_at_its_size(text):
     effect = rig_effect(name)
     evidence = evidence_of(recorded("imposed", (text,)))
     fitter = Fitter(evidence)
-    fit = fitter.refit_with_tolerances(fitter.fit_one(effect))
+    fit = fitter.refit_with_tolerances(fitter.fit_one(fitter.screen(effect)))
     nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])

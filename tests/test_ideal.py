@@ -13,7 +13,8 @@ from controllers import Settings, Skyhook, Structure
 from controllers.beam import all_modes, assembled
 from controllers.skyhook import semi_active_damping
 from experiments.single_mass import CHAPTER_3
-from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
 from rigtwin.simulation.ideal import simulate_ideal
 
 TIME = np.arange(10_000) * 1e-3

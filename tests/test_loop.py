@@ -10,7 +10,9 @@ import pytest
 
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
-from rigtwin.description.configuration import Configuration, Timing, from_assignments
+from rigtwin.description.changes import from_assignments
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.signals.excitation import schroeder

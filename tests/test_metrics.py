@@ -7,7 +7,7 @@ import pytest
 
 from experiments.thesis.trial import trial
 from experiments.thesis.validation import TABLE_3_5
-from rigtwin.description.configuration import Timing
+from rigtwin.description.settings import Timing
 from rigtwin.recording import load
 from rigtwin.simulation.metrics import compute_tracking, tracking_of
 from rigtwin.simulation.runner import record

@@ -8,7 +8,8 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.components import Effect, RigPlant, Swing, candidates
-from rigtwin.description.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings

@@ -13,7 +13,8 @@ from referee.reference_rig import run
 from referee.test_signals import draw_demands
 from referee.tuning import Case, check, draw_rig, text
 from rigtwin.cli import main
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store

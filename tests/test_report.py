@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from rigtwin.description.configuration import Configuration, from_toml, override
+from rigtwin.description.changes import from_toml, override
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.report import bars, html, plots

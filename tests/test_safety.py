@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controllers import Commands, Measurements
-from rigtwin.description.configuration import Safety
+from rigtwin.description.settings import Safety
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.safety import (
     Trip,

@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from experiments import EXPERIMENTS
 from experiments import find as experiment
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate, without_limits
 from rigtwin.studies.stability.sampled_loop import closed_loop, decay, mechanics
 

@@ -18,7 +18,8 @@ import pytest
 from controllers import Measurements
 from experiments import find
 from rigtwin.cli import main
-from rigtwin.description.configuration import Configuration, from_assignments
+from rigtwin.description.changes import from_assignments
+from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.calibration import (

@@ -429,7 +429,7 @@ class TestCommand:
         ("words", "line"),
         [
             (["--vehicle", "tram"], "unknown vehicle 'tram'; there are quarter-car, boeing-707"),
-            (["--set", "mass=3"], "--set mass=3: unknown parameter 'mass'"),
+            (["--set", "mass=3"], "unknown parameter 'mass' of a vehicle"),
             (["--set", "sprung_mass=heavy"], "--set sprung_mass=heavy: expected a number"),
             (["--set", "sprung_mass=-3"], "sprung_mass -3: expected 0.001 to"),
             (["--tau", "0"], "--tau 0: expected 1e-09 to"),

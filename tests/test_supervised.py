@@ -16,7 +16,7 @@ import pytest
 from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
-from rigtwin.description.configuration import from_assignments
+from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table

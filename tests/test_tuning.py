@@ -18,7 +18,8 @@ from experiments import EXPERIMENTS
 from experiments import find as experiment
 from experiments.tuning import STUDIES, find_study
 from rigtwin.cli import main
-from rigtwin.description.configuration import Configuration, from_toml, override
+from rigtwin.description.changes import from_toml, override
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml, load_posterior
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load

@@ -27,7 +27,8 @@ from experiments.experiment import time_of
 from experiments.thesis.identification import hydraulic
 from experiments.thesis.study import Result
 from experiments.thesis.trial import Trial, trial
-from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 from rigtwin.signals.excitation import fade_in

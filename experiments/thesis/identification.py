@@ -14,7 +14,8 @@ from experiments.experiment import time_of
 from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import seeded
-from rigtwin.description.configuration import Configuration, Safety, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Safety, Timing
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.signals.excitation import schroeder

@@ -5,14 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from rigtwin.cli.options import add_workers
+import rigtwin
+from rigtwin.cli.options import add_workers, counting_bar
 from rigtwin.console import writable, write_json
 from rigtwin.errors import RigtwinError
-
-if TYPE_CHECKING:
-    from rigtwin.studies.sweep import Workers
 
 RIGS = 8
 """Of a check of tuning, unless said."""
@@ -62,54 +59,58 @@ def execute(parsed: argparse.Namespace) -> int:
     """Runs the check that was asked for and prints its score."""
     if (parsed.cases is not None and parsed.cases < 1) or parsed.seed < 0:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
-    from rigtwin.studies.sweep import open_workers
-
     if parsed.json is not None:
         writable(parsed.json)
     if parsed.wild and (parsed.tune is not None or parsed.baselines):
         raise RigtwinError("--wild: expected without --tune and --baselines")
-    with open_workers(parsed.workers, parsed.cluster) as workers:
-        if parsed.wild:
-            return _wild(parsed, workers)
-        return _diagnoses(parsed, workers) if parsed.tune is None else _tuning(parsed, workers)
+    if parsed.wild:
+        return _wild(parsed)
+    return _diagnoses(parsed) if parsed.tune is None else _tuning(parsed)
 
 
-def _diagnoses(parsed: argparse.Namespace, workers: Workers) -> int:
-    from tqdm import tqdm
-
-    from referee.check import check
+def _diagnoses(parsed: argparse.Namespace) -> int:
     from referee.score import document, table
 
-    cases = CASES if parsed.cases is None else parsed.cases
-    shown = {"unit": "case", "desc": "withheld effects", "leave": False}
-    with tqdm(total=2 * cases, disable=None, **shown) as bar:
-        result = check(parsed.folder, cases, parsed.seed, parsed.baselines, workers, bar.update)
+    with counting_bar("case", "withheld effects") as progress:
+        result = rigtwin.blindcheck(
+            CASES if parsed.cases is None else parsed.cases,
+            seed=parsed.seed,
+            folder=parsed.folder,
+            baselines=parsed.baselines,
+            workers=parsed.workers,
+            cluster=parsed.cluster,
+            progress=progress,
+        )
     print(table(result))
     if parsed.json is not None:
         write_json(parsed.json, document(result))
     return 0
 
 
-def _wild(parsed: argparse.Namespace, workers: Workers) -> int:
-    from tqdm import tqdm
+def _wild(parsed: argparse.Namespace) -> int:
+    from referee.wild import wild_document, wild_table
 
-    from referee.wild import check_wild, wild_document, wild_table
-
-    cases = CASES if parsed.cases is None else parsed.cases
-    with tqdm(total=cases, disable=None, unit="machine", desc="wild machines", leave=False) as bar:
-        result = check_wild(parsed.folder, cases, parsed.seed, workers, bar.update)
+    with counting_bar("machine", "wild machines") as progress:
+        result = rigtwin.blindcheck_wild(
+            CASES if parsed.cases is None else parsed.cases,
+            seed=parsed.seed,
+            folder=parsed.folder,
+            workers=parsed.workers,
+            cluster=parsed.cluster,
+            progress=progress,
+        )
     print(wild_table(result))
     if parsed.json is not None:
         write_json(parsed.json, wild_document(result))
     return 0
 
 
-def _tuning(parsed: argparse.Namespace, workers: Workers) -> int:
+def _tuning(parsed: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from experiments.tuning import find_study
     from referee.tuning import Case, check, document, text
-    from rigtwin.studies.sweep import Store
+    from rigtwin.studies.sweep import Store, open_workers
     from rigtwin.studies.tuning.bench import Bench
 
     study = find_study(parsed.tune)
@@ -121,6 +122,7 @@ def _tuning(parsed: argparse.Namespace, workers: Workers) -> int:
     searches = (cases + 1) * (budget.evaluations + 1) * budget.roads
     total = searches + cases * (1 + 3 * budget.held_out)
     with (
+        open_workers(parsed.workers, parsed.cluster) as workers,
         Store(parsed.folder / f"tuning-{study.name}.sqlite") as store,
         tqdm(total=total, disable=None, unit="run", leave=False, file=sys.stderr) as bar,
     ):

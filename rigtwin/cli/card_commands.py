@@ -15,7 +15,8 @@ import numpy as np
 
 from rigtwin.console import apart, configured, writable
 from rigtwin.console import table as tabulated
-from rigtwin.description.configuration import Configuration, apply_effects
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.effects import apply_effects
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,

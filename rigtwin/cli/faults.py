@@ -3,12 +3,39 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import rigtwin
+from rigtwin.cli.options import counting_bar
+from rigtwin.console import table, writable, write_json
+from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
+
+if TYPE_CHECKING:
+    from rigtwin.hardware.faults.campaign import FaultResult
+    from rigtwin.hardware.faults.kinds import FaultKind
 
 SUMMARY = "put faults into sessions on the virtual card; see that each is stopped"
 MORE = "docs/faults.md"
+
+
+HEADER = (
+    "fault",
+    "where",
+    "sessions",
+    "stopped",
+    "never seen",
+    "ticks to safe",
+    "from its start",
+    "of a limit",
+    "reason",
+    "readable",
+)
+MARK = "<!-- made by rigtwin faults -->"
+"""In a page that has this line, everything after it is replaced."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,9 +68,91 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    from rigtwin.hardware.daq.card import require_client
+    """Runs the campaign and prints its table.
 
-    require_client()
-    from rigtwin.cli.faults_commands import faults
+    Returns
+    -------
+    int
+        4 unless every session was stopped as it must be, else 0.
+    """
+    from rigtwin.hardware.faults.kinds import KINDS
 
-    return faults(parsed)
+    for out in (parsed.out, parsed.json):
+        if out is not None:
+            writable(out)
+    with counting_bar("fault", "faults") as show:
+        found = rigtwin.faults(
+            seed=parsed.seed,
+            each=parsed.each,
+            processes=parsed.processes,
+            card=parsed.card,
+            progress=lambda _kind, done, total: show(done, total),
+        )
+    tried = {
+        kind: [result for result in found.results if result.fault.kind == kind] for kind in KINDS
+    }
+    rows = [_row(kind, results) for kind, results in tried.items() if results]
+    passed = len(found.results) - len(found.failed)
+    said = (
+        f"{len(found.results)} faults of {len(rows)} kinds, seed {parsed.seed}: "
+        f"{passed} sessions ended as they must"
+    )
+    print(table([HEADER, *rows]))
+    for result in found.failed:
+        print(f"failed: {_describe(result)}")
+    for one in found.undone:
+        print(f"not run: {one}")
+    print(said)
+    if parsed.out is not None:
+        _write(parsed.out, said, rows, list(found.failed))
+    if parsed.json is not None:
+        write_json(parsed.json, [asdict(result) for result in found.results])
+    return 0 if not found.failed and not found.undone else 4
+
+
+def _row(kind: FaultKind, results: list[FaultResult]) -> tuple[str, ...]:
+    """One line of the table."""
+    seen = [result for result in results if result.late is not None]
+    late = [result.late for result in seen if result.late is not None]
+    start = [result.from_start for result in seen]
+    return (
+        kind.name,
+        kind.place,
+        str(len(results)),
+        str(len(seen)),
+        str(len(results) - len(seen)),
+        f"at most {max(max(late), 0)}" if late else "",
+        f"{sorted(start)[len(start) // 2]}, at most {max(start)}" if start else "",
+        f"{100 * max((result.exceeded for result in results), default=0.0):.0f} %",
+        f"{sum(result.right for result in results)} right",
+        str(sum(result.readable for result in results)),
+    )
+
+
+def _describe(result: FaultResult) -> str:
+    fault = result.fault
+    return (
+        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, "
+        f"seed {fault.seed}: safe "
+        f"{result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, said {result.cause}: "
+        f"{result.reason}"
+    )
+
+
+def _write(
+    path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[FaultResult]
+) -> None:
+    lines = [said + ".", "", "| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += ["", *(f"- failed: {_describe(result)}" for result in failed)]
+    try:
+        old = path.read_text(encoding="utf-8") if path.exists() else ""
+        before, mark, _ = old.partition(MARK)
+        path.write_text(
+            f"{before}{MARK}\n\n" + "\n".join(lines).rstrip() + "\n"
+            if mark
+            else "\n".join(lines) + "\n",
+            "utf-8",
+        )
+    except OSError as error:
+        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +77,17 @@ def add_stretch(parser: argparse.ArgumentParser) -> None:
 
 def add_json(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument("--json", type=Path, metavar="F.json", help=f"also write {what}")
+
+
+@contextmanager
+def counting_bar(unit: str, title: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on a terminal; what it gives is told what is done, and how much there is."""
+    from tqdm import tqdm
+
+    with tqdm(disable=None, desc=title, unit=unit, leave=False, file=sys.stderr) as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        yield show

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.cli.options import add_workers
+import rigtwin
+from rigtwin.cli.options import add_workers, counting_bar
+from rigtwin.console import writable, write_json
+from rigtwin.errors import RigtwinError
 
 SUMMARY = "reproduce the thesis: its tables, figures and statements beside ours"
 MORE = """\
@@ -52,6 +55,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    from experiments.thesis.commands import reproduce
-
-    return reproduce(parsed)
+    """Runs the studies asked for; a second run goes on where the first was stopped."""
+    for out in (parsed.json, parsed.html):
+        if out is not None:
+            writable(out)
+    pictures = parsed.draw or parsed.folder / "figures"
+    if pictures.exists() and not pictures.is_dir():
+        raise RigtwinError(f"cannot draw into {pictures}: it is a file")
+    with counting_bar("job", "reproduce") as progress:
+        found = rigtwin.reproduce(
+            " ".join(parsed.what) or None,
+            seeds=parsed.seeds,
+            folder=parsed.folder,
+            workers=parsed.workers,
+            cluster=parsed.cluster,
+            progress=progress,
+        )
+    print(found.text())
+    if parsed.json is not None:
+        write_json(parsed.json, found.document())
+    if parsed.html is not None:
+        print(f"\nlook at {found.page(parsed.html)}")
+    drawn = found.draw(pictures)
+    if len(drawn) == 1:
+        [(out, covers)] = drawn.items()
+        print(f"\n{covers} drawn in {out}")
+    elif drawn:
+        print(f"\n{len(drawn)} figures drawn in {pictures}")
+    if parsed.gallery is not None:
+        print(f"\ngallery in {found.gallery(parsed.gallery)}")
+    return 0

@@ -55,7 +55,7 @@ def execute(parsed: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     import rigtwin
-    from rigtwin.description.configuration import with_changes
+    from rigtwin.description.changes import with_changes
     from rigtwin.simulation.experiment import find_experiment
 
     machine = rigtwin.machine(parsed.machine)

@@ -12,7 +12,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from rigtwin.console import late, table
-from rigtwin.description.configuration import read_toml
+from rigtwin.description.changes import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import rigtwin
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.stability.vehicle import QuarterCar, believable, checked_time
+
+if TYPE_CHECKING:
+    from rigtwin import ModelStability, Stability
 
 RIG_LAG = 0.01
 """s, of the four filters (thesis §6.2)."""
-ROUNDING = 1e-12
-"""Of a pole's distance from the origin: a real part within this is none."""
 TABLE_6_2 = "quarter-car"
 SUMMARY = "say whether a vehicle is stable on the rig with its delays, and how much delay it bears"
 MORE = "example:\n  rigtwin stability --vehicle car --tau 0.01"
@@ -74,8 +77,10 @@ def execute(parsed: argparse.Namespace) -> int:
         stability_map,
     )
 
-    car = _changed(_vehicle(parsed.vehicle), parsed.set)
-    tau = checked_time("--tau", parsed.tau)
+    found = rigtwin.stability(
+        parsed.vehicle, changes=_numbers(parsed.set), tau=parsed.tau, delay=parsed.delay
+    )
+    car, tau = found.vehicle, found.tau
     out = parsed.out or Path("stability.png")
     if parsed.out is not None and parsed.map is None:
         raise RigtwinError(f"-o {parsed.out}: expected --map X Y, the parameters to draw it over")
@@ -91,11 +96,10 @@ def execute(parsed: argparse.Namespace) -> int:
                 f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
             )
     axes = [around(name, car, tau) for name in parsed.map or ()]
-    rows = _rows(car, tau, parsed.delay)
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
-    print(_printed(rows, tau, parsed.delay))
-    at_rig = _rows(car, RIG_LAG, delay=False)["rig"]
-    words = "stable" if at_rig["stable"] else "unstable"
+    print(_printed(found))
+    at_rig = rigtwin.stability(car, tau=RIG_LAG).models["rig"]
+    words = "stable" if at_rig.stable else "unstable"
     print(
         f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} "
         f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
@@ -106,79 +110,33 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.json is not None:
         write_json(
             parsed.json,
-            {"vehicle": car._asdict(), "tau": tau, "models": rows, "rig_at_10_ms": at_rig},
+            {
+                "vehicle": car._asdict(),
+                "tau": tau,
+                "models": {name: asdict(each) for name, each in found.models.items()},
+                "rig_at_10_ms": asdict(at_rig),
+            },
         )
     return 0
 
 
-def _vehicle(name: str) -> QuarterCar:
-    from controllers.settings import Settings
-    from experiments.vehicles import VEHICLES
-    from rigtwin.components import Carriage, Tyre
-
-    tyre, settings = Tyre(), Settings()
-    found = {
-        TABLE_6_2: QuarterCar(
-            tyre.stiffness,
-            tyre.damping,
-            Carriage().mass,
-            settings.suspension_stiffness,
-            settings.suspension_damping,
-            settings.sprung_mass,
-        )
-    }
-    for each, vehicle in VEHICLES.items():
-        found[each] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
-    if name not in found:
-        raise RigtwinError(f"unknown vehicle {name!r}; there are {', '.join(found)}")
-    return found[name]
-
-
-def _changed(car: QuarterCar, assignments: list[str]) -> QuarterCar:
+def _numbers(assignments: list[str]) -> dict[str, float]:
+    found = {}
     for assignment in assignments:
         name, _, text = assignment.partition("=")
-        if name not in QuarterCar._fields:
-            raise RigtwinError(
-                f"--set {assignment}: unknown parameter {name!r}; "
-                f"there are {', '.join(QuarterCar._fields)}"
-            )
         try:
-            car = car._replace(**{name: float(text)})
+            found[name] = float(text)
         except ValueError:
             raise RigtwinError(f"--set {assignment}: expected a number after {name}=") from None
-    return believable(car)
-
-
-def _rows(car: QuarterCar, tau: float, delay: bool) -> dict[str, dict[str, float | bool | None]]:
-    """Model → its figures, SI units."""
-    from rigtwin.studies.stability.critical import critical_delay, critical_lag
-    from rigtwin.studies.stability.delayed import rightmost_delay_root
-    from rigtwin.studies.stability.loop import LOOPS
-    from rigtwin.studies.stability.models import MODELS, rightmost
-
-    found: dict[str, dict[str, float | bool | None]] = {}
-    for name, model in MODELS.items():
-        loop = LOOPS[name](car)
-        pole = rightmost_delay_root(loop, tau) if delay else rightmost(model(car, tau))
-        lag, pure = critical_lag(loop), critical_delay(loop)
-        found[name] = {
-            "real": pole.real,
-            "imaginary": abs(pole.imag),
-            "stable": pole.real < -ROUNDING * abs(pole),
-            "critical_lag": lag.time if lag else None,
-            "critical_lag_frequency": lag.frequency if lag else None,
-            "critical_delay": pure.time if pure else None,
-            "critical_delay_frequency": pure.frequency if pure else None,
-        }
     return found
 
 
-def _printed(rows: dict[str, dict[str, float | bool | None]], tau: float, delay: bool) -> str:
-    kind = "delays" if delay else "lags"
+def _printed(found: Stability) -> str:
+    kind = "delays" if found.delay else "lags"
     lines: list[tuple[str, ...]] = [
         (
             "model",
-            f"rightmost pole, {kind} of {1e3 * tau:g} ms",
+            f"rightmost pole, {kind} of {1e3 * found.tau:g} ms",
             "stable",
             "critical lag",
             "at",
@@ -186,16 +144,18 @@ def _printed(rows: dict[str, dict[str, float | bool | None]], tau: float, delay:
             "at",
         )
     ]
-    for name, row in rows.items():
-        times = []
-        for key in ("critical_lag", "critical_delay"):
-            time, frequency = row[key], row[f"{key}_frequency"]
-            times += (
-                ["none", ""] if time is None else [f"{1e3 * time:.4g} ms", f"{frequency:.4g} rad/s"]
-            )
-        lines.append((name, f"{_pole(row)} 1/s", "yes" if row["stable"] else "no", *times))
+    for name, model in found.models.items():
+        times = [
+            *_time(model.critical_lag, model.critical_lag_frequency),
+            *_time(model.critical_delay, model.critical_delay_frequency),
+        ]
+        lines.append((name, f"{_pole(model)} 1/s", "yes" if model.stable else "no", *times))
     return table(lines)
 
 
-def _pole(row: dict[str, float | bool | None]) -> str:
-    return f"{row['real']:+.4g} ± {row['imaginary']:.4g}j"
+def _time(time: float | None, frequency: float | None) -> tuple[str, str]:
+    return ("none", "") if time is None else (f"{1e3 * time:.4g} ms", f"{frequency:.4g} rad/s")
+
+
+def _pole(model: ModelStability) -> str:
+    return f"{model.real:+.4g} ± {model.imaginary:.4g}j"

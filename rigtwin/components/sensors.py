@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from controllers.compiled import compilable
 from rigtwin.components.quantity import NONE, Quantity
@@ -170,6 +169,9 @@ def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
     """
     lagged = signal
     if sensor.lag > 0.0 and len(signal) > PADDED:
+        # Loading it takes a second, which most runs need not wait for.
+        from scipy.signal import butter, sosfiltfilt
+
         smooth = sosfiltfilt(
             butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos"), signal
         )

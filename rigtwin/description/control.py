@@ -28,7 +28,7 @@ from controllers import (
     update,
 )
 from controllers.formula import Formula
-from rigtwin.description.configuration import Nothing, settings_of
+from rigtwin.description.settings import Nothing, settings_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 

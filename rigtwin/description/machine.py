@@ -12,8 +12,10 @@ from typing import Any
 
 from rigtwin.components import Effect, candidates
 from rigtwin.components.quantity import Quantity
-from rigtwin.description.configuration import Configuration, Nothing, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
+from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording

@@ -16,14 +16,8 @@ from typing import Any
 import numpy as np
 
 from controllers.quantity import Quantity, fields
-from rigtwin.description.configuration import (
-    POSTERIOR,
-    Configuration,
-    groups,
-    override,
-    read_toml,
-    values_of,
-)
+from rigtwin.description.changes import POSTERIOR, override, read_toml, values_of
+from rigtwin.description.configuration import Configuration, groups
 from rigtwin.errors import RigtwinError
 
 NORMAL_95 = 1.959964

@@ -3,8 +3,7 @@ how sure that is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,10 +18,9 @@ from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_rep
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.selection import Selection, select
 from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-THREADS = 2
-"""That fit at a time: the compiled plants leave the interpreter free."""
 REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them."""
 BEAM = 3
@@ -86,20 +84,17 @@ def library(evidence: Evidence) -> list[Effect]:
     return [effect for effect in evidence.machine.effects() if effect.searched]
 
 
-MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
-
-
 @dataclass(frozen=True)
 class _Search:
     """What a search needs. coarse, fitter: on evidence of half as many steps, and on all;
-    map_fits: runs fits side by side."""
+    threads: that fit side by side."""
 
     coarse: Fitter
     fitter: Fitter
     effects: Sequence[Effect]
     least: float
     thresholds: Thresholds
-    map_fits: MapFits
+    threads: Threads
 
     def cost(self, fit: Fit) -> float:
         return penalised_cost(fit, self.thresholds.price)
@@ -107,8 +102,17 @@ class _Search:
     def fit_singles(self) -> tuple[Fit, list[Fit]]:
         """The nominal plant and each effect alone, the best again with the tolerances taken at
         them."""
-        singles = self.map_fits(self.coarse.fit_one, self.effects)
+        screened = self.threads.map(self.coarse.screen, self.effects)
+        most = max((each.promise for each in screened), default=0.0)
+        worth = self.thresholds.promising * max(most, self.least)
+        singles = self.threads.map(
+            self.coarse.fit_one, [each for each in screened if each.promise >= worth]
+        )
+        singles += [self.coarse.unfitted(each) for each in screened if each.promise < worth]
         singles.sort(key=self.cost)
+        nothing = self.fitter.refit_with_tolerances(self.fitter.nothing)
+        if self.coarse.nothing.misfit - singles[0].misfit < worth:
+            return nothing, singles
         # Those far behind stay there, however the tolerances are taken.
         near = (
             singles[0].misfit
@@ -118,9 +122,9 @@ class _Search:
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
         rough = self.fitter.evidence.machine.rough
         settle = self.fitter.settle if rough else self.fitter.refit_with_tolerances
-        tried = self.map_fits(settle, close) + singles[len(close) :]
+        tried = self.threads.map(settle, close) + singles[len(close) :]
         tried.sort(key=self.cost)
-        return self.fitter.refit_with_tolerances(self.fitter.nothing), tried
+        return nothing, tried
 
 
 def attribute(
@@ -147,22 +151,9 @@ def attribute(
     effects = library(evidence)
     searched = evidence.thin() if evidence.machine.rough else evidence
     coarse = Fitter(searched.halve_steps())
-    with ThreadPoolExecutor(THREADS) as pool:
-
-        def map_fits(function: Callable[..., Fit], items: Iterable[object]) -> list[Fit]:
-            results = []
-            try:
-                for fit in pool.map(function, items):
-                    results.append(fit)
-                    progress(1)
-            except BaseException:
-                # Interrupted: what has not begun need not be done.
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-            return results
-
+    with Threads(progress) as threads:
         least = detection_limit(evidence, thresholds)
-        search = _Search(coarse, Fitter(searched), effects, least, thresholds, map_fits)
+        search = _Search(coarse, Fitter(searched), effects, least, thresholds, threads)
         nothing, tried = search.fit_singles()
         silent = tuple(
             effect for effect in effects if coarse.largest_response(effect) < thresholds.detected
@@ -190,7 +181,7 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
             hopes += propose_additions(search.coarse, leader, search.effects, search.least)
     hopes.sort(key=lambda hope: hope.promised)
     hopeful = _distinct(hopes)[: MANY if much else FEW]
-    pairs = search.map_fits(
+    pairs = search.threads.map(
         lambda hope: search.coarse.refine(hope.effects, hope.values, hope.space), hopeful
     )
     pairs.sort(key=search.cost)
@@ -201,9 +192,9 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
             for pair in propose_replacements(search.coarse, pairs[0], search.effects)
             if frozenset(pair[0]) not in known
         ]
-        pairs += search.map_fits(lambda pair: search.coarse.refine(*pair), fresh)
+        pairs += search.threads.map(lambda pair: search.coarse.refine(*pair), fresh)
         pairs.sort(key=search.cost)
-    settled = search.map_fits(search.fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
+    settled = search.threads.map(search.fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
     least_more = max(
         thresholds.second * search.least,
         thresholds.known.more * _excess(first.misfit, evidence),
@@ -230,7 +221,7 @@ def _attribute_rough(
     growth = Growth(search.coarse, judge, search.effects, search.least, thresholds)
     tried = [*singles]
     if nothing.misfit - search.cost(singles[0]) > search.least:
-        tried += fit_stepwise(singles, growth, search.map_fits)
+        tried += fit_stepwise(singles, growth, search.threads)
     tried = [
         fit
         for fit in drop_needless(tried, search.least, thresholds)
@@ -241,7 +232,7 @@ def _attribute_rough(
         search.coarse,
         judge,
         search.effects,
-        search.map_fits,
+        search.threads,
     )
     if selection.chosen.fit.effects:
         settled = final.refit_with_tolerances(selection.chosen.fit)

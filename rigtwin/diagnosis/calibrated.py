@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.components.effect import GROUPS
-from rigtwin.description.configuration import Configuration, Nothing, flatten
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml
+from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.errors import RigtwinError

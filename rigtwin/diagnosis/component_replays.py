@@ -13,6 +13,7 @@ from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.sensors import apply_sensor, undo_sensor
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.component import (
     Output,
     replay_carriage,
@@ -31,9 +32,7 @@ from rigtwin.signals.noise import (
     rms,
     white_noise,
 )
-from rigtwin.simulation.loop import run
 from rigtwin.simulation.plant import initial_deflection
-from rigtwin.simulation.replay import Replay
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
@@ -233,18 +232,16 @@ class ComponentReplays:
         return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
 
     def controller(self) -> Residual:
-        replay = Replay(self.recording)
-        for _ in run(replay, without_limits(self.configuration), self._demands()):
-            pass
+        control = RigControl()
+        inputs = [self.recording.column(*channel) for channel in control.channels]
+        replayed = control.replay(self.configuration.controller, inputs, self.period)
         outputs: dict[str, Residual] = {}
         differences: dict[str, Array] = {}
         for number, (name, unit) in enumerate(
             zip(Commands._fields, ("m", "m", "N", "V"), strict=True)
         ):
             recorded = self._command(name)
-            differences[name] = (
-                np.array([commands[number] for commands in replay.written]) - recorded
-            )
+            differences[name] = replayed[number] - recorded
             outputs[name] = compute_residual(
                 differences[name], rounding(recorded), unit, self.period
             )

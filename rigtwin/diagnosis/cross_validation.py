@@ -15,6 +15,7 @@ from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -143,10 +144,15 @@ def _refit(evidence: Evidence, fit: Fit) -> Fit:
 def _fit_halves(evidence: Evidence, fit: Fit) -> tuple[tuple[list[Array], list[Array]], list[Fit]]:
     """The halves of the recordings, and the fit made again to each."""
     parts = halves(evidence.recordings)
-    return parts, [
-        _refit(Evidence(evidence.machine, evidence.recordings, evidence.configurations, part), fit)
-        for part in parts
-    ]
+    if not fit.effects:
+        return parts, [fit, fit]
+
+    def refit(part: list[Array]) -> Fit:
+        half = Evidence(evidence.machine, evidence.recordings, evidence.configurations, part)
+        return _refit(half, fit)
+
+    with Threads() as threads:
+        return parts, threads.map(refit, parts)
 
 
 def validate(

@@ -4,6 +4,8 @@ prior beside them."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -22,6 +24,8 @@ SHAKES = (0.88, 0.95, 1.05, 1.12)
 """Shares of a magnitude at which a fit is tried to be better yet."""
 SETTLING = 2
 """Times that the tolerances are taken anew at a fit."""
+UNMOVED = 0.05
+"""Half widths by which no tolerance may have moved for it not to be taken anew."""
 AT_BOUND = 1e-3
 """Share of a bound within which a value stands at it."""
 REFINED = 3
@@ -32,10 +36,22 @@ LIMITS = ("saturation", "rate_limit", "resonance")
 """Kinds whose magnitude is no measure of what they do."""
 KEPT = 64
 """Responses beside a fit that are kept."""
+SMALL = 0.05
+"""Share of the smallest start at which an effect is tried too."""
 NOTHING = 1e-3
 """χ² below which an effect does nothing at all."""
 Responses = list[tuple[tuple[float, ...], Array]]
 """Of an effect: values that were tried, and what each changes, whitened."""
+
+
+@dataclass(frozen=True)
+class Screened:
+    """An effect before it is fitted. starts: misfit and values of all that were tried, the best
+    first; promise: χ² that it may explain, to first order."""
+
+    effect: Effect
+    starts: tuple[tuple[float, tuple[float, ...]], ...]
+    promise: float
 
 
 class Fitter:
@@ -43,14 +59,22 @@ class Fitter:
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence, self.plant = evidence, evidence.plant
-        self.space = Space(evidence, evidence.plant)
         self.swing = swings(evidence.machine, evidence.recordings)
         self._scales: dict[str, Scales] = {}
         self._nominal = evidence.residual(evidence.plant)
-        self.nothing = Fit((), (), self.space.misfit(self._nominal), (), evidence.plant)
         self._responses: dict[Effect, Responses] = {}
         self._beside: dict[tuple[object, ...], Responses] = {}
         self._residual: tuple[tuple[tuple[Effect, ...], Values], Array] = ((), ()), self._nominal
+
+    @cached_property
+    def space(self) -> Space:
+        """The tolerances about the nominal plant."""
+        return Space(self.evidence, self.plant)
+
+    @cached_property
+    def nothing(self) -> Fit:
+        """The nominal plant."""
+        return Fit((), (), self.space.misfit(self._nominal), (), self.plant)
 
     def starts(self, effect: Effect) -> Starts:
         """Where a search for an effect starts."""
@@ -76,8 +100,8 @@ class Fitter:
             self._scales[component] = Scales.of(motion, force, self.evidence.lines[longest].period)
         return self._scales[component]
 
-    def fit_one(self, effect: Effect) -> Fit:
-        """The best fit of one effect.
+    def screen(self, effect: Effect) -> Screened:
+        """What one effect does at every value that a search for it starts from.
 
         Parameters
         ----------
@@ -86,20 +110,17 @@ class Fitter:
 
         Returns
         -------
-        Fit
-            From the best of its starts.
+        Screened
+            Its starts, and what it promises to explain.
         """
+        found = self.starts(effect)
         if not is_possible((effect,), self.plant):
-            start = self.starts(effect).values
             self._responses[effect] = [
-                (values, np.zeros_like(self._nominal, np.float32)) for values in start
+                (values, np.zeros_like(self._nominal, np.float32)) for values in found.values
             ]
-            return Fit(
-                (effect,), (start[0],), self.nothing.misfit, ((0.0,) * len(start[0]),), self.plant
-            )
+            return Screened(effect, ((self.nothing.misfit, found.values[0]),), 0.0)
         scored: list[tuple[float, tuple[float, ...]]] = []
         responses = []
-        found = self.starts(effect)
         for start in found.values:
             residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
             scored.append((self.space.misfit(residual), start))
@@ -108,8 +129,37 @@ class Fitter:
         if found.quadrature:
             scored += self._blend(effect, responses)
         scored.sort()
+        promise = max(self.nothing.misfit - scored[0][0], self._promise(effect, responses))
+        return Screened(effect, tuple(scored), promise)
+
+    def _promise(self, effect: Effect, responses: Responses) -> float:
+        """χ² that the best strength of any response explains, or of a small one, which large ones
+        need not resemble."""
+        small = self.scale_start(effect, min(start for start, _ in responses), SMALL)
+        residual = self.evidence.residual(with_values(self.plant, (effect,), small))
+        shapes = [response for _, response in responses] + [self._nominal - residual]
+        apart = self.space.project_out(np.stack(shapes, axis=1).astype(np.float64))
+        power = np.sum(apart**2, axis=0)
+        along = self.space.subtract_tolerances(self._nominal) @ apart
+        felt = power > NOTHING
+        return float(np.max(along[felt] ** 2 / power[felt], initial=0.0))
+
+    def fit_one(self, screened: Screened) -> Fit:
+        """The best fit of one effect.
+
+        Parameters
+        ----------
+        screened
+            What was tried of it.
+
+        Returns
+        -------
+        Fit
+            From the best of its starts.
+        """
         # Another start is followed too where it comes near the best; where none helps, the best is
         # followed alone.
+        scored = screened.starts
         enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
         followed = [
             start
@@ -117,7 +167,33 @@ class Fitter:
             if number == 0 or misfit < enough
         ]
         return min(
-            (self.refine((effect,), (start,)) for start in followed), key=lambda fit: fit.misfit
+            (self.refine((screened.effect,), (start,)) for start in followed),
+            key=lambda fit: fit.misfit,
+        )
+
+    def unfitted(self, screened: Screened) -> Fit:
+        """The best of what was tried of an effect, or none of it if nothing helped.
+
+        Parameters
+        ----------
+        screened
+            What was tried of it.
+
+        Returns
+        -------
+        Fit
+            Of that effect alone.
+        """
+        (misfit, start), effect = screened.starts[0], screened.effect
+        values: Values = (start,)
+        if misfit >= self.nothing.misfit and effect.kind.name not in LIMITS:
+            misfit, values = self.nothing.misfit, self.scale_start(effect, start, 0.0)
+        return Fit(
+            (effect,),
+            values,
+            misfit,
+            ((0.0,) * len(start),),
+            with_values(self.plant, (effect,), values),
         )
 
     def _blend(self, effect: Effect, responses: Responses) -> list[tuple[float, tuple[float, ...]]]:
@@ -256,14 +332,16 @@ class Fitter:
 
     def _settle(self, fit: Fit, rounds: int, improve: Callable[[Fit, Space, Plant], Fit]) -> Fit:
         tolerances = self.evidence.machine.tolerances
+        mechanical = np.array([tolerance.mechanical for tolerance in tolerances], bool)
+        # A first guess of how much of them is used does not depend on where it is made.
+        space = self.space.beside(fit.effects)
         used = np.zeros(len(tolerances))
-        space = Space(self.evidence, fit.plant, used, fit.effects)
         residual = self.evidence.residual(fit.plant)
-        for _ in range(rounds):
-            found = space.estimate_tolerances(residual)
-            used = np.array(
-                [share if t.mechanical else 0.0 for t, share in zip(tolerances, found, strict=True)]
-            )
+        for number in range(rounds):
+            found = np.where(mechanical, space.estimate_tolerances(residual), 0.0)
+            if number and np.max(np.abs(found - used), initial=0.0) < UNMOVED:
+                break
+            used = found
             base = self.evidence.shift(self.plant, used.tolist())
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects

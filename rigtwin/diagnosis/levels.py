@@ -4,7 +4,6 @@ after a correction."""
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +17,7 @@ from rigtwin.description.machine import Structure
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Level
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, spectrum
@@ -79,8 +79,8 @@ def _component_levels(
                 continue
         return found
 
-    with ThreadPoolExecutor(2) as pool:
-        one, *others = pool.map(ratios, dict.fromkeys((before, after)))
+    with Threads() as threads:
+        one, *others = threads.map(ratios, dict.fromkeys((before, after)))
     other = others[0] if others else one
     return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
 
@@ -117,11 +117,13 @@ def _closed_loop(
     nominal = before._replace(plant=_with_noise_of(own, before.plant))
     corrected = after._replace(plant=own)
     runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
-    with ThreadPoolExecutor(2) as pool:
+    with Threads() as threads:
         found = dict(
             zip(
                 runs,
-                pool.map(lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs),
+                threads.map(
+                    lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs
+                ),
                 strict=True,
             )
         )

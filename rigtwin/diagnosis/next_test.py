@@ -28,10 +28,15 @@ WORTH = 25.0
 
 
 def record_on_twin(
-    machine: Machine, name: str, configuration: Configuration, demands: np.ndarray
+    machine: Machine,
+    name: str,
+    configuration: Configuration,
+    demands: np.ndarray,
+    seed: int = SEED,
 ) -> Recording:
-    """The recording that a test would make on a machine of that configuration."""
-    ran = simulate(without_limits(configuration), demands, SEED)
+    """The recording that a test would make on a machine of that configuration. seed: of the
+    sensors' noise."""
+    ran = simulate(without_limits(configuration), demands, seed)
     columns = {
         "/command": dict(zip(Commands._fields, ran.commands.T.copy(), strict=True)),
         "/sensor": dict(zip(Measurements._fields, ran.measurements.T.copy(), strict=True)),

@@ -9,7 +9,7 @@ do as well as the best, the one with the fewest parameters is taken.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from rigtwin.components import Effect, measures
@@ -19,6 +19,7 @@ from rigtwin.diagnosis.fit import Fit, Values, is_possible, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.proposals import propose_replacements
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import SelectionRules
 
 SHAKES, SHAKEN, PRICE = (0.6, 1.6), 2, 0.1
@@ -220,7 +221,7 @@ def select(
     coarse: Fitter,
     judge: HeldOutJudge,
     effects: Sequence[Effect],
-    map_fits: Callable[[Callable[..., Fit], Iterable[object]], list[Fit]],
+    threads: Threads,
 ) -> Selection:
     """Chooses among explanations, and judges those next to the one that is chosen.
 
@@ -234,7 +235,7 @@ def select(
         Of fits to the evidence.
     effects
         Candidates.
-    map_fits
+    threads
         Runs fits side by side.
 
     Returns
@@ -262,7 +263,7 @@ def select(
         if not fresh:
             break
         tried_starts.update(fresh)
-        for fit in map_fits(lambda pair: fitter.refine(*pair), fresh):
+        for fit in threads.map(lambda pair: fitter.refine(*pair), fresh):
             pool[frozenset(fit.effects)] = judge.judge(fit)
     chosen = choose(list(pool.values()), fitter, rules)
     ranked = sorted(pool.values(), key=lambda each: each.score)

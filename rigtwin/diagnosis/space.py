@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -30,22 +31,31 @@ class Space:
     ) -> None:
         """used: by how many half widths the plant already uses each tolerance. An effect's own
         parameters have none."""
-        self._columns = evidence.tolerance_responses(plant)
-        machine = evidence.machine
+        self._machine = evidence.machine
+        self._responses = evidence.tolerance_responses(plant)
+        self._used = np.zeros(self._responses.shape[1]) if used is None else used
+        self._fix(effects)
+
+    def _fix(self, effects: Sequence[Effect]) -> None:
+        """Takes out the tolerances that effects take the place of."""
+        tolerances = self._machine.tolerances
         own = [
-            machine.tolerance_of(effect.group, parameter)
+            self._machine.tolerance_of(effect.group, parameter)
             for effect in effects
             for parameter in effect.kind.parameters
         ]
         # With a delay to be found, when samples were taken is no question of its own any more.
         timed = any("delay" in effect.kind.parameters for effect in effects)
-        fixed = [
-            tolerance in own or (timed and tolerance.ticks) for tolerance in machine.tolerances
-        ]
-        self._columns[:, fixed] = 0.0
-        self._used = np.zeros(len(machine.tolerances)) if used is None else used
+        fixed = [tolerance in own or (timed and tolerance.ticks) for tolerance in tolerances]
+        self._columns = np.where(fixed, 0.0, self._responses) if any(fixed) else self._responses
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
+
+    def beside(self, effects: Sequence[Effect]) -> Space:
+        """The same tolerances, less those that effects take the place of."""
+        like = copy(self)
+        like._fix(effects)
+        return like
 
     def estimate_tolerances(self, residual: Array) -> Array:
         """The tolerances that take up most of a residual, in half widths."""

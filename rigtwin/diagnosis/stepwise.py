@@ -7,7 +7,7 @@ the best with dry friction, without which a play, a spring or a Stribeck peak is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,6 +17,7 @@ from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge
 from rigtwin.diagnosis.proposals import propose_additions
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import NamingRules, Thresholds
 
 TRIED, SETTLED = 4, 2
@@ -40,7 +41,6 @@ BEHIND = ("compliance", "backlash")
 """Kinds that hide their gateway."""
 Start = tuple[tuple[Effect, ...], Values]
 """Effects, and values to start from."""
-MapFits = Callable[[Callable[..., Fit], Iterable[object]], list[Fit]]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Growth:
         return drop_needless(fits, self.least, self.thresholds)
 
 
-def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> list[Fit]:
+def fit_stepwise(singles: Sequence[Fit], growth: Growth, threads: Threads) -> list[Fit]:
     """Adds one effect after another to the best explanations.
 
     Parameters
@@ -82,7 +82,7 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> l
         Fits of one effect.
     growth
         What the search needs.
-    map_fits
+    threads
         Runs fits side by side.
 
     Returns
@@ -90,7 +90,7 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> l
     list of Fit
         Of two effects and more.
     """
-    found = _fit_regulars(growth, map_fits)
+    found = _fit_regulars(growth, threads)
     level = sorted(growth.drop_needless(singles), key=growth.cost)
     costs: list[float] = []
     while level:
@@ -101,13 +101,13 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, map_fits: MapFits) -> l
         following: list[Fit] = []
         for leader in _leaders(level, growth.fitter.nothing.misfit):
             if len(leader.effects) < growth.rules.most:
-                following += _extend(leader, growth, map_fits)
+                following += _extend(leader, growth, threads)
         found += following
         level = sorted(growth.drop_needless(following), key=growth.cost)
     return found
 
 
-def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
+def _fit_regulars(growth: Growth, threads: Threads) -> list[Fit]:
     """What nearly every machine has, all of it together, and then without one after another: what
     is found in turn may stand for several of them at once."""
     chosen: list[Effect] = []
@@ -124,7 +124,7 @@ def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
         values = [v for v in search.starts(effect).values if v[0] > 0.0]
         return values[min(number, len(values) - 1)]
 
-    tries = map_fits(
+    tries = threads.map(
         lambda number: search.refine(
             tuple(chosen), [start_of(effect, int(number)) for effect in chosen]
         ),
@@ -137,7 +137,7 @@ def _fit_regulars(growth: Growth, map_fits: MapFits) -> list[Fit]:
             for _, rest, values in without_each(found[-1])
             if is_possible(rest, search.plant)
         ]
-        found.append(min(map_fits(lambda pair: search.refine(*pair), fewer), key=growth.cost))
+        found.append(min(threads.map(lambda pair: search.refine(*pair), fewer), key=growth.cost))
     return [fit for fit in found if not within_tolerance(fit, search.evidence, growth.thresholds)]
 
 
@@ -159,21 +159,21 @@ def _leaders(level: Sequence[Fit], nothing: float) -> list[Fit]:
     )
 
 
-def _extend(leader: Fit, growth: Growth, map_fits: MapFits) -> list[Fit]:
+def _extend(leader: Fit, growth: Growth, threads: Threads) -> list[Fit]:
     """Fits of one effect more that explain enough of what a leader leaves."""
     evidence = growth.fitter.evidence
     hopes = sorted(
         propose_additions(growth.search, leader, growth.effects, growth.least),
         key=lambda hope: hope.promised,
     )[:TRIED]
-    found = map_fits(
+    found = threads.map(
         lambda hope: growth.search.refine(hope.effects, hope.values, hope.space), hopes
     )
-    found += map_fits(
+    found += threads.map(
         lambda start: growth.search.refine(*start),
         [*_gateway_starts(leader, growth), *_unfold(leader, growth)],
     )
-    found = map_fits(growth.fitter.settle, sorted(found, key=growth.cost)[:SETTLED])
+    found = threads.map(growth.fitter.settle, sorted(found, key=growth.cost)[:SETTLED])
     # What the noise of a measured motion makes of friction at its reversals is no further effect.
     left = max(leader.misfit - evidence.expected_misfit(leader.plant), 0.0)
     enough = max(growth.thresholds.second * growth.least, growth.rules.more * left)

@@ -51,9 +51,9 @@ class SelectionRules:
     """unless both magnitudes are off nominal by that many standard errors."""
     necessary: float = 0.05
     """Price included, by how much every explanation without an effect must do worse,"""
-    rarely: float = 0.08
+    rarely: float = 0.11
     """and what one of those that few machines have must account for, as a share of the signals,"""
-    far: float = 1.0
+    far: float = 1.4
     """unless it does that much better."""
     calibration: tuple[tuple[float, float], ...] = (
         (0.05, 0.75),
@@ -90,6 +90,9 @@ class Thresholds:
     """and share of what noise alone leaves: less is a trace that no closed loop shows."""
     unexplained: float = 0.10
     """χ² per degree of freedom above 1 from which what is left counts as a gap."""
+    promising: float = 0.1
+    """Share of what the effect that promises most would explain, to first order, from which another
+    is fitted."""
     much: float = 0.03
     """Share of what noise leaves from which what one effect leaves is worth a search among many
     pairs."""

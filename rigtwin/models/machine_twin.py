@@ -11,8 +11,9 @@ from rigtwin import __version__
 from rigtwin.components import measures
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
-from rigtwin.description.configuration import Configuration, apply_effects, flatten
+from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import Channel
+from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import OWN, Machine, ReplayOf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.joint import RUNAWAY

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from rigtwin.description.configuration import Road
+from rigtwin.description.settings import Road
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 

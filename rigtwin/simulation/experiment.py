@@ -12,7 +12,8 @@ import numpy as np
 
 from controllers.formula import formula
 from rigtwin.components.rig import RigPlant
-from rigtwin.description.configuration import Configuration, rebase
+from rigtwin.description.changes import rebase
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array

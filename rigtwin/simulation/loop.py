@@ -27,7 +27,8 @@ from controllers import (
     unpacked,
     update,
 )
-from rigtwin.description.configuration import Configuration, Safety
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel

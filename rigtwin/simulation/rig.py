@@ -1,4 +1,4 @@
-"""What every rig can do, be it the twin, a recording, or the real one behind a DAQ."""
+"""What every rig can do, be it the twin or the real one behind a DAQ."""
 
 from __future__ import annotations
 

@@ -11,8 +11,10 @@ import numpy as np
 
 from machines import DEFAULT_MACHINE
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, Safety, apply_effects, flatten
+from rigtwin.description.configuration import Configuration, flatten
+from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import OWN
+from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.simulation.loop import Tick, run, run_compiled

@@ -18,7 +18,7 @@ from controllers import Commands, Measurements
 from controllers.compiled import compilable
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import RigPlant
-from rigtwin.description.configuration import Safety
+from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 
 MOTOR_LAG = RigPlant().motor.time_constant

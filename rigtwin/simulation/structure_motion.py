@@ -19,7 +19,8 @@ from controllers import (
     update,
 )
 from controllers.mil import PLACES
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording

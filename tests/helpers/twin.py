@@ -7,7 +7,8 @@ from functools import cache
 from experiments import EXPERIMENTS
 from rigtwin.components import Effect, find
 from rigtwin.description.catalogue import find as machine_of
-from rigtwin.description.configuration import Configuration, apply_effects
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.effects import apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.next_test import record_on_twin

@@ -13,7 +13,8 @@ import numpy as np
 
 from controllers import Measurements, Mode, Settings
 from controllers.force import MOTOR_CONSTANT
-from rigtwin.description.configuration import Configuration, Timing
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, Line
 from rigtwin.numerics.arrays import Array

@@ -16,7 +16,8 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 from controllers import Measurements
 from controllers.quantity import Quantity, fields
-from rigtwin.description.configuration import Safety, check_value, read_toml
+from rigtwin.description.changes import check_value, read_toml
+from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.channels import CHANNELS
 

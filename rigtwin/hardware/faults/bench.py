@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controllers.force import MOTOR_CONSTANT
-from rigtwin.description.configuration import Safety
+from rigtwin.description.settings import Safety
 from rigtwin.hardware.daq.conversion import conversion, to_values
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.terminals import Terminals

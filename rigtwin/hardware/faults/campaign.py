@@ -15,7 +15,7 @@ from google.protobuf.message import Message
 
 from controllers import Commands, Controller, Demand, Measurements, State
 from controllers import update as healthy
-from rigtwin.description.configuration import override
+from rigtwin.description.changes import override
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import ChannelTable

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from controllers import update
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, apply_effects, flatten
+from rigtwin.description.configuration import Configuration, flatten
+from rigtwin.description.effects import apply_effects
 from rigtwin.hardware.daq.card import Card, connect, require_client
 from rigtwin.hardware.daq.table import ChannelTable, require_ranges, to_toml
 from rigtwin.hardware.daq.terminals import Terminals

@@ -21,6 +21,7 @@ from rigtwin.studies.tuning.pictures import draw
 from rigtwin.studies.tuning.result import TuningResult
 from rigtwin.studies.tuning.run import LIMITS
 from rigtwin.studies.tuning.scenario import APART
+from rigtwin.studies.tuning.study import Study
 
 RUNS, SETTINGS, BEST, PAGE = "runs.sqlite", "tuned.toml", "best.mcap", "index.html"
 CAPTIONS = {
@@ -29,6 +30,11 @@ CAPTIONS = {
     "search": "What the search tried, in order.",
     "parameters": "The first objective of every candidate over each parameter.",
 }
+
+
+def default_folder(study: Study) -> Path:
+    """Where the results of a study go unless it is said."""
+    return Path("tuning") / study.name
 
 
 def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]:

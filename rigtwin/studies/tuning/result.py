@@ -136,6 +136,24 @@ def tune(
     )
 
 
+def count_runs(study: Study, posterior: Posterior | None) -> int:
+    """About how many runs a tuning makes.
+
+    Parameters
+    ----------
+    study : Study
+        What is tuned.
+    posterior : Posterior or None
+        Of a diagnosis of the rig, if it is tuned on a calibrated twin.
+    """
+    budget = study.budget
+    searches = 1 if posterior is None else 2
+    rigs = 1 + len(study.other_rigs) + (0 if posterior is None else 1 + len(posterior.otherwise))
+    points = budget.points if len(study.goals.minimise) == 2 else 0
+    tried = searches * (budget.evaluations + 1) * budget.roads
+    return tried + budget.held_out * (rigs * (1 + searches) + points)
+
+
 def find_settings(bench: Bench, rig: Rig, seed: int) -> Settings:
     """Tune on a rig without evaluating. Raises RigtwinError if no candidate is allowed."""
     return settings_of(bench.study, _choose(*_search(bench, rig, seed)))

@@ -13,7 +13,8 @@ import numpy as np
 from machines import DEFAULT_MACHINE
 from rigtwin.components import RigPlant
 from rigtwin.description.catalogue import find
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Changes, Posterior, shift_within, value_of
 from rigtwin.studies.tuning.study import Study
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from controllers import Settings
-from rigtwin.description.configuration import Configuration, override
+from rigtwin.description.changes import override
+from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Parameter

@@ -11,13 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from controllers.quantity import Quantity, fields
-from rigtwin.description.configuration import (
-    Configuration,
-    groups,
-    override,
-    parse_assignments,
-    read_toml,
-)
+from rigtwin.description.changes import override, parse_assignments, read_toml
+from rigtwin.description.configuration import Configuration, groups
 from rigtwin.description.posterior import value_of
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment

@@ -1,0 +1,2 @@
+"""What `import rigtwin` offers. The commands of the command line call these functions and nothing
+else."""

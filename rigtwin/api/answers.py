@@ -1,0 +1,171 @@
+"""What recordings say: diagnoses, comparisons, calibrations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, twin_of
+from rigtwin.description import catalogue
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.diagnosis.compare import Comparison, differences
+from rigtwin.diagnosis.compare import compare as compare_with_twin
+from rigtwin.diagnosis.compare import compare_recordings as find_differences
+from rigtwin.diagnosis.data_checks import require_fit
+from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.residual import Residual
+from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.errors import RigtwinError
+from rigtwin.recording import reader
+from rigtwin.simulation.experiment import find_experiment
+from rigtwin.studies.friction_spikes import Calibration, find_compensator
+
+
+def diagnose(
+    recordings: reader.Recording | Sequence[reader.Recording],
+    *,
+    machine: Machine | str | Path | None = None,
+    held_out: reader.Recording | Sequence[reader.Recording] = (),
+    settings: Settings = (),
+    without: Sequence[str] = (),
+    progress: Callable[[str, int], object] = lambda _stage, _steps: None,
+) -> Diagnosis:
+    """Says why recordings of one machine and its twin disagree.
+
+    Parameters
+    ----------
+    recordings
+        One, or several that are explained together.
+    machine
+        That they are of; by default the one that they name.
+    held_out
+        Recordings of the same machine that the correction is judged on and not fitted to.
+    settings
+        Changes of the twin that they are compared with: of its plant and `timing.timestep`.
+    without
+        Effects that are taken out of the twin first, such as "coulomb@rail".
+    progress
+        Called with a stage's name and the steps done in it.
+
+    Returns
+    -------
+    The verdict, the effects with confidence, where the gap lies, and how far it shrinks. In a
+    notebook it shows its report.
+
+    Raises
+    ------
+    RigtwinError
+        If the recordings' settings are unknown, or held-out data are not fit to be compared.
+    """
+    several = list(_several(recordings))
+    apart = list(_several(held_out))
+    paths = [each.path.resolve() for each in (*several, *apart) if each.path.exists()]
+    if len(set(paths)) < len(paths) or not several:
+        raise RigtwinError(
+            "a recording is named twice; each counts once, and what is held out must not be fitted"
+            if several
+            else "no recording to diagnose"
+        )
+    found = described_machine(several[0], machine)
+    base = twin_of(found, settings, without)
+    tests = [find_experiment(found, name) for name in found.next_tests]
+    return find_reasons(found, several, base, apart, tests, progress)
+
+
+def compare(
+    recording: reader.Recording,
+    *,
+    machine: Machine | str | Path | None = None,
+    settings: Settings = (),
+    effects: Effects = (),
+    progress: Callable[[str], object] = lambda _replay: None,
+) -> Comparison:
+    """What a recording and a twin differ by: replay by replay of the suspension rig's components,
+    signal by signal of another machine.
+
+    Parameters
+    ----------
+    recording
+        The data.
+    machine
+        That it is compared with; by default the one that it names.
+    settings
+        Changes of the twin: of its plant and `timing.timestep`.
+    effects
+        That the twin is given.
+    progress
+        Called with each replay's name.
+
+    Raises
+    ------
+    RigtwinError
+        Naming every fault of the data that makes a comparison meaningless.
+    """
+    found = described_machine(recording, machine)
+    base = twin_of(found, settings, (), effect_texts(effects))
+    return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
+
+
+def compare_recordings(
+    first: reader.Recording, second: reader.Recording
+) -> tuple[dict[str, Residual], tuple[str, ...]]:
+    """Two recordings of one test, sensor by sensor.
+
+    Parameters
+    ----------
+    first, second
+        Of one machine.
+
+    Returns
+    -------
+    What they differ by, by sensor; and what was not the same in the tests, a line each.
+
+    Raises
+    ------
+    RigtwinError
+        If their periods differ or they share no sensor.
+    """
+    return find_differences(machine_of(first), first, second), differences(first, second)
+
+
+def calibrate(recording: reader.Recording) -> Calibration:
+    """The friction compensator's settings that a recording of the suspension rig asks for.
+
+    Parameters
+    ----------
+    recording
+        Made without compensation, that reverses often, such as `friction-road`.
+
+    Raises
+    ------
+    RigtwinError
+        If the data are unfit, or a compensator found from them would do harm.
+    """
+    of = machine_of(recording)
+    if of.structure is not Structure.QUARTER_CAR:
+        raise RigtwinError(
+            f"{recording.path}: it is of machine {of.name!r}; "
+            f"expected {Structure.QUARTER_CAR.value}"
+        )
+    configuration = of.configuration_of(recording)
+    require_fit(of, recording, configuration)
+    found = find_compensator(recording, configuration.controller)
+    if found.detected < 0.8 * found.reversals or found.false > 0.1 * found.reversals:
+        raise RigtwinError(
+            f"{recording.path}: a compensator found from it would do harm; record a test that "
+            "reverses often, such as friction-road, without compensation"
+        )
+    return found
+
+
+def _several(given: reader.Recording | Sequence[reader.Recording]) -> Iterator[reader.Recording]:
+    if isinstance(given, reader.Recording):
+        yield given
+    else:
+        yield from given
+
+
+def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
+    if given is None:
+        return machine_of(recording)
+    return given if isinstance(given, Machine) else catalogue.find(str(given))

@@ -1,0 +1,125 @@
+"""Machines by name or file, their experiments and effects, and the twin of one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from rigtwin.components import Effect
+from rigtwin.description import catalogue
+from rigtwin.description.changes import Changes, with_changes
+from rigtwin.description.configuration import Configuration, parameters
+from rigtwin.description.effects import apply_effects
+from rigtwin.description.effects import without_effect as take_out
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.errors import RigtwinError
+from rigtwin.recording import reader
+from rigtwin.simulation.experiment import Experiment, experiments_of
+
+Settings = Changes | Sequence[Changes]
+"""Group → name → value, {"rail": {"coulomb": 60}, "timing": {"duration": 5}}; or the path of a TOML
+file that holds them; or several of these, one over the other."""
+Effects = Mapping[str, float | Mapping[str, float]] | Sequence[str]
+"""Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect`
+takes."""
+
+
+def machine(name: str | Path) -> Machine:
+    """A machine.
+
+    Parameters
+    ----------
+    name
+        Of a shipped one, see `machines`, or the path of a description, a TOML file.
+
+    Raises
+    ------
+    RigtwinError
+        With the first mistake in the description, or with what there is.
+    """
+    return catalogue.find(str(name))
+
+
+def machines() -> dict[str, Path]:
+    """The machines that come along: name → description."""
+    return catalogue.shipped()
+
+
+def machine_of(recording: reader.Recording) -> Machine:
+    """The machine that a recording is of. Raises RigtwinError if it has to be said."""
+    described = getattr(recording, "described", None)
+    if described is not None:
+        return described
+    if recording.machine not in catalogue.shipped():
+        known = ", ".join(catalogue.shipped())
+        raise RigtwinError(
+            f"{recording.path}: it is of machine {recording.machine!r}; give its description, "
+            f'machine="F.toml" or --machine F.toml (shipped ones: {known})'
+        )
+    return catalogue.find(recording.machine)
+
+
+def experiments(of: Machine) -> dict[str, Experiment]:
+    """The experiments that a machine's description names: name → experiment."""
+    return experiments_of(of)
+
+
+def effects(of: Machine) -> list[Effect]:
+    """All effects that a machine can have."""
+    return list(of.effects())
+
+
+def effect_texts(given: Effects) -> list[str]:
+    """Effects as `--effect` takes them: `coulomb@rail=80`."""
+    if not isinstance(given, Mapping):
+        return list(given)
+    return [f"{name}={_values(value)}" for name, value in given.items()]
+
+
+def _values(value: float | Mapping[str, float]) -> str:
+    if not isinstance(value, Mapping):
+        return repr(float(value))
+    first, *more = value.items()
+    return ",".join([repr(float(first[1])), *(f"{name}={each!r}" for name, each in more)])
+
+
+def twin_of(
+    of: Machine,
+    settings: Settings = (),
+    taken_out: Sequence[str] = (),
+    effects: Sequence[str] = (),
+) -> Configuration:
+    """The twin that recordings are compared with.
+
+    Parameters
+    ----------
+    of
+        The machine.
+    settings
+        Changes of its plant or of `timing.timestep`; all other settings are a recording's own.
+    taken_out
+        Effects that the nominal machine has and the twin is not to have.
+    effects
+        That the twin is given.
+
+    Raises
+    ------
+    RigtwinError
+        For any other setting, or an effect that is not there.
+    """
+    base = with_changes(of.configuration, settings)
+    for (key, value, _), (_, described, _) in zip(
+        parameters(base), parameters(of.configuration), strict=True
+    ):
+        group, _, name = key.partition(".")
+        own = group in of.plant._fields or (
+            group == "controller" and of.structure is Structure.JOINTS
+        )
+        if value != described and not own and (group, name) != ("timing", "timestep"):
+            raise RigtwinError(
+                f"{key}: a comparison changes the plant and timing.timestep only; "
+                "all other settings are the recording's own"
+            )
+    for name in taken_out:
+        base = take_out(base, name)
+    return apply_effects(base, effects)

@@ -1,0 +1,125 @@
+"""Recordings as they are worked with: channels, plots, videos, exports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from rigtwin.api.machines import machine, machine_of
+from rigtwin.description.machine import Machine
+from rigtwin.importing.convert import convert
+from rigtwin.recording import export, reader
+from rigtwin.render.plot import draw
+from rigtwin.render.video import film
+
+
+@dataclass(frozen=True)
+class Recording(reader.Recording):
+    """A test as it was recorded.
+
+    `recording["/sensor.load_cell"]` is a channel, shape (ticks,), `recording.time` its time in s,
+    `recording.channels` names them all, `recording.units` says their units.
+    """
+
+    described: Machine | None = field(default=None, repr=False)
+    """The machine that it is of, where it was said."""
+    report: tuple[str, ...] = field(default=(), repr=False)
+    """What was found in the data that it was made of, where it was imported."""
+
+    @property
+    def tripped(self) -> bool:
+        """Whether a limit ended the test."""
+        return self.end.startswith("trip")
+
+    def plot(self, out: str | Path, start: float = 0.0, until: float | None = None) -> Path:
+        """Draws it.
+
+        Parameters
+        ----------
+        out
+            A png, svg or pdf file.
+        start, until
+            s, the stretch that is drawn; until the end by default.
+
+        Raises
+        ------
+        RigtwinError
+            For another ending or an empty stretch.
+        """
+        draw(self, Path(out), start, until)
+        return Path(out)
+
+    def video(self, out: str | Path, **options: Any) -> Path:
+        """Films it.
+
+        Parameters
+        ----------
+        out
+            An mp4 file.
+        **options
+            camera, start and until in s, magnify, progress; see `rigtwin.render.video.film`.
+
+        Raises
+        ------
+        RigtwinError
+            If this computer cannot draw, or the file cannot be written.
+        """
+        film(self, Path(out), machine_of(self), **options)
+        return Path(out)
+
+    def export(self, out: str | Path) -> Path:
+        """Writes it as csv or mat, by the name's ending. Raises RigtwinError for any other."""
+        export.export(self, Path(out))
+        return Path(out)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Channel → unit, of those that the machine's description knows."""
+        known = machine_of(self).units
+        return {name: known[name] for name in self.channels if name in known}
+
+
+def load(path: str | Path, of: Machine | str | Path | None = None) -> Recording:
+    """Reads a recording.
+
+    Parameters
+    ----------
+    path
+        Of an MCAP file, whoever wrote it.
+    of
+        The machine, or its name or description; by default the one that the recording names.
+
+    Raises
+    ------
+    RigtwinError
+        If it is no recording, is empty, or is of a format that this version does not read.
+    """
+    return faced(reader.load(Path(path)), machine(of) if isinstance(of, str | Path) else of)
+
+
+def faced(plain: reader.Recording, described: Machine | None) -> Recording:
+    return Recording(
+        **{each.name: getattr(plain, each.name) for each in fields(plain)}, described=described
+    )
+
+
+def import_data(data: str | Path, mapping: str | Path, out: str | Path) -> Recording:
+    """Makes a recording of another program's data.
+
+    Parameters
+    ----------
+    data
+        A csv, mat or parquet file.
+    mapping
+        A TOML file that says which column is which channel, docs/tutorial.md.
+    out
+        The recording, an MCAP file.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the column, unit or line that is at fault.
+    """
+    report = convert(Path(data), Path(mapping), Path(out))
+    return replace(load(out), report=tuple(report))

@@ -1,0 +1,117 @@
+"""A test on a machine's twin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from rigtwin.api.machines import Effects, Settings, effect_texts
+from rigtwin.api.recordings import Recording, faced
+from rigtwin.description.changes import with_changes
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.errors import RigtwinError
+from rigtwin.models.machine_twin import run_machine
+from rigtwin.recording import reader
+from rigtwin.simulation.experiment import Demands, Experiment, find_experiment
+from rigtwin.simulation.loop import TickController
+from rigtwin.simulation.runner import record
+
+Demanding = Callable[[Configuration, int], Demands]
+"""An experiment of one's own: what is demanded of the machine for (settings, seed)."""
+
+
+def run(
+    on: Machine,
+    experiment: str | Experiment | Demanding,
+    *,
+    seed: int = 0,
+    effects: Effects = (),
+    settings: Settings = (),
+    controller: TickController | Callable[..., Any] | None = None,
+    path: str | Path | None = None,
+    progress: Callable[[int], object] = lambda _ticks: None,
+) -> Recording:
+    """Runs a test on a machine's twin.
+
+    Parameters
+    ----------
+    on
+        The machine, see `machine`; also a corrected one, `Diagnosis.machine`.
+    experiment
+        Its name among `experiments`, an `Experiment`, or a function that gives the demands.
+    seed
+        Of the excitation and of the sensors' noise; the same seed gives the same recording.
+    effects
+        What the twin has and its operator does not know of.
+    settings
+        Changes of what the operator knows.
+    controller
+        One of your own instead of the machine's: an object with `tick(measured, demand)`, or a
+        function, compiled or not; it returns `controllers.Commands` on the suspension rig, the
+        actuator's command on any other machine, for measurements and demands by name.
+    path
+        Where to record; by default nowhere but in memory.
+    progress
+        Called with the ticks done since its last call.
+
+    Raises
+    ------
+    RigtwinError
+        If anything asked for is not known or not allowed, before the test starts.
+    """
+    if seed < 0:
+        raise RigtwinError(f"seed {seed}: expected 0 or more")
+    test = _experiment(on, experiment)
+    configuration = with_changes(test.configuration, settings)
+    if path is not None:
+        _record(
+            Path(path), on, test, configuration, seed, effect_texts(effects), controller, progress
+        )
+        return faced(reader.load(Path(path)), on)
+    with TemporaryDirectory(prefix="rigtwin-") as folder:
+        kept = Path(folder) / f"{test.name}-{seed}.mcap"
+        _record(kept, on, test, configuration, seed, effect_texts(effects), controller, progress)
+        return replace(faced(reader.load(kept), on), path=Path(kept.name))
+
+
+def _experiment(of: Machine, experiment: str | Experiment | Demanding) -> Experiment:
+    if isinstance(experiment, str):
+        return find_experiment(of, experiment)
+    if isinstance(experiment, Experiment):
+        return experiment
+    name = getattr(experiment, "__name__", "own")
+    return Experiment(name, "", "", of.configuration, experiment)
+
+
+def _record(
+    path: Path,
+    on: Machine,
+    test: Experiment,
+    configuration: Configuration,
+    seed: int,
+    effects: Sequence[str],
+    controller: TickController | Callable[..., Any] | None,
+    progress: Callable[[int], object],
+) -> None:
+    tick: Any = getattr(controller, "tick", controller)
+    demands = test.demands(configuration, seed)
+    if on.structure is Structure.QUARTER_CAR:
+        record(
+            path,
+            test.name,
+            configuration,
+            demands,
+            seed,
+            progress,
+            effects,
+            machine=on.name,
+            controller=tick,
+        )
+    else:
+        run_machine(
+            path, on, test.name, configuration, demands, seed, effects=effects, controller=tick
+        )

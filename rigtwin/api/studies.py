@@ -1,0 +1,250 @@
+"""Studies on the twin: tuning, stability, the thesis again, the diagnosis held to its word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from experiments.thesis.result import Reproduction
+from experiments.thesis.result import reproduce as reproduce_thesis
+from experiments.tuning import find_study
+from experiments.vehicles import find_vehicle
+from referee import check, wild
+from rigtwin.description.posterior import load_posterior
+from rigtwin.errors import RigtwinError
+from rigtwin.studies.stability.judgement import ModelStability as ModelStability
+from rigtwin.studies.stability.judgement import Stability, judge
+from rigtwin.studies.stability.vehicle import QuarterCar, believable, checked_time
+from rigtwin.studies.sweep import Store, open_workers
+from rigtwin.studies.tuning.bench import Bench
+from rigtwin.studies.tuning.folder import RUNS, default_folder, write
+from rigtwin.studies.tuning.result import TuningResult, count_runs
+from rigtwin.studies.tuning.result import tune as tune_study
+
+Progress = Callable[[int, int], object]
+"""Called with what is done and with how much there is in all."""
+
+
+def _nothing(*_: object) -> None:
+    """Tells nobody."""
+
+
+def tune(
+    study: str,
+    *,
+    settings: Sequence[str] = (),
+    twin: str | Path | None = None,
+    out: str | Path | None = None,
+    seed: int = 1,
+    evaluations: int | None = None,
+    roads: int | None = None,
+    held_out: int | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress = _nothing,
+    stage: Callable[[str], object] = _nothing,
+) -> TuningResult:
+    """Tunes a controller on the twin, and judges it on roads that the tuning has not seen.
+
+    Parameters
+    ----------
+    study
+        By name, or the path of its file, docs/tuning.md.
+    settings
+        `group.name=value` for every run, over the study's own.
+    twin
+        A calibrated twin, as a diagnosis writes it: to be tuned on, within its uncertainty.
+    out
+        The folder of the results, `tuning/STUDY` by default. What is there already is not run
+        again.
+    seed
+        Of the optimiser; the same seed gives the same settings.
+    evaluations, roads, held_out
+        About how many candidates, scenarios that each is tried in, and scenarios to judge on; by
+        default the study's.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the runs done and with about how many there will be.
+    stage
+        Called with what begins.
+
+    Raises
+    ------
+    RigtwinError
+        For a mistake in the study, or if no candidate meets its constraints.
+    """
+    if seed < 0:
+        raise RigtwinError(f"--seed {seed}: expected 0 or more")
+    found = find_study(study, settings, roads=roads, held_out=held_out, evaluations=evaluations)
+    posterior = None if twin is None else load_posterior(Path(twin))
+    folder = Path(out) if out is not None else default_folder(found)
+    if folder.exists() and not folder.is_dir():
+        raise RigtwinError(f"cannot write into {folder}: it is a file")
+    total, done = count_runs(found, posterior), 0
+
+    def step(more: int) -> None:
+        nonlocal done
+        done += more
+        progress(done, total)
+
+    with open_workers(workers, cluster) as open_, Store(folder / RUNS) as store:
+        result = tune_study(Bench(found, store, open_, step), seed, posterior, stage)
+    on = found.configuration if posterior is None else posterior.at_best(found.configuration)
+    write(folder, result, on)
+    return result
+
+
+def stability(
+    vehicle: str | QuarterCar = "quarter-car",
+    *,
+    changes: Mapping[str, float] | None = None,
+    tau: float = 0.01,
+    delay: bool = False,
+) -> Stability:
+    """Whether a vehicle is stable on the rig with its lags, and how much of them it bears.
+
+    Parameters
+    ----------
+    vehicle
+        By name, such as "truck", or its figures.
+    changes
+        Other values of it: {"suspension_damping": 500}.
+    tau
+        s, the lag of every path.
+    delay
+        Whether the rightmost pole is with pure delays of tau instead.
+
+    Raises
+    ------
+    RigtwinError
+        For an unknown name, or a figure that no pole can be worked out for.
+    """
+    car = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    for name in changes or {}:
+        if name not in QuarterCar._fields:
+            known = ", ".join(QuarterCar._fields)
+            raise RigtwinError(f"unknown parameter {name!r} of a vehicle; there are {known}")
+    car = believable(car._replace(**(changes or {})))
+    return judge(car, checked_time("--tau", tau), delay)
+
+
+def reproduce(
+    what: str | None = None,
+    *,
+    seeds: int = 32,
+    folder: str | Path = "reproduction",
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress = _nothing,
+) -> Reproduction:
+    """Reproduces the thesis: its tables, figures and statements beside ours.
+
+    Parameters
+    ----------
+    what
+        A chapter (3 to 7, A), study, table, figure or equation; everything by default.
+    seeds
+        Roads and noise to judge over.
+    folder
+        Of the results; what is there already is not computed again.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the jobs done and with how many there are.
+
+    Raises
+    ------
+    RigtwinError
+        If nothing is called that, or the folder cannot be written.
+    """
+    with open_workers(workers, cluster) as open_:
+        return reproduce_thesis(what, seeds, Path(folder), open_, progress)
+
+
+def blindcheck(
+    cases: int = 200,
+    *,
+    seed: int = 2026,
+    folder: str | Path = "blindcheck",
+    baselines: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress = _nothing,
+) -> check.Result:
+    """Holds the diagnosis to recordings of another rig, whose defects are withheld from it.
+
+    Parameters
+    ----------
+    cases
+        How many rigs.
+    seed
+        Of the referee's draws.
+    folder
+        Of recordings and answers; what is there already is not diagnosed again.
+    baselines
+        Whether cruder methods are asked too.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the recordings and answers done and with how many there are.
+
+    Raises
+    ------
+    RigtwinError
+        If the referee fails, or its key is not the one that it committed itself to.
+    """
+    _check_draw(cases, seed)
+    with open_workers(workers, cluster) as open_:
+        step = _counting(progress, 2 * cases)
+        return check.check(Path(folder), cases, seed, baselines, open_, step)
+
+
+def blindcheck_wild(
+    cases: int = 200,
+    *,
+    seed: int = 2026,
+    folder: str | Path = "blindcheck",
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress = _nothing,
+) -> wild.WildResult:
+    """Holds the diagnosis to machines whose physics have forms that its library does not have.
+
+    Parameters
+    ----------
+    cases
+        How many machines.
+    seed
+        Of the draws.
+    folder
+        Of the answers; what is there already is not diagnosed again.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the machines done and with how many there are.
+
+    Raises
+    ------
+    RigtwinError
+        If the folder cannot be written.
+    """
+    _check_draw(cases, seed)
+    with open_workers(workers, cluster) as open_:
+        return wild.check_wild(Path(folder), cases, seed, open_, _counting(progress, cases))
+
+
+def _check_draw(cases: int, seed: int) -> None:
+    if cases < 1 or seed < 0:
+        raise RigtwinError("--cases must be at least 1, --seed at least 0")
+
+
+def _counting(progress: Progress, total: int) -> Callable[[int], None]:
+    done = 0
+
+    def step(more: int) -> None:
+        nonlocal done
+        done += more
+        progress(done, total)
+
+    return step
