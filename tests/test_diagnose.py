@@ -185,6 +185,17 @@ def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     assert deviation.used == pytest.approx(value, rel=1e-3)
 
 
+def test_a_setting_without_consequence_is_a_note_and_no_gap():
+    recording = recorded("road1.6", (), 3.0)
+    told = EXPERIMENTS["road1.6"].configuration.controller.start - 1e-7
+    recording = replace(recording, controller={**recording.controller, "start": told})
+    outcome = answer(recording)
+    assert explains_nothing(outcome)
+    (note,) = (note for note in outcome.answer.notes if "start" in note)
+    assert "instead of -0.00" in note
+    assert note.endswith("no gap")
+
+
 def test_missed_ticks_are_counted():
     deviation = deviation_of(recorded("imposed", ("missed_ticks@controller=0.04",)))
     assert deviation is not None

@@ -3,8 +3,9 @@ recorded."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,13 +39,15 @@ AWAY = np.array([-2.0, -1.0, -0.75, -0.5, -0.25, -0.05, 0.05, 0.25, 0.5, 1.0, 2.
 class Deviation:
     """What a controller did other than told. kind: `setting`, `missed_ticks` or `delay`, or
     `unknown` if nothing reproduces its commands; name: of the setting, or of the parameter; told:
-    the operator's value; used: the one that reproduces them."""
+    the operator's value; used: the one that reproduces them; consequence: by how much of itself
+    the command that changes most does."""
 
     kind: str
     name: str
     told: float
     used: float
     unit: str
+    consequence: float = math.inf
 
 
 class ControllerReplay:
@@ -95,15 +98,28 @@ class ControllerReplay:
 
     def deviation(self) -> Deviation | None:
         """What explains that the commands are not those of the settings; None if they are."""
-        left = self.misfit(self.commands(self._settings))
+        commands = self.commands(self._settings)
+        left = self.misfit(commands)
         if left <= 1.0:
             return None
-        return (
+        found = (
             self._find_missed_ticks()
             or self._find_delay()
             or self._find_setting(left)
             or Deviation("unknown", "", 0.0, 0.0, "1")
         )
+        return replace(found, consequence=self._consequence(commands))
+
+    def _consequence(self, commands: Array) -> float:
+        """rms of what commands differ by, as a share of how far they move; of the worst."""
+        differs = np.sqrt(np.mean((commands - self.recorded)[:, SETTLED:] ** 2, axis=1))
+        moves = np.std(self.recorded[:, SETTLED:], axis=1)
+        shares = [
+            (one / other if other > 0.0 else math.inf)
+            for one, other in zip(differs.tolist(), moves.tolist(), strict=True)
+            if one > 0.0
+        ]
+        return max(shares, default=0.0)
 
     def _find_missed_ticks(self) -> Deviation | None:
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=1) == 0.0, axis=0)])

@@ -33,6 +33,7 @@ from rigtwin.diagnosis.findings import (
     describe_attributed,
     describe_controller,
     describe_sensor,
+    describe_slight,
     find_nearest,
     find_traces,
     list_unobservable,
@@ -170,6 +171,13 @@ def _diagnose(
         or (left - disturbed[0].misfit) > thresholds.something * found.expected
     )
     deviations = _deviations(evidence)
+    slight = [
+        each
+        for each in deviations
+        if each.kind in ("setting", "unknown") and each.consequence < thresholds.consequence
+    ]
+    notes += [describe_slight(each) for each in slight]
+    deviations = [each for each in deviations if each not in slight]
     sampled = find_outstanding(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )

@@ -479,6 +479,8 @@ class Evidence:
             columns.append(
                 self.whiten([scale * (b - a) for a, b in zip(start, after, strict=True)])
             )
+        if not columns:
+            return np.zeros((sum(2 * each.weight.size for each in self.lines), 0))
         return np.stack(columns, axis=1)
 
 

@@ -14,6 +14,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Unobservable
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.sampling import SensorProperty
+from rigtwin.diagnosis.text import tell_apart
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 SHOWN = 0.01
@@ -241,6 +242,19 @@ def describe_controller(each: Deviation, sure: float) -> Finding:
     spread = 1e-3 * abs(each.used)
     estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
     return Finding(name, {each.name: estimate}, sure, (name,), 1.0, title(each.kind))
+
+
+def describe_slight(each: Deviation) -> str:
+    """What the controller did other than told, if nothing comes of it."""
+    share = f"{100 * each.consequence:.1g} %"
+    if each.kind == "unknown":
+        return f"the controller's commands differ by {share} from those of its settings; no gap"
+    used, told = tell_apart(each.used, each.told)
+    unit = "" if each.unit == "1" else f" {each.unit}"
+    return (
+        f"the controller's {each.name} is {used}{unit} instead of {told}{unit}, "
+        f"which changes no command by more than {share}; no gap"
+    )
 
 
 def list_unobservable(found: Attribution, effects: Sequence[Finding]) -> tuple[Unobservable, ...]:

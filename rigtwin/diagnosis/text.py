@@ -10,14 +10,23 @@ UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands, and change no replay."""
 
 
+def tell_apart(one: float, other: float) -> tuple[str, str]:
+    """Two numbers with four digits, or with as many more as it takes to tell them apart."""
+    texts = "", ""
+    for digits in range(4, 17):
+        texts = f"{one:.{digits}g}", f"{other:.{digits}g}"
+        if texts[0] != texts[1]:
+            break
+    return texts
+
+
 def number(estimate: Estimate) -> str:
     """A parameter's value with its interval."""
     unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    nominal = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}"
-    return (
-        f"{estimate.value:.4g}{unit} (95 %: {estimate.low:.4g} "
-        f"to {estimate.high:.4g}), nominal {nominal}"
-    )
+    value, nominal = tell_apart(estimate.value, estimate.nominal)
+    if abs(estimate.nominal) >= 1e9:
+        nominal = "none"
+    return f"{value}{unit} (95 %: {estimate.low:.4g} to {estimate.high:.4g}), nominal {nominal}"
 
 
 def describe(diagnosis: Answer) -> str:
@@ -109,12 +118,13 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         name, estimate = next(iter(effect.parameters.items()))
         unit = "" if estimate.unit == "1" else f" {estimate.unit}"
         likely = f"{100 * effect.confidence:.0f} %"
-        was = "none" if abs(estimate.nominal) >= 1e9 else f"{estimate.nominal:.4g}{unit}"
+        value, nominal = tell_apart(estimate.value, estimate.nominal)
+        was = "none" if abs(estimate.nominal) >= 1e9 else f"{nominal}{unit}"
         title = f"setting {name}" if effect.name.kind == "setting" else effect.title
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
         article = "an" if title[0] in "aeiou" else "a"
         parts.append(
-            f"the {owner} has {article} {title} of {estimate.value:.4g}{unit} "
+            f"the {owner} has {article} {title} of {value}{unit} "
             f"instead of {was} (confidence {likely})"
         )
     closes = (

@@ -125,6 +125,9 @@ class Thresholds:
     """Share of what is explained that an explanation with one effect replaced may lack."""
     worse: float = 1.05
     """Times the gap without it from which held-out data reject a correction."""
+    consequence: float = 1e-3
+    """Share of how far commands move below which what a controller did other than told is a note,
+    and no gap."""
     sure: float = 0.98
     """Confidence in what is read off a signal or reproduced exactly; nothing is ever surer."""
     less_sure: float = 0.88
