@@ -3,6 +3,7 @@ diagnosis alike."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ import pytest
 import rigtwin
 from rigtwin.description.catalogue import SHIPPED
 from rigtwin.description.document import examine
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.space import Space
 from rigtwin.models.choose import model_of
-from tests.helpers.described import TOML, described
+from tests.helpers.described import TOML, described, recording_of
 
 SHORT = {"timing": {"duration": 4}}
 
@@ -125,3 +128,14 @@ def test_a_loop_is_closed_over_any_sensor_of_position(tmp_path: Path):
     assert np.ptp(ran) > 0.01
     np.testing.assert_array_equal((ran, replayed), plain)
     np.testing.assert_allclose(replayed, ran, atol=0.01 * np.ptp(ran))
+
+
+def test_a_machine_without_any_tolerance_is_compared_too(tmp_path):
+    time = 1e-3 * np.arange(2000)
+    machine = replace(described(tmp_path, "slide"), tolerances=())
+    position = 0.01 * np.sin(5.0 * time)
+    recording = recording_of(machine, 10.0 * np.sin(5.0 * time), position)
+    evidence = Evidence(machine, [recording], [machine.configuration_of(recording)])
+    nominal = evidence.residual(evidence.plant)
+    assert evidence.tolerance_responses(evidence.plant).shape == (len(nominal), 0)
+    assert Space(evidence, evidence.plant).misfit(nominal) == pytest.approx(nominal @ nominal)
