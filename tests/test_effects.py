@@ -41,7 +41,7 @@ from tests.helpers.effects import text
 
 EFFECTS = {effect.name: effect for effect in candidates(RigPlant())}
 IMPOSED = EXPERIMENTS["imposed"]
-SHORT = IMPOSED.configuration._replace(timing=Timing(duration=3.0))
+SHORT = IMPOSED.configuration._replace(timing=Timing(duration=2.0))
 DEMANDS = IMPOSED.demands(SHORT, 0)
 
 

@@ -67,7 +67,14 @@ MADE = {
 may cause in 8 s."""
 
 
-@pytest.mark.parametrize("text", MADE)
+ONCE = ("coulomb@rail", "stiffness@tyre", "gain@motor", "lag@load_cell", "delay@structure_cylinder")
+"""One of a law, a stiffness, a gain, a lag and a delay; the others are tried when there is time."""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [pytest.param(text, marks=() if text.startswith(ONCE) else pytest.mark.slow) for text in MADE],
+)
 def test_an_effect_is_found_at_its_size(text):
     name, _, value = text.partition("=")
     effect = rig_effect(name)
@@ -140,7 +147,9 @@ def test_ticks_where_a_sensor_is_cut_off_do_not_count():
 
 
 def test_two_effects_are_told_apart():
-    evidence = evidence_of(recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96")))
+    evidence = evidence_of(
+        recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96"), 5.0)
+    )
     found = attribute(evidence)
     assert found.best is not None
     assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}

@@ -16,7 +16,7 @@ from rigtwin.recording import Recording
 from tests.helpers.described import TOML, described
 
 PERIOD, STEPS = 1e-3, 20
-TIME = np.arange(1500) * PERIOD
+TIME = np.arange(1000) * PERIOD
 COMMAND = 20.0 * np.sin(2 * np.pi * 1.1 * TIME) + 12.0 * np.sin(2 * np.pi * 2.3 * TIME)
 MOTION = 0.1 * np.sin(2 * np.pi * 0.9 * TIME) + 0.03 * np.sin(2 * np.pi * 2.7 * TIME)
 FRICTION = {"coulomb": 4.0, "viscous": 6.0, "stiffness": 150.0}
@@ -76,7 +76,7 @@ def rms(signal: Array) -> float:
     return float(np.sqrt(np.mean(signal**2)))
 
 
-@pytest.mark.parametrize("sort", ["slide", "pendulum"])
+@pytest.mark.parametrize("sort", ["slide", pytest.param("pendulum", marks=pytest.mark.slow)])
 def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
     machine = described(tmp_path, sort)
     column = {"/command": {"force": COMMAND}, "/sensor": {"position": np.zeros_like(TIME)}}

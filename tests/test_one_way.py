@@ -17,7 +17,7 @@ from rigtwin.diagnosis.space import Space
 from rigtwin.models.choose import model_of
 from tests.helpers.described import TOML, described, recording_of
 
-SHORT = {"timing": {"duration": 4}}
+SHORT = {"timing": {"duration": 3}}
 
 
 def rig_named(folder: Path, name: str, **replaced: str) -> rigtwin.Machine:
@@ -68,7 +68,7 @@ def test_a_described_mass_is_the_mass_everywhere(tmp_path: Path):
 
 LVDT = TOML.replace("effects = []", 'type = "lvdt"')
 PLAIN = TOML.replace("effects = []", 'type = "position sensor"\nwhite = 6e-5')
-TIME = np.arange(8000) * 1e-3
+TIME = np.arange(5000) * 1e-3
 PUSH = np.asarray(sum(8.0 * np.sin(2 * np.pi * f * TIME + f) for f in (0.23, 0.61, 1.13, 1.9, 3.1)))
 COARSE = 9e-4
 """m, rms: fifteen times what is declared."""
@@ -91,7 +91,11 @@ def test_a_joints_sensor_of_declared_noise_is_no_finding(tmp_path: Path, toml: s
 
 @pytest.mark.parametrize(
     ("sort", "share", "unit", "toml"),
-    [("slide", 1.0, "m", LVDT), ("slide", 1.0, "m", PLAIN), ("pendulum", 0.04, "rad", PLAIN)],
+    [
+        pytest.param("slide", 1.0, "m", LVDT, marks=pytest.mark.slow),
+        ("slide", 1.0, "m", PLAIN),
+        ("pendulum", 0.04, "rad", PLAIN),
+    ],
     ids=["lvdt", "position sensor", "turning"],
 )
 def test_coarse_noise_of_a_joints_sensor_is_named(

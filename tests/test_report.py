@@ -27,11 +27,11 @@ VERDICTS = ("explained", "unknown", "no gap", "unusable")
 def outcomes() -> dict[str, Diagnosis]:
     """Of a twin with more dry friction than told; of one whose load cell drifts, which is no effect
     of the library; of one as told; of one with a sensor in mm."""
-    sound = recorded("imposed", seconds=5.0)
+    sound = recorded("imposed", seconds=3.5)
     load_cell = sound.column("/sensor", "load_cell") + 4.0 * sound.time
     travel = 1e3 * sound.column("/sensor", "suspension_lvdt")
     return {
-        "explained": answer(recorded("imposed", ("coulomb@rail=75",), 5.0)),
+        "explained": answer(recorded("imposed", ("coulomb@rail=75",), 3.5)),
         "unknown": answer(replace_sensors(sound, load_cell=load_cell)),
         "no gap": answer(sound),
         "unusable": answer(replace_sensors(sound, suspension_lvdt=travel)),

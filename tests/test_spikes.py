@@ -59,6 +59,7 @@ def test_finds_the_friction_and_every_reversal(calibration):
         assert low <= getattr(calibration.settings, name) <= high
 
 
+@pytest.mark.slow
 def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
     """The thesis' goals on another road: 37 % less e1 + e2, half the spike; and the observer beats
     it."""

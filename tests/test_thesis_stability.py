@@ -100,6 +100,7 @@ def test_the_quarter_car_disagrees_where_the_thesis_contradicts_itself_alone(qua
     assert all(entry.note for entry in quarter if not entry.agrees)
 
 
+@pytest.mark.slow
 def test_root_loci_disagree_where_a_lag_is_misprinted(loci):
     known = [
         ("Figure A1.21", "larger lag, case 1, τ = 0.0333 s"),
@@ -121,6 +122,7 @@ def test_root_loci_disagree_where_a_lag_is_misprinted(loci):
     assert share(loci) == "156 of 182"
 
 
+@pytest.mark.slow
 def test_with_the_lag_that_was_meant_every_statement_of_those_sections_holds(loci):
     meant = [entry for entry in loci if entry.what.endswith("τ = 0.0333 s")]
     assert len(meant) > 12

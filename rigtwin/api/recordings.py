@@ -10,8 +10,6 @@ from rigtwin.api.machines import machine, machine_of
 from rigtwin.description.machine import Machine
 from rigtwin.importing.convert import convert
 from rigtwin.recording import export, reader
-from rigtwin.render.plot import draw
-from rigtwin.render.video import film
 
 
 @dataclass(frozen=True)
@@ -47,6 +45,8 @@ class Recording(reader.Recording):
         RigtwinError
             For another ending or an empty stretch.
         """
+        from rigtwin.render.plot import draw  # Late: matplotlib takes a second.
+
         draw(self, Path(out), start, until)
         return Path(out)
 
@@ -65,6 +65,8 @@ class Recording(reader.Recording):
         RigtwinError
             If this computer cannot draw, or the file cannot be written.
         """
+        from rigtwin.render.video import film  # Late: so does scipy.signal.
+
         film(self, Path(out), machine_of(self), **options)
         return Path(out)
 

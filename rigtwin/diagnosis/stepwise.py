@@ -72,6 +72,17 @@ class Growth:
         """The fits less those in which a simpler effect would do as well."""
         return drop_needless(fits, self.least, self.thresholds)
 
+    def leaves_noise(self, fits: Sequence[Fit]) -> bool:
+        """Whether one of them, with a parameter an effect, leaves less than any further effect must
+        explain: then nothing as simple remains to be tried."""
+        enough = self.thresholds.second * self.least
+        expected = self.fitter.evidence.expected_misfit
+        return any(
+            _count_parameters(fit) == len(fit.effects)
+            and fit.misfit - expected(fit.plant) < enough
+            for fit in fits
+        )
+
 
 def fit_stepwise(singles: Sequence[Fit], growth: Growth, threads: Threads) -> list[Fit]:
     """Adds one effect after another to the best explanations.
@@ -90,10 +101,10 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, threads: Threads) -> li
     list of Fit
         Of two effects and more.
     """
-    found = _fit_regulars(growth, threads)
     level = sorted(growth.drop_needless(singles), key=growth.cost)
+    found = [] if growth.leaves_noise(level) else _fit_regulars(growth, threads)
     costs: list[float] = []
-    while level:
+    while level and not growth.leaves_noise(level):
         costs.append(min(growth.judge.cost(fit) for fit in level[:LEADERS]))
         if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
             # What is held out asks for no more.

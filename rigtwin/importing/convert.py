@@ -6,7 +6,6 @@ import difflib
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.mapping import Map, Source, load
@@ -265,6 +264,8 @@ def _resample(
 
     Smoothed first where that is longer, so that nothing is aliased.
     """
+    from scipy.signal import butter, sosfiltfilt  # Late: it takes a second.
+
     ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
     found = {}
     for channel, values in signals.items():

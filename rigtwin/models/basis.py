@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
@@ -63,6 +62,8 @@ def low_pass(signal: Array, time_constant: float, period: float) -> Array:
     """
     share = period / (time_constant + period)
     start = [(1.0 - share) * signal[0]]
+    from scipy.signal import lfilter  # Late: it takes a second.
+
     out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=start)
     return np.asarray(out)
 
