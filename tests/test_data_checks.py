@@ -62,7 +62,7 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
 @pytest.mark.parametrize("name", once_a_sort([e.name for e in candidates(RigPlant())]))
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]
-    configuration = experiment.configuration._replace(timing=Timing(duration=3.0))
+    configuration = experiment.configuration._replace(timing=Timing(duration=2.0))
     record(
         tmp_path / "e.mcap",
         "imposed",

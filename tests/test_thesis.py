@@ -171,30 +171,15 @@ def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
         "--draw",
         str(tmp_path / "figures"),
     ]
-    assert (
-        main(["reproduce", "table-3.5", "--seeds", "1", "--folder", str(tmp_path / "kept"), *out])
-        == 0
-    )
+    kept = ["--seeds", "1", "--workers", "1", "--folder", str(tmp_path / "kept")]
+    assert main(["reproduce", "table-3.5", *kept, *out]) == 0
     printed = capsys.readouterr().out
     assert "Table 3.5" in printed
     assert "12 of 12" in printed
     assert "Table 3.4" not in printed
     assert json.loads((tmp_path / "p.json").read_text())["tables"][0]["agree"] == "12 of 12"
-    assert (
-        main(
-            [
-                "reproduce",
-                "figure-3.18",
-                "--seeds",
-                "1",
-                "--folder",
-                str(tmp_path / "kept"),
-                "--draw",
-                str(tmp_path / "f"),
-            ]
-        )
-        == 0
-    )
+    drawn = [*kept, "--draw", str(tmp_path / "f")]
+    assert main(["reproduce", "figure-3.18", *drawn]) == 0
     (picture,) = (tmp_path / "f").iterdir()
     assert imread(picture).std() > 0.05
 

@@ -131,6 +131,7 @@ def test_with_the_lag_that_was_meant_every_statement_of_those_sections_holds(loc
     ]
 
 
+@pytest.mark.slow
 def test_crossings_found(loci):
     found = {(entry.where, entry.what): entry.ours for entry in loci}
     assert (
@@ -156,6 +157,7 @@ def test_table_6_1():
     ]
 
 
+@pytest.mark.slow
 def test_every_table_and_figure_is_covered(single, quarter, loci):
     for module, entries in (
         (single_mass_stability, single),
