@@ -62,7 +62,7 @@ def answered(truth: ActuatorTruth | DamperTruth) -> Diagnosis:
     return diagnose(find(recording.machine), [recording])
 
 
-CONTAINED = ("lag", "two lags", "spring", "play", "one way", "lag and delay")
+CONTAINED = ("lag", "two lags", "resonance", "spring", "play", "one way", "lag and delay")
 """In another of them, or as long."""
 
 

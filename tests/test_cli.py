@@ -191,19 +191,11 @@ def test_ctrl_c_leaves_a_readable_recording_and_one_line(tmp_path):
     assert recording.notes == ()
 
 
-def test_progress_is_shown_on_a_terminal_only(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "rigtwin.cli",
-        "run",
-        "drop",
-        "--out",
-        str(tmp_path / "p.mcap"),
-        *QUICK,
-    ]
-    quiet = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert quiet.stderr == ""
+def test_progress_is_shown_on_a_terminal_only(tmp_path, capsys):
+    run = ["run", "drop", "--out", str(tmp_path / "p.mcap"), *QUICK]
+    assert main(run) == 0
+    assert capsys.readouterr().err == ""
+    command = [sys.executable, "-m", "rigtwin.cli", *run]
     controller, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     subprocess.run(command, stderr=terminal, stdout=subprocess.DEVNULL, check=True)

@@ -21,7 +21,7 @@ from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
-from tests.helpers.effects import once_a_sort, text
+from tests.helpers.effects import once_a_component, text
 from tests.helpers.recordings import SHIPPED, beside, replace_sensors, shipped
 from tests.helpers.twin import RIG, rig_effect
 
@@ -212,7 +212,7 @@ LEFT_OVER = {
 
 @pytest.mark.parametrize(
     "name",
-    once_a_sort([e.name for e in candidates(RigPlant()) if e.kind.name != "quantisation"]),
+    once_a_component([e.name for e in candidates(RigPlant()) if e.kind.name != "quantisation"]),
 )
 def test_a_twin_with_the_effect_explains_a_rig_with_it(name):
     """The law behind every diagnosis: record with an effect, replay with the same effect, and noise

@@ -298,6 +298,7 @@ def test_regions_are_told_apart():
     )
 
 
+@SLOW
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",), 4.0))
     fitter = Fitter(evidence)

@@ -94,7 +94,7 @@ def test_a_joints_sensor_of_declared_noise_is_no_finding(tmp_path: Path, toml: s
     [
         pytest.param("slide", 1.0, "m", LVDT, marks=pytest.mark.slow),
         ("slide", 1.0, "m", PLAIN),
-        ("pendulum", 0.04, "rad", PLAIN),
+        pytest.param("pendulum", 0.04, "rad", PLAIN, marks=pytest.mark.slow),
     ],
     ids=["lvdt", "position sensor", "turning"],
 )

@@ -62,7 +62,13 @@ def measured(configuration: Configuration) -> float:
     return math.log(early / late) / (2 * quarter * period)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in ("late computer", "skyhook") else pytest.mark.slow)
+        for name in CASES
+    ],
+)
 def test_it_decays_as_the_twin_does(name):
     configuration = free(CASES[name])
     assert decay(configuration) == pytest.approx(measured(configuration), rel=0.04, abs=0.008)

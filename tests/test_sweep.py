@@ -348,6 +348,7 @@ def test_a_worker_with_other_sources_is_refused():
         _run_if_same("0" * 12, square, 2)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_not_there_is_one_line():
     pytest.importorskip("distributed")
     with pytest.raises(RigtwinError, match="no cluster at"):

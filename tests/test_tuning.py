@@ -614,7 +614,7 @@ def test_settings_that_should_not_be_used_are_said_and_end_with_another_code(tmp
     text = SMALL.replace("[50.0, 1500.0]", "[1.0, 20.0]")
     text = text.replace("limits = 0.9", "limits = 0.9\nroad_holding = 100.0")
     text += '\n[judge."$x_{$ no tyre to speak of"]\n"tyre.stiffness" = 500000.0\n'
-    assert tune(tmp_path, text=text) == 4
+    assert tune(tmp_path, "--evaluations", "8", text=text) == 4
     printed = capsys.readouterr().out
     assert "but no objective is certainly better than before" in printed
     assert "controller.skyhook_damping is 200 before, outside the bounds 1 to 20" in printed

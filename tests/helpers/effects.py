@@ -80,3 +80,13 @@ def once_a_sort(names: Sequence[str]) -> list[object]:
         return f"{kind}@{ALIKE.get(component)}" in names
 
     return [pytest.param(name, marks=pytest.mark.slow if repeats(name) else ()) for name in names]
+
+
+def once_a_component(names: Sequence[str]) -> list[object]:
+    """Parameters of a test: the first kind of every component; the others are left to the slow
+    tests."""
+    first = {name.partition("@")[2]: name for name in reversed(names)}
+    return [
+        pytest.param(name, marks=() if name in first.values() else pytest.mark.slow)
+        for name in names
+    ]
