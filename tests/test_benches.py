@@ -186,7 +186,9 @@ def test_cases_are_drawn_the_same_again_and_hold_every_sort():
 @pytest.mark.slow
 def test_emps_on_its_held_out_recording(tmp_path: Path):
     for data, name in (("DATA_EMPS", "emps"), ("DATA_EMPS_PULSES", "emps_pulses")):
-        convert(EMPS / f"{data}.mat", SHIPPED / "maps" / f"{name}.toml", tmp_path / f"{name}.mcap")
+        convert(
+            [EMPS / f"{data}.mat"], SHIPPED / "maps" / f"{name}.toml", tmp_path / f"{name}.mcap"
+        )
     machine = find("emps")
     fitted, held_out = (load(tmp_path / f"{name}.mcap") for name in ("emps", "emps_pulses"))
     found = diagnose(machine, [fitted], held_out=[held_out])

@@ -3,6 +3,7 @@ mistake is one line."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from scipy.io import savemat
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
-from rigtwin.importing.table import find_layout, read
+from rigtwin.importing.table import read
+from rigtwin.importing.text import find_layout
 from rigtwin.importing.units import UNITS, unit_of
 from rigtwin.recording import load
 
@@ -43,7 +45,7 @@ def text(
 def imported(folder: Path, data: str | bytes, map_text: str = MAP, name: str = "data.csv"):
     (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
     (folder / "map.toml").write_text(map_text)
-    report = convert(folder / name, folder / "map.toml", folder / "out.mcap")
+    report = convert([folder / name], folder / "map.toml", folder / "out.mcap")
     return load(folder / "out.mcap"), report
 
 
@@ -122,14 +124,14 @@ def test_matlab_files(tmp_path: Path):
         {"t": TIME[:, None], "x": POSITION[:, None], "f": FORCE[:, None], "gain": 3.0},
     )
     (tmp_path / "map.toml").write_text(MAP)
-    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    convert([tmp_path / "data.mat"], tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
     savemat(tmp_path / "data.mat", {"log": {"t": TIME, "both": np.column_stack([POSITION, FORCE])}})
     names = (
         MAP.replace('"t"', '"log.t"').replace('"x"', '"log.both:1"').replace('"f"', '"log.both:2"')
     )
     (tmp_path / "map.toml").write_text(names)
-    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    convert([tmp_path / "data.mat"], tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
 
 
@@ -141,7 +143,7 @@ def test_matlab_v73(tmp_path: Path):
     with (tmp_path / "data.mat").open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
     (tmp_path / "map.toml").write_text(MAP.replace('column = "f"', 'column = "s.f"'))
-    convert(tmp_path / "data.mat", tmp_path / "map.toml", tmp_path / "out.mcap")
+    convert([tmp_path / "data.mat"], tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
 
 
@@ -153,8 +155,165 @@ def test_parquet(tmp_path: Path):
         pyarrow.table({"t": TIME, "x": POSITION, "f": FORCE}), tmp_path / "data.parquet"
     )
     (tmp_path / "map.toml").write_text(MAP)
-    convert(tmp_path / "data.parquet", tmp_path / "map.toml", tmp_path / "out.mcap")
+    convert([tmp_path / "data.parquet"], tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
+
+
+WORDS = [
+    f"{line},{word}"
+    for line, word in zip(text().splitlines()[1:], ["RUN", "hold"] * 150, strict=True)
+]
+
+
+def with_time(stamps: list[str], names: str = "t,x,f") -> str:
+    """The data with other time cells."""
+    rows = [line.split(",", 1)[1] for line in text().splitlines()[1:]]
+    return "\n".join([names, *(f"{s},{row}" for s, row in zip(stamps, rows, strict=True))]) + "\n"
+
+
+def test_columns_of_words_are_left_out(tmp_path: Path):
+    recording, report = imported(tmp_path, "\n".join(["t,x,f,state", *WORDS]))
+    assert_right(recording)
+    assert "words in state" in report[0]
+
+
+def test_rows_that_break_off_are_said(tmp_path: Path):
+    cut = text(names="t,x,f,u").splitlines()
+    cut = [cut[0], *(f"{line},{n}" for n, line in enumerate(cut[1:]))]
+    cut[100] = cut[100].rpartition(",")[0]
+    cut[200] += ",operator looked away"
+    recording, report = imported(tmp_path, "\n".join([*cut, "0.6,2"]))
+    assert_right(recording)
+    said = "\n".join(report)
+    assert "the last line, 302, breaks off and is left out" in said
+    assert "1 lines break off, the first is 101" in said
+    assert "1 lines have words after their last cell, the first is 201" in said
+
+
+CLOCKS = [f"{int(t) // 60:02d}:{t % 60:07.4f}" for t in TIME]
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        [f"22.11.2026 10:{clock}" for clock in CLOCKS],
+        [f"11/22/2026 10:{clock} PM" for clock in CLOCKS],
+        [f"22/11/2026 10:{clock}" for clock in CLOCKS],
+        [f"2026/11/22 10:{clock}" for clock in CLOCKS],
+        [f"22-Nov-2026 10:{clock}" for clock in CLOCKS],
+        [f"2026-11-22T10:{clock}+02:00" for clock in CLOCKS],
+        [f"10:{clock} am" for clock in CLOCKS],
+        [f"{'23:59' if t < 0.1 else '00:00'}:{(59.9 + t) % 60.0:07.4f}" for t in TIME],
+        [
+            f"2026-0{2 if t < 0.1 else 3}-{28 if t < 0.1 else 1:02d} "
+            f"{'23:59' if t < 0.1 else '00:00'}:{(59.9 + t) % 60.0:07.4f}"
+            for t in TIME
+        ],
+        [
+            f"{'12/3' if t < 0.1 else '12/4'}/2026 "
+            f"{'23:59' if t < 0.1 else '00:00'}:{(59.9 + t) % 60.0:07.4f}"
+            for t in TIME
+        ],
+    ],
+    ids=range(10),
+)
+def test_dates_however_they_are_written(tmp_path: Path, stamps: list[str]):
+    assert_right(imported(tmp_path, with_time(stamps))[0])
+
+
+def test_a_date_and_a_time_in_two_columns(tmp_path: Path):
+    stamps = [f"22.11.2026,10:{clock}" for clock in CLOCKS]
+    two = MAP.replace('column = "t"', 'column = ["day", "clock"]')
+    assert_right(imported(tmp_path, with_time(stamps, "day,clock,x,f"), two)[0])
+
+
+RECORDS = [{"t": t, "x": x, "f": f} for t, x, f in zip(TIME, POSITION, FORCE, strict=True)]
+NESTED = [{"t": r["t"], "at": {"x": r["x"]}, "f": [r["f"], 0], "on": "yes"} for r in RECORDS]
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "changes"),
+    [
+        ("a.json", json.dumps(RECORDS), {}),
+        ("a.json", json.dumps({"rig": "one", "kp": 3, "entries": RECORDS}), {}),
+        ("a.json", json.dumps({key: [r[key] for r in RECORDS] for key in "txf"}), {}),
+        ("a.jsonl", "\n".join(map(json.dumps, RECORDS)), {}),
+        ("a.json", json.dumps(NESTED), {'"x"': '"at.x"', '"f"': '"f:1"'}),
+    ],
+    ids=["records", "inside", "lists", "lines", "nested"],
+)
+def test_json(tmp_path: Path, name: str, data: str, changes: dict[str, str]):
+    changed = MAP
+    for old, new in changes.items():
+        changed = changed.replace(f"column = {old}", f"column = {new}")
+    assert_right(imported(tmp_path, data, changed, name)[0])
+
+
+def test_a_counter_that_wraps_around(tmp_path: Path):
+    """16 bits, unsigned, about zero: and what the import says if the map does not."""
+    counts = np.round(50.0 * POSITION).astype(int) % 65536
+    rows = [f"{t},{n},{f}" for t, n, f in zip(TIME, counts, FORCE, strict=True)]
+    data = "\n".join(["t,x,f", *rows])
+    wraps = MAP.replace('unit = "mm"', 'unit = "mm", scale = 0.02, wrap = 65536')
+    recording, _ = imported(tmp_path, data, wraps)
+    found = recording.column("/sensor", "displacement")
+    np.testing.assert_allclose(found, 1e-3 * POSITION, atol=1.1e-5)
+    _, report = imported(tmp_path, data)
+    assert any("say wrap = 65536" in line for line in report)
+
+
+DERIVED = """
+machine = "bench"
+[time]
+column = "t"
+[columns]
+travel = { column = "x", unit = "mm" }
+load = "f"
+[constants]
+mass = 2.5
+[channels]
+"/sensor.position" = { column = "x", unit = "mm" }
+"/sensor.velocity" = { formula = "derivative(travel)" }
+"/command.force" = { formula = "load - mass * derivative(derivative(travel))" }
+"/command.mean" = { formula = "mean(load, 5) + 0 * f" }
+"""
+
+
+def test_channels_are_worked_out_without_lateness(tmp_path: Path):
+    recording, _ = imported(tmp_path, text(), DERIVED)
+    inside = slice(3, -3)
+    velocity, force, mean = (
+        recording.column(topic, name)[inside]
+        for topic, name in (("/sensor", "velocity"), ("/command", "force"), ("/command", "mean"))
+    )
+    # x = 20 mm sin 8t, f = 150 N cos(8t + 2) + 3 N.
+    np.testing.assert_allclose(velocity, 0.16 * np.cos(8.0 * TIME)[inside], atol=2e-5)
+    inertia = -2.5 * 1.28 * np.sin(8.0 * TIME)
+    np.testing.assert_allclose(force, (FORCE - inertia)[inside], atol=1e-3)
+    np.testing.assert_allclose(mean, FORCE[inside], atol=0.05)
+
+
+def test_files_side_by_side(tmp_path: Path):
+    """Two files whose columns have the same names, as an arm's positions and currents."""
+    for name, column in (("pos", POSITION), ("curr", FORCE)):
+        (tmp_path / f"{name}.csv").write_text("J1\n" + "\n".join(f"{v:.6f}" for v in column))
+    both = """
+machine = "bench"
+[time]
+period = 0.002
+[columns]
+p = { column = "pos.J1", unit = "mm" }
+[channels]
+"/sensor.displacement" = { formula = "p / 1" }
+"/sensor.force" = { column = "curr.J1", unit = "N" }
+"""
+    (tmp_path / "map.toml").write_text(both)
+    files = [tmp_path / "pos.csv", tmp_path / "curr.csv"]
+    convert(files, tmp_path / "map.toml", tmp_path / "out.mcap")
+    assert_right(load(tmp_path / "out.mcap"))
+    files[1].write_text("J1\n1\n2\n3\n4\n5\n6\n")
+    with pytest.raises(RigtwinError, match="same rows; they have: pos 300, curr 6"):
+        convert(files, tmp_path / "map.toml", tmp_path / "out.mcap")
 
 
 def test_what_is_odd_is_said(tmp_path: Path):
@@ -194,8 +353,9 @@ BAD_DATA = [
     ("hello\nworld\n", "no lines of numbers"),
     (text(names="t,y,f"), "no column 'x'; there are t, y, f"),
     (text(names="t,x,x"), "two columns are named 'x'"),
-    (text() + "1,2\n", "line 302 has 2 cells; expected 3"),
-    (text() + "1,two,3\n", "line 302: two; expected numbers"),
+    (text() + "1,2,3,4\n", "line 302 has 4 cells; expected 3"),
+    (text() + "0.6,two,3\n", "is not a number in 1 rows, the first at 0.6 s ('two' in line 302)"),
+    (text() + "late,2,3\n", "time column 't' is not a number in 'late' in line 302"),
     (text() + "0.6,,3\n", "is not a number in 1 rows, the first at 0.6 s"),
     (text() + "0.1,2,3\n", "time goes back in row 301"),
     (text() + "0.5980,2,3\n", "has the same time as the one before"),
@@ -223,6 +383,16 @@ BAD_MAPS = [
     (MAP.replace('unit = "mm"', "scal = 2"), "unknown key 'scal'"),
     (MAP.replace('"/sensor.force"', '"force"'), 'expected "/command.NAME"'),
     (MAP.split("[channels]")[0], "[channels] is missing"),
+    (MAP + '"/sensor.a" = { formula = "2 * y" }', "no column 'y'; there are t, x, f"),
+    (MAP + '"/sensor.a" = { formula = "2 *" }', "is no formula"),
+    (MAP + '"/sensor.a" = { formula = "3.0" }', "it names no column"),
+    (MAP + '"/sensor.a" = { formula = "x", unit = "mm" }', "unit goes with a column"),
+    (MAP + '"/sensor.a" = { formula = "1 / (x - x)" }', "is not a number at 0 s"),
+    (MAP + '[columns]\n"a b" = "x"', "'a b': expected a name of letters"),
+    (MAP + '[columns]\na = "x"\n[constants]\na = 1', "[columns] has that name too"),
+    (MAP + "[constants]\na = 'x'", "[constants] a = 'x': expected a number"),
+    (MAP.replace('unit = "mm"', "wrap = 1"), "wrap = 1: expected a number from 2"),
+    (MAP.replace('column = "t"', "column = 3"), "a date's and a time's"),
     (MAP.replace('column = "x", unit = "mm"', ""), "either column"),
     (MAP + "[controller]\nkp = [1]\n", "a table of settings"),
     ("machine = ", "not valid TOML"),
@@ -260,6 +430,19 @@ def test_every_unit_has_an_si_unit_that_is_one_itself():
         assert factor > 0.0
         assert UNITS[base] == (base, 1.0), name
     assert unit_of("[mm]") == ("m", 1e-3)
+    for text, (base, factor) in {
+        "kip": ("N", 4448.2216152605),
+        "KIPS": ("N", 4448.2216152605),
+        "Degrees": ("rad", np.pi / 180.0),
+        "RPM": ("rad/s", np.pi / 30.0),
+        "N·m": ("Nm", 1.0),
+        "lbf-in": ("Nm", 0.0254 * 4.4482216152605),
+        "oz.in": ("Nm", 0.0254 * 4.4482216152605 / 16.0),
+    }.items():
+        assert unit_of(text) == (base, pytest.approx(factor))
+    for ambiguous in ("Mm", "MM", "ma"):
+        with pytest.raises(RigtwinError, match="unknown unit"):
+            unit_of(ambiguous)
 
 
 def test_thousands_are_no_columns():

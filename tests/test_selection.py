@@ -3,22 +3,17 @@ to."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from rigtwin.components import Guide
 from rigtwin.components.guide import resists
 from rigtwin.description.catalogue import find
-from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import Judged
-from rigtwin.diagnosis.selection import choose
+from rigtwin.diagnosis.selection import choose, conclude
 from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.models.start import fit_start, read_start
-from rigtwin.recording import Recording
 
 TIME = np.arange(400) * 5e-3
 
@@ -74,12 +69,12 @@ def explain(error: float, *names: str) -> Judged:
     return Judged(fit, np.full((2, 40), error**2), widths, 1e-12, 200.0, float(len(effects)))
 
 
+def kinds(judged: Judged) -> set[str]:
+    return {effect.kind.name for effect in judged.fit.effects}
+
+
 def chosen(*pool: Judged) -> set[str]:
-    data = {"displacement": 0.01 * np.sin(30.0 * TIME), "force": np.cos(30.0 * TIME)}
-    recording = Recording(Path("bench"), DAMPER.name, "", 5e-3, TIME, {"/sensor": data}, {})
-    fitter = Fitter(Evidence(DAMPER, [recording], [DAMPER.configuration_of(recording)]))
-    found = choose(pool, fitter, SelectionRules())
-    return {effect.kind.name for effect in found.fit.effects}
+    return kinds(choose(pool, DAMPER.plant, SelectionRules()))
 
 
 def test_the_simplest_of_those_that_do_as_well_is_chosen():
@@ -95,6 +90,27 @@ def test_what_few_machines_have_must_account_for_much():
     assert chosen(none, rough, explain(0.2, "coulomb", "backlash")) == {"coulomb", "backlash"}
     # A difference that is no part of the signals to speak of, but leaves a fifth.
     assert chosen(none, one, explain(0.008, "coulomb", "backlash")) == {"coulomb", "backlash"}
+
+
+def test_recordings_that_nothing_was_fitted_to_count_as_much_as_the_others():
+    none, first, second = explain(1.0), explain(0.1, "coulomb"), explain(0.15, "viscous")
+    more = explain(0.09, "coulomb", "stiffness")
+    found = conclude([none, first, second, more], DAMPER.plant, SelectionRules())
+    assert kinds(found.chosen) == {"coulomb"}
+
+    def errors(fit: Fit) -> np.ndarray:
+        left = {"viscous": 0.15, "coulomb": 0.6, "stiffness": 0.01}
+        return np.full(2, left[fit.effects[-1].kind.name] if fit.effects else 1.0)
+
+    # What has more parameters than the search asked for is no finding of other recordings.
+    assert kinds(found.beside(errors).chosen) == {"viscous"}
+    assert kinds(found.beside(lambda fit: np.full(2, 0.1)).chosen) == {"coulomb"}
+
+
+def test_what_runs_to_a_bound_on_all_ticks_is_not_chosen():
+    none, first, second = explain(1.0), explain(0.1, "coulomb"), explain(0.15, "viscous")
+    found = conclude([none, first, second], DAMPER.plant, SelectionRules())
+    assert kinds(found.without(found.chosen).chosen) == {"viscous"}
 
 
 def swing(start: tuple[float, float]) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -106,15 +107,17 @@ def faced(plain: reader.Recording, described: Machine | None) -> Recording:
     )
 
 
-def import_data(data: str | Path, mapping: str | Path, out: str | Path) -> Recording:
+def import_data(
+    data: str | Path | Sequence[str | Path], mapping: str | Path, out: str | Path
+) -> Recording:
     """Makes a recording of another program's data.
 
     Parameters
     ----------
     data
-        A csv, mat or parquet file.
+        A csv, json, mat or parquet file, or several that are put side by side, row by row.
     mapping
-        A TOML file that says which column is which channel, docs/tutorial.md.
+        A TOML file that says which column is which channel, docs/machines.md.
     out
         The recording, an MCAP file.
 
@@ -123,5 +126,6 @@ def import_data(data: str | Path, mapping: str | Path, out: str | Path) -> Recor
     RigtwinError
         Naming the column, unit or line that is at fault.
     """
-    report = convert(Path(data), Path(mapping), Path(out))
+    files = [data] if isinstance(data, str | Path) else data
+    report = convert([Path(each) for each in files], Path(mapping), Path(out))
     return replace(load(out), report=tuple(report))

@@ -4,7 +4,7 @@ how sure that is."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
+from rigtwin.diagnosis.held_out_judge import HeldOutJudge
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.selection import Selection, select
@@ -234,11 +234,20 @@ def _attribute_rough(
         search.effects,
         search.threads,
     )
-    if selection.chosen.fit.effects:
-        settled = final.refit_with_tolerances(selection.chosen.fit)
-        selection = selection.replace_chosen(settled)
+    selection = _settle(selection, final)
     chain = _nest(search.fitter, selection)
     return _conclude_rough(final, search.least, thresholds, selection, chain, silent)
+
+
+def _settle(selection: Selection, final: Fitter) -> Selection:
+    """The chosen explanation fitted to all ticks; if a value runs to a bound there, another is
+    chosen."""
+    while selection.chosen.fit.effects:
+        settled = final.refit_with_tolerances(selection.chosen.fit)
+        if not final.is_bounded(settled):
+            return selection.replace_chosen(settled)
+        selection = selection.without(selection.chosen)
+    return selection
 
 
 def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
@@ -370,9 +379,14 @@ def _conclude_rough(
     )
 
 
-def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) -> Attribution:
-    """Of explanations of a rough model that do equally well, the one that does best on recordings
-    that none of them was chosen by.
+def prefer_held_out(
+    found: Attribution,
+    evidence: Evidence,
+    held_out: Evidence,
+    thresholds: Thresholds = STANDARD,
+) -> Attribution:
+    """Of explanations of a rough model the one that does best on all recordings, those among them
+    that none was fitted to.
 
     Parameters
     ----------
@@ -382,6 +396,8 @@ def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) 
         By which.
     held_out
         Other recordings.
+    thresholds
+        What figures are held against.
 
     Returns
     -------
@@ -390,30 +406,14 @@ def prefer_held_out(found: Attribution, evidence: Evidence, held_out: Evidence) 
     """
     if found.selection is None or found.best is None:
         return found
-    selection = found.selection
-
-    def cost(each: Judged) -> float:
-        power = relative_errors(held_out, each.fit.plant) ** 2 + each.floor**2
-        return float(0.5 * np.mean(np.log(power))) + selection.price * each.size
-
-    best = min((selection.chosen, *selection.alike), key=cost)
-    if best is found.selection.chosen:
+    selection = found.selection.beside(lambda fit: relative_errors(held_out, fit.plant))
+    if selection.chosen.fit is found.selection.chosen.fit:
         return found
-    fit = Fitter(evidence).refit_with_tolerances(best.fit)
-    foremost = replace(found.best, fit=fit, price=best.score)
-    ahead = [foremost, *(each for each in found.ranking if each.fit is not best.fit)]
-    likely = sorted((each.probability for each in ahead), reverse=True)
-    ranking = tuple(
-        replace(each, probability=probability)
-        for each, probability in zip(ahead, likely, strict=True)
-    )
-    return replace(
-        found,
-        best=ranking[0],
-        ranking=ranking,
-        shares=_shares(fit, evidence, found.explained),
-        selection=found.selection.prefer(best, fit),
-    )
+    final = Fitter(evidence)
+    selection = _settle(selection, final)
+    chain = _nest(final, selection)
+    least = detection_limit(evidence, thresholds)
+    return _conclude_rough(final, least, thresholds, selection, chain, found.silent)
 
 
 def _nest(fitter: Fitter, selection: Selection) -> list[Fit]:

@@ -147,7 +147,7 @@ def _diagnose(
 ) -> Diagnosis:
     found = attribute(evidence, lambda steps: progress("fitting effects", steps), thresholds)
     if held_out is not None:
-        found = prefer_held_out(found, evidence, held_out)
+        found = prefer_held_out(found, evidence, held_out, thresholds)
     best = (
         found.best.fit
         if found.best is not None

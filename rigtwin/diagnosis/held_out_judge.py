@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,12 @@ class Judged:
             change = own / one - foreign / two
             total += 0.25 * float(np.mean(change**2)) / max(len(own) - 1, 1)
         return math.sqrt(total) / len(self.power)
+
+    def beside(self, errors: Array) -> Judged:
+        """The same, judged on further recordings too, shape (recordings,): what it leaves of each,
+        in units of the signals' own."""
+        blocks = np.tile(np.square(errors)[:, None], (1, self.power.shape[1]))
+        return replace(self, power=np.concatenate([self.power, blocks]))
 
     def is_stable(self, nominal: Sequence[float], least: float) -> bool:
         """Whether the magnitude of each effect is off nominal by that many standard errors."""

@@ -9,7 +9,7 @@ do as well as the best, the one with the fewest parameters is taken.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from rigtwin.components import Effect, measures
@@ -21,6 +21,7 @@ from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.proposals import propose_replacements
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import SelectionRules
+from rigtwin.numerics.arrays import Array
 
 SHAKES, SHAKEN, PRICE = (0.6, 1.6), 2, 0.1
 """Shares of a magnitude from which explanations are fitted again, how many of them, and at what
@@ -85,21 +86,38 @@ class Selection:
         pool = tuple(chosen if each is self.chosen else each for each in self.pool)
         return replace(self, chosen=chosen, pool=pool)
 
-    def prefer(self, other: Judged, fit: Fit) -> Selection:
-        """The same with one that does as well, fitted again, in the place of the chosen one."""
-        alike = (self.chosen, *(each for each in self.alike if each is not other))
-        return replace(self, chosen=other, alike=alike).replace_chosen(fit)
+    def beside(self, errors: Callable[[Fit], Array]) -> Selection:
+        """What is chosen where further recordings count as much as those that were fitted.
+
+        Nothing of more parameters than before: what the search did not ask for is no finding.
+
+        Parameters
+        ----------
+        errors
+            What a fit leaves of each of them, in units of the signals' own, shape (recordings,).
+        """
+        pool = [
+            each.beside(errors(each.fit))
+            for each in self.pool
+            if each is self.chosen or each.size <= self.chosen.size
+        ]
+        return conclude(pool, self.nominal, self.rules)
+
+    def without(self, judged: Judged) -> Selection:
+        """What is chosen if one explanation stands at a bound."""
+        pool = [replace(each, bounded=True) if each is judged else each for each in self.pool]
+        return conclude(pool, self.nominal, self.rules)
 
 
-def choose(pool: Sequence[Judged], fitter: Fitter, rules: SelectionRules) -> Judged:
+def choose(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Judged:
     """The explanation that does best at a price for each parameter.
 
     Parameters
     ----------
     pool
         All that were judged, the empty one among them.
-    fitter
-        Of the evidence.
+    plant
+        Without any effect.
     rules
         What "as well" means.
 
@@ -114,7 +132,7 @@ def choose(pool: Sequence[Judged], fitter: Fitter, rules: SelectionRules) -> Jud
         if not each.cancels
         and not each.bounded
         and each.is_stable(
-            [e.nominal(fitter.plant)[e.kind.parameters[0]] for e in each.fit.effects], rules.steady
+            [e.nominal(plant)[e.kind.parameters[0]] for e in each.fit.effects], rules.steady
         )
     ]
     price = rules.price_of(max(each.pieces for each in fair))
@@ -247,7 +265,7 @@ def select(
     pool = {frozenset(fit.effects): judge.judge(fit) for fit in _foremost(tried)}
     tried_starts: set[tuple[tuple[Effect, ...], Values]] = set()
     for _ in range(ROUNDS):
-        chosen = choose(list(pool.values()), fitter, rules)
+        chosen = choose(list(pool.values()), fitter.plant, rules)
         best = min(pool.values(), key=lambda each: each.score)
         simple = sorted(pool.values(), key=lambda each: each.score + PRICE * each.size)
         near = [pair for each in simple[:SHAKEN] for pair in _shake(each.fit, fitter)]
@@ -265,8 +283,23 @@ def select(
         tried_starts.update(fresh)
         for fit in threads.map(lambda pair: fitter.refine(*pair), fresh):
             pool[frozenset(fit.effects)] = judge.judge(fit)
-    chosen = choose(list(pool.values()), fitter, rules)
-    ranked = sorted(pool.values(), key=lambda each: each.score)
+    return conclude(list(pool.values()), fitter.plant, rules)
+
+
+def conclude(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Selection:
+    """What is chosen of everything judged, and what does as well.
+
+    Parameters
+    ----------
+    pool
+        All that were judged, the empty one among them.
+    plant
+        Without any effect.
+    rules
+        What "as well" means.
+    """
+    chosen = choose(pool, plant, rules)
+    ranked = sorted(pool, key=lambda each: each.score)
     alike = tuple(
         each
         for each in ranked
@@ -277,7 +310,7 @@ def select(
         and _is_as_good(each, chosen, rules.alike, rules.slack)
     )
     price = rules.price_of(max(each.pieces for each in ranked))
-    return Selection(chosen, alike, tuple(ranked), price, fitter.plant, rules)
+    return Selection(chosen, alike, tuple(ranked), price, plant, rules)
 
 
 def _shake(fit: Fit, fitter: Fitter) -> list[tuple[tuple[Effect, ...], Values]]:

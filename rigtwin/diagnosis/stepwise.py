@@ -78,8 +78,7 @@ class Growth:
         enough = self.thresholds.second * self.least
         expected = self.fitter.evidence.expected_misfit
         return any(
-            _count_parameters(fit) == len(fit.effects)
-            and fit.misfit - expected(fit.plant) < enough
+            _count_parameters(fit) == len(fit.effects) and fit.misfit - expected(fit.plant) < enough
             for fit in fits
         )
 

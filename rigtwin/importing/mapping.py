@@ -10,43 +10,54 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from controllers.formula import Formula, formula
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.units import unit_of
 
 TOPICS = ("/command", "/sensor")
+TABLES = ("machine", "experiment", "time", "columns", "constants", "channels", "controller")
+COLUMN = ("column", "unit", "wrap")
+SCALED = (*COLUMN, "scale", "offset", "sign")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the file. unit: None if the file says it; wrap: after how many of its own counts
+    it begins again, None if it does not."""
+
+    name: str
+    unit: str | None
+    wrap: float | None
 
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel's values come from.
+    """Where a channel's values come from: sign·scale·column + offset, after conversion to SI; a
+    formula of columns in SI; or a constant."""
 
-    Sign·scale·column + offset, after conversion to SI; or a constant.
-    """
-
-    column: str
-    unit: str | None
-    scale: float
-    offset: float
-    sign: float
-    constant: float | None
+    column: Column | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: float = 1.0
+    constant: float | None = None
+    formula: Formula | None = None
 
 
 @dataclass(frozen=True)
 class Map:
-    """period.
-
-    S, None if the time column says it; resample: s, None if the data stay as they are; start,
-    until: s of the data that are taken.
-    """
+    """period: s, None if a column says the time; time: columns whose sum that is, such as a date
+    and a time of day; resample: s, None if the data stay as they are; start, until: s of the data
+    that are taken; columns: name in formulas → column."""
 
     machine: str
     experiment: str
-    time: str | None
+    time: tuple[str, ...]
     time_unit: str | None
     period: float | None
     resample: float | None
     start: float
     until: float
+    columns: Mapping[str, Column]
     channels: Mapping[tuple[str, str], Source]
     controller: Mapping[str, float | str]
 
@@ -88,7 +99,7 @@ def _number(where: str, value: object, low: float = -math.inf, high: float = mat
 
 
 def _map(document: Mapping[str, Any]) -> Map:
-    _require_keys("the map", document, ("machine", "experiment", "time", "channels", "controller"))
+    _require_keys("the map", document, TABLES)
     machine = document.get("machine")
     if not isinstance(machine, str) or not machine:
         raise RigtwinError(
@@ -114,7 +125,14 @@ def _map(document: Mapping[str, Any]) -> Map:
             '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", '
             'unit = "mm" }'
         )
-    found = {_channel(name): _source(name, table) for name, table in channels.items()}
+    columns = {name: _named(name, each) for name, each in _tables(document, "columns").items()}
+    constants = {
+        name: _number(f"[constants] {name}", each)
+        for name, each in _tables(document, "constants").items()
+    }
+    if twice := sorted(set(columns) & set(constants)):
+        raise RigtwinError(f"[constants] {twice[0]}: [columns] has that name too")
+    found = {_channel(name): _source(name, table, constants) for name, table in channels.items()}
     controller = document.get("controller", {})
     if not isinstance(controller, Mapping) or not all(
         isinstance(v, int | float | str) for v in controller.values()
@@ -123,12 +141,13 @@ def _map(document: Mapping[str, Any]) -> Map:
     return Map(
         machine=machine,
         experiment=str(document.get("experiment", "")),
-        time=str(time["column"]) if "column" in time else None,
+        time=_time_columns(time["column"]) if "column" in time else (),
         time_unit=str(time["unit"]) if "unit" in time else None,
         period=period,
         resample=resample,
         start=_number("[time] start", time.get("start", 0.0)),
         until=_number("[time] until", time.get("until", 1e12)),
+        columns=columns,
         channels=found,
         controller=dict(controller),
     )
@@ -141,13 +160,61 @@ def _channel(name: str) -> tuple[str, str]:
     return topic, field
 
 
-def _source(name: str, given: object) -> Source:
-    where = f"[channels] {name!r}"
-    table = _require_keys(where, given, ("column", "unit", "scale", "offset", "sign", "constant"))
-    if ("column" in table) == ("constant" in table):
-        raise RigtwinError(f'{where}: expected either column = "NAME" or constant = NUMBER')
+def _tables(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """A table whose keys are names for formulas."""
+    table = document.get(name, {})
+    if not isinstance(table, Mapping):
+        raise RigtwinError(f"[{name}]: expected a table")
+    for key in table:
+        if not key.isidentifier():
+            raise RigtwinError(
+                f"[{name}] {key!r}: expected a name of letters, digits and _, as formulas take it"
+            )
+    return table
+
+
+def _time_columns(given: object) -> tuple[str, ...]:
+    if isinstance(given, str):
+        return (given,)
+    if isinstance(given, list) and given and all(isinstance(each, str) for each in given):
+        return tuple(given)
+    raise RigtwinError(f"[time] column = {given}: expected a name, or a date's and a time's")
+
+
+def _named(name: str, given: object) -> Column:
+    where = f"[columns] {name}"
+    if isinstance(given, str):
+        return Column(given, None, None)
+    table = _require_keys(where, given, COLUMN)
+    if "column" not in table:
+        raise RigtwinError(f'{where}: expected column = "NAME"')
+    return _column(where, table)
+
+
+def _column(where: str, table: Mapping[str, Any]) -> Column:
     if "unit" in table:
         unit_of(str(table["unit"]))
+    return Column(
+        name=str(table["column"]),
+        unit=str(table["unit"]) if "unit" in table else None,
+        wrap=_number(f"{where} wrap", table["wrap"], 2.0, 1e300) if "wrap" in table else None,
+    )
+
+
+def _source(name: str, given: object, constants: Mapping[str, float]) -> Source:
+    where = f"[channels] {name!r}"
+    table = _require_keys(where, given, (*SCALED, "constant", "formula"))
+    ways = [way for way in ("column", "constant", "formula") if way in table]
+    if len(ways) != 1:
+        raise RigtwinError(
+            f'{where}: expected either column = "NAME", constant = NUMBER or formula = "..."'
+        )
+    if ways != ["column"] and (beside := [key for key in SCALED if key in table]):
+        raise RigtwinError(f"{where}: {beside[0]} goes with a column, not with a {ways[0]}")
+    if "constant" in table:
+        return Source(constant=_number(f"{where} constant", table["constant"]))
+    if "formula" in table:
+        return Source(formula=_formula(where, table["formula"], constants))
     sign = table.get("sign", 1)
     if sign not in (1, -1):
         raise RigtwinError(f"{where} sign = {sign}: expected 1 or -1")
@@ -155,10 +222,20 @@ def _source(name: str, given: object) -> Source:
     if scale == 0.0:
         raise RigtwinError(f"{where} scale = 0: expected anything else")
     return Source(
-        column=str(table.get("column", "")),
-        unit=str(table["unit"]) if "unit" in table else None,
+        column=_column(where, table),
         scale=scale,
         offset=_number(f"{where} offset", table.get("offset", 0.0)),
         sign=float(sign),
-        constant=_number(f"{where} constant", table["constant"]) if "constant" in table else None,
     )
+
+
+def _formula(where: str, text: object, constants: Mapping[str, float]) -> Formula:
+    if not isinstance(text, str):
+        raise RigtwinError(f'{where} formula = {text}: expected a text, such as "4.2 * current"')
+    try:
+        found = formula(text, constants)
+    except ValueError as error:
+        raise RigtwinError(f"{where} formula: {error}") from None
+    if not found.inputs:
+        raise RigtwinError(f"{where} formula = {text!r}: it names no column")
+    return found

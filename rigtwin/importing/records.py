@@ -1,0 +1,96 @@
+"""JSON: records, or a list a column; and JSON lines."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.columns import Columns, numbers_of
+
+
+def read_json(path: Path) -> Columns:
+    """Columns of a JSON file: a list of records, an object with such a list in it, an object with a
+    list of numbers a column, or a record a line.
+
+    A record's inner object `{"motor": {"u": 1}}` is the column `motor.u`, its inner list
+    `{"q": [1, 2]}` the columns `q:1` and `q:2`. Raises RigtwinError if none of these is in it.
+    """
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    try:
+        if path.suffix.lower() == ".json":
+            content = json.loads(text)
+        else:
+            content = [json.loads(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError) as error:
+        raise RigtwinError(f"{path} is not valid JSON: {error}") from None
+    records = _find_records(content)
+    if records is not None:
+        return _of_records(records)
+    if isinstance(content, Mapping):
+        flat = _flatten("", content, lists=False)
+        lists = {
+            name: value
+            for name, value in flat.items()
+            if isinstance(value, list) and value and not isinstance(value[0], list | dict)
+        }
+        longest = max(map(len, lists.values()), default=0)
+        columns = {name: value for name, value in lists.items() if len(value) == longest}
+        return _of_cells(columns, "JSON, a list a column", ())
+    raise RigtwinError(f"{path}: expected records or lists of numbers; it holds neither")
+
+
+def _find_records(content: Any) -> Sequence[Mapping[str, Any]] | None:
+    """The list of records in a document, the longest of several; None if there is none."""
+    if isinstance(content, list):
+        records = content and all(isinstance(each, Mapping) for each in content)
+        return content if records else None
+    if isinstance(content, Mapping):
+        inner = [found for value in content.values() if (found := _find_records(value))]
+        return max(inner, key=len, default=None)
+    return None
+
+
+def _flatten(prefix: str, record: Mapping[str, Any], lists: bool = True) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in record.items():
+        own = f"{prefix}{name}"
+        if isinstance(value, Mapping):
+            found |= _flatten(f"{own}.", value, lists)
+        elif isinstance(value, list) and lists:
+            found |= {f"{own}:{place}": each for place, each in enumerate(value, start=1)}
+        else:
+            found[own] = value
+    return found
+
+
+def _of_records(records: Sequence[Mapping[str, Any]]) -> Columns:
+    flat = [_flatten("", record) for record in records]
+    names = list(dict.fromkeys(name for record in flat for name in record))
+    short = sum(len(record) < len(names) for record in flat)
+    notes = (f"{short} records lack some of the columns",) if short else ()
+    cells = {name: [record.get(name) for record in flat] for name in names}
+    return _of_cells(cells, "JSON, records", notes)
+
+
+def _of_cells(cells: Mapping[str, Sequence[Any]], form: str, notes: tuple[str, ...]) -> Columns:
+    values, wrong, texts = {}, {}, []
+    for name, column in cells.items():
+        numbers, bad = numbers_of(["" if each is None else _cell(each) for each in column], ".")
+        if bad is not None and not np.isfinite(numbers).any():
+            texts.append(name)
+            continue
+        values[name] = numbers
+        if bad is not None:
+            wrong[name] = f"{str(column[bad])[:40]!r} in record {bad + 1}"
+    if texts:
+        form += f"; text in {', '.join(texts)}"
+    return Columns(values, {}, form, notes, wrong)
+
+
+def _cell(value: Any) -> str:
+    return str(float(value)) if isinstance(value, bool) else str(value)

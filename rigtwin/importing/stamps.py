@@ -1,0 +1,82 @@
+"""Dates and times of day, as loggers write them, in seconds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+from dateutil import parser
+
+from rigtwin.numerics.arrays import Array
+
+DAY = 86_400.0
+"""s."""
+_CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?\s*([ap]m)?", re.IGNORECASE)
+_ISO = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
+_DATE = re.compile(r"\d{1,4}[./-](\d{1,2}|[A-Za-z]{3,9})[./-]\d{2,4}(\D.*)?")
+_LEADING = re.compile(r"(\d{1,2})([./-])(\d{1,2})[./-]")
+
+
+def clock_of(cell: str) -> float | None:
+    """A time of day in s; None if the cell is none."""
+    found = _CLOCK.fullmatch(cell.strip())
+    if found is None:
+        return None
+    hours, minutes, seconds, half = found.groups()
+    hour = int(hours) % 12 + 12 * (half.lower() == "pm") if half else int(hours)
+    return 3600.0 * hour + 60.0 * int(minutes) + float((seconds or "0").replace(",", "."))
+
+
+def stamps_of(cells: Sequence[str]) -> Array | None:
+    """Dates with or without times, or times of day, in s.
+
+    Times of day go on past midnight. A date without a zone is in universal time, so that no change
+    of the clocks lies in it.
+
+    Parameters
+    ----------
+    cells
+        Of one column.
+
+    Returns
+    -------
+    array or None
+        Shape (rows,); None if one of them is neither a date nor a time of day.
+    """
+    clocks = [clock_of(cell) for cell in cells]
+    if all(clock is not None for clock in clocks):
+        return np.unwrap(np.array(clocks, float), period=DAY)
+    first = _is_day_first(cells)
+    found = [_date(cell.strip(), first) for cell in cells]
+    return None if any(each is None for each in found) else np.array(found, float)
+
+
+def _is_day_first(cells: Sequence[str]) -> bool:
+    """Whether 3/4 is the third of April: by a number above 12, by a.m. and p.m., by the dot; else
+    by what makes the shorter recording."""
+    pairs = [found for cell in cells if (found := _LEADING.match(cell.strip()))]
+    if not pairs:
+        return True
+    if pairs[0].group(2) == "." or any(int(pair.group(1)) > 12 for pair in pairs):
+        return True
+    if any(int(pair.group(3)) > 12 for pair in pairs):
+        return False
+    if any(cell.strip().lower().endswith("m") for cell in cells):
+        return False
+    days = [(int(pair.group(1)), int(pair.group(3))) for pair in pairs]
+    return len({month for _, month in days}) <= len({month for month, _ in days})
+
+
+def _date(cell: str, day_first: bool) -> float | None:
+    try:
+        if _ISO.fullmatch(cell):
+            date = datetime.fromisoformat(cell.replace(",", "."))
+        elif _DATE.fullmatch(cell):
+            date = parser.parse(cell.replace(",", "."), dayfirst=day_first)
+        else:
+            return None
+    except (ValueError, OverflowError):
+        return None
+    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()

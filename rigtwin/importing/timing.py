@@ -1,0 +1,107 @@
+"""A recording's time base: out of time stamps, without what is there twice, at even ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+
+JITTER = 0.5
+"""Share of the period by which a time stamp may be off."""
+Signals = Mapping[str, Array]
+"""Name → shape (rows,)."""
+
+
+def drop_repeats(time: Array, signals: Signals, report: list[str]) -> tuple[Array, Signals]:
+    """Without rows that are there twice, which the report says.
+
+    Raises RigtwinError if time goes back, or has two different values at once.
+    """
+    steps = np.diff(time)
+    if (steps < 0).any():
+        row = int(np.argmax(steps < 0)) + 2
+        raise RigtwinError(
+            f"time goes back in row {row}, from {time[row - 2]:g} s to {time[row - 1]:g} s"
+        )
+    again = np.concatenate([[False], steps == 0])
+    if not again.any():
+        return time, signals
+    for name, values in signals.items():
+        unlike = again[1:] & (np.diff(values) != 0)
+        if unlike.any():
+            row = int(np.argmax(unlike)) + 2
+            raise RigtwinError(
+                f"row {row} has the same time as the one before, "
+                f"but another value of {name!r}; expected each time once "
+                "(is the time column's resolution too coarse? then give [time] period instead)"
+            )
+    report.append(f"{int(again.sum())} rows were there twice and are left out")
+    return time[~again], {name: values[~again] for name, values in signals.items()}
+
+
+def find_period(time: Array) -> float:
+    """The period of time stamps, as round as they allow."""
+    steps = np.diff(time)
+    typical = float(np.median(steps))
+    regular = np.abs(steps - typical) < JITTER * typical
+    period = float(np.mean(steps[regular]))
+    for digits in range(1, 8):
+        rounded = float(f"{period:.{digits}g}")
+        if (
+            abs(rounded - period) * len(time) < JITTER * period
+            and abs(rounded / period - 1.0) < 1e-3
+        ):
+            return rounded
+    return period
+
+
+def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
+    """Raises RigtwinError if the time stamps are not those of one period."""
+    steps = np.diff(time)
+    off = np.abs(steps - period) > JITTER * period
+    if off.any():
+        at = int(np.argmax(off))
+        raise RigtwinError(
+            f"{int(off.sum())} gaps in time, "
+            f"the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
+            f"{period:g} s is the rule; take a stretch without them by [time] start and until, "
+            f"or say [time] resample = {period:g}"
+        )
+    drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
+    if drift * len(time) > JITTER * period:
+        report.append(
+            f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, "
+            f"mostly {period:g} s"
+        )
+    worst = float(np.max(np.abs(steps - period)))
+    if worst > 0.01 * period:
+        report.append(f"time stamps are off by up to {worst:.2g} s; taken as ticks of {period:g} s")
+
+
+def resample(
+    time: Array, signals: Signals, period: float, wanted: float, report: list[str]
+) -> tuple[Array, Signals]:
+    """At another period, straight between samples and over gaps, which the report says.
+
+    Smoothed first where that is longer, so that nothing is aliased.
+    """
+    bridged = np.diff(time)
+    bridged = bridged[bridged > (1.0 + JITTER) * period]
+    if len(bridged):
+        report.append(
+            f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, "
+            f"{bridged.sum():.4g} s in all"
+        )
+    from scipy.signal import butter, sosfiltfilt  # Late: it takes a second.
+
+    ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
+    found = {}
+    for name, values in signals.items():
+        if wanted > 1.5 * period and len(values) > 60:
+            values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
+        found[name] = np.interp(ticks, time, values)
+    report.append(f"resampled from {period:g} s to {wanted:g} s: {len(ticks)} ticks")
+    return ticks, found
