@@ -178,7 +178,9 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
         if leader.misfit - first.misfit <= thresholds.far_behind * max(
             nothing.misfit - first.misfit, 0.0
         ):
-            hopes += propose_additions(search.coarse, leader, search.effects, search.least)
+            hopes += propose_additions(
+                search.coarse, leader, search.effects, search.least, search.threads
+            )
     hopes.sort(key=lambda hope: hope.promised)
     hopeful = _distinct(hopes)[: MANY if much else FEW]
     pairs = search.threads.map(
@@ -189,7 +191,9 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
         known = {frozenset(pair.effects) for pair in pairs}
         fresh = [
             pair
-            for pair in propose_replacements(search.coarse, pairs[0], search.effects)
+            for pair in propose_replacements(
+                search.coarse, pairs[0], search.effects, search.threads
+            )
             if frozenset(pair[0]) not in known
         ]
         pairs += search.threads.map(lambda pair: search.coarse.refine(*pair), fresh)

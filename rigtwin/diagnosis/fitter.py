@@ -260,7 +260,8 @@ class Fitter:
         # A wave along the stroke changes much the same whatever else is there.
         wave = rough and self.starts(effect).quadrature
         known = (effect, len(first.effects) > 0) if wave else (effect, first.effects, first.values)
-        if known not in self._beside:
+        found = self._beside.get(known)
+        if found is None:
             found = []
             here = self.residual_at(first)
             values = (
@@ -272,7 +273,7 @@ class Fitter:
                 there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
                 found.append((start, (here - there).astype(np.float32)))
             self._beside = {**dict(list(self._beside.items())[-KEPT:]), known: found}
-        return self._beside[known]
+        return found
 
     def responses_instead(self, effect: Effect, rest: Fit) -> Responses:
         """What an effect would change in another's place.

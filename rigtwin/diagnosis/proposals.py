@@ -12,6 +12,8 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.threads import Threads
+from rigtwin.numerics.arrays import Array
 
 LOOKALIKES, RESEMBLES = 3, 0.6
 """Effects that are tried in another's place at most, if they can explain this share of what it
@@ -30,7 +32,7 @@ class Proposal:
 
 
 def propose_additions(
-    fitter: Fitter, first: Fit, effects: Sequence[Effect], least: float
+    fitter: Fitter, first: Fit, effects: Sequence[Effect], least: float, threads: Threads
 ) -> list[Proposal]:
     """Further effects beside a fit, by how well their responses at the nominal plant, or beside
     it, resemble what it leaves.
@@ -45,6 +47,8 @@ def propose_additions(
         Candidates, all fitted alone before.
     least
         χ² that one must promise to explain.
+    threads
+        Work side by side.
 
     Returns
     -------
@@ -53,12 +57,12 @@ def propose_additions(
     """
     space = Space(fitter.evidence, first.plant)
     left = space.subtract_tolerances(fitter.residual_at(first))
-    found = []
-    for effect in effects:
+
+    def propose(effect: Effect) -> Proposal | None:
         if clashes(effect, first.effects) or not is_possible(
             (*first.effects, effect), fitter.plant
         ):
-            continue
+            return None
         starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
         apart = space.project_out(np.stack(responses, axis=1).astype(np.float64))
         alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
@@ -66,17 +70,17 @@ def propose_additions(
         share = np.clip(alike / power, 0.0, 3.0)
         gains = 2.0 * share * alike - share**2 * power
         best = int(np.argmax(gains))
-        if gains[best] > least:
-            promised = first.misfit - float(gains[best])
-            start = fitter.scale_start(effect, starts[best], float(share[best]))
-            found.append(
-                Proposal(promised, (*first.effects, effect), (*first.values, *start), space)
-            )
-    return found
+        if gains[best] <= least:
+            return None
+        promised = first.misfit - float(gains[best])
+        start = fitter.scale_start(effect, starts[best], float(share[best]))
+        return Proposal(promised, (*first.effects, effect), (*first.values, *start), space)
+
+    return [each for each in threads.spread(propose, effects) if each is not None]
 
 
 def propose_replacements(
-    fitter: Fitter, fit: Fit, effects: Sequence[Effect]
+    fitter: Fitter, fit: Fit, effects: Sequence[Effect], threads: Threads
 ) -> list[tuple[tuple[Effect, ...], Values]]:
     """The effects of a fit with each in turn replaced by those whose response is most like its
     own: what was found first may only resemble what is there.
@@ -89,6 +93,8 @@ def propose_replacements(
         The fit.
     effects
         Candidates, all fitted alone before.
+    threads
+        Work side by side.
 
     Returns
     -------
@@ -104,35 +110,33 @@ def propose_replacements(
         plant = with_values(fitter.plant, kept, values_kept)
         own = fitter.space.project_out((fitter.evidence.residual(plant) - here)[:, None])[:, 0]
         without = Fit(kept, values_kept, fit.misfit, (), plant)
-        scored = []
-        for other in effects:
-            if (
-                other in fit.effects
-                or clashes(other, kept)
-                or not is_possible((*kept, other), fitter.plant)
-            ):
-                continue
+        fitter.residual_at(without)
+
+        def resemble(
+            other: Effect, own: Array = own, without: Fit = without
+        ) -> tuple[float, Effect, Values]:
             starts, responses = zip(*fitter.responses_instead(other, without), strict=True)
             apart = fitter.space.project_out(np.stack(responses, axis=1).astype(np.float64))
             along, power = apart.T @ own, np.maximum(np.sum(apart**2, axis=0), 1e-300)
             resemblance = np.maximum(along, 0.0) ** 2 / power
             best = int(np.argmax(resemblance))
             share = min(float(along[best] / power[best]), 3.0)
-            scored.append(
-                (
-                    float(resemblance[best]),
-                    number,
-                    other,
-                    fitter.scale_start(other, starts[best], share),
-                )
-            )
-        scored.sort(key=lambda item: -item[0])
+            return float(resemblance[best]), other, fitter.scale_start(other, starts[best], share)
+
+        others = [
+            other
+            for other in effects
+            if other not in fit.effects
+            and not clashes(other, kept)
+            and is_possible((*kept, other), fitter.plant)
+        ]
+        scored = sorted(threads.spread(resemble, others), key=lambda item: -item[0])
         kind, rough = fit.effects[number].kind.name, fitter.evidence.machine.rough
-        for rank, (gain, place, other, start) in enumerate(scored):
+        for rank, (gain, other, start) in enumerate(scored):
             resembles = rank < LOOKALIKES and gain > RESEMBLES * float(own @ own)
             # The same at another component is the first thing to be asked about.
             if resembles or (rough and other.kind.name == kind):
                 changed, values = list(fit.effects), list(fit.values)
-                changed[place], values[place] = other, start[0]
+                changed[number], values[number] = other, start[0]
                 found.append((tuple(changed), tuple(values)))
     return found

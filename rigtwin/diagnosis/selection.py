@@ -262,7 +262,9 @@ def select(
         The simplest explanation that does as well as any.
     """
     fitter, rules = judge.fitter, judge.rules
-    pool = {frozenset(fit.effects): judge.judge(fit) for fit in _foremost(tried)}
+    pool = {
+        frozenset(each.fit.effects): each for each in threads.spread(judge.judge, _foremost(tried))
+    }
     tried_starts: set[tuple[tuple[Effect, ...], Values]] = set()
     for _ in range(ROUNDS):
         chosen = choose(list(pool.values()), fitter.plant, rules)
@@ -276,13 +278,18 @@ def select(
             if is_possible(rest, fitter.plant)
         ]
         if chosen.fit.effects:
-            near += propose_replacements(coarse, chosen.fit, effects)
+            near += propose_replacements(coarse, chosen.fit, effects, threads)
         fresh = [pair for pair in dict.fromkeys(near) if pair not in tried_starts]
         if not fresh:
             break
         tried_starts.update(fresh)
+        fits: dict[frozenset[Effect], Fit] = {}
         for fit in threads.map(lambda pair: fitter.refine(*pair), fresh):
-            pool[frozenset(fit.effects)] = judge.judge(fit)
+            known = fits.setdefault(frozenset(fit.effects), fit)
+            if fit.misfit < known.misfit:
+                fits[frozenset(fit.effects)] = fit
+        for judged in threads.spread(judge.judge, fits.values()):
+            pool[frozenset(judged.fit.effects)] = judged
     return conclude(list(pool.values()), fitter.plant, rules)
 
 

@@ -104,7 +104,7 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, threads: Threads) -> li
     found = [] if growth.leaves_noise(level) else _fit_regulars(growth, threads)
     costs: list[float] = []
     while level and not growth.leaves_noise(level):
-        costs.append(min(growth.judge.cost(fit) for fit in level[:LEADERS]))
+        costs.append(min(threads.spread(growth.judge.cost, level[:LEADERS])))
         if len(costs) > PATIENCE and min(costs[-PATIENCE:]) >= min(costs[:-PATIENCE]):
             # What is held out asks for no more.
             break
@@ -173,7 +173,7 @@ def _extend(leader: Fit, growth: Growth, threads: Threads) -> list[Fit]:
     """Fits of one effect more that explain enough of what a leader leaves."""
     evidence = growth.fitter.evidence
     hopes = sorted(
-        propose_additions(growth.search, leader, growth.effects, growth.least),
+        propose_additions(growth.search, leader, growth.effects, growth.least, threads),
         key=lambda hope: hope.promised,
     )[:TRIED]
     found = threads.map(
