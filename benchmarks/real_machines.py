@@ -1,0 +1,172 @@
+"""Real machines: what the diagnosis names of them, what that leaves of recordings that it was not
+fitted to, and how long it takes: `python -m benchmarks.real_machines FOLDER [NAME ...]`.
+
+The folder holds a folder a machine, with its data, its description and its map. The data do not
+come with the project; docs/diagnosis.md says where they are from.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+import rigtwin
+from rigtwin.description.catalogue import SHIPPED
+from rigtwin.description.changes import override
+from rigtwin.diagnosis.evidence import Evidence
+
+BAND = "Hz36lbtension{}amplitude"
+DAMPER = ("0.25" + BAND.format(1.5), "0.5" + BAND.format(1))
+DAMPER_HELD_OUT = tuple(
+    f"{hertz}{BAND.format(inch)}" for hertz, inch in ((1, 1), (1, 1.5), (0.5, 0.5), (2, 0.5))
+)
+BENCH, BENCH_HELD_OUT = ("1", "3"), ("test1", "test2")
+HELD = """
+[machine]
+name = "pendulum-servo"
+title = "XL330 pendulum, held by its servo"
+model = "pendulum.xml"
+[components]
+arm = { body = "arm", effects = [] }
+gearbox = { joint = "shaft" }
+servo = { actuator = "servo", command = "voltage", unit = "V" }
+encoder = { sensor = "encoder", channel = "position" }
+[controller]
+output = "voltage"
+formula = "limit(0.0212926 * kp * (goal - position), -7.4, 7.4)"
+inputs = { position = "/sensor.position" }
+settings = { kp = 200 }
+[[replays]]
+name = "held"
+moved_by = "servo"
+observe = ["encoder"]
+"""
+"""The pendulum's description in a closed loop: the recorded voltage is the formula's."""
+HELD_MAP = """
+machine = "pendulum-servo"
+time = {{ column = "t" }}
+controller = {{ kp = {} }}
+[channels]
+"/command.voltage" = {{ column = "load", wrap = 65536, scale = 0.0083615819 }}
+"/command.goal" = {{ column = "goal" }}
+"/sensor.position" = {{ column = "position" }}
+"""
+
+
+@dataclass(frozen=True)
+class Case:
+    """folder, description, map: in the data's folder; fitted, held_out: files without their ending;
+    settings: other nominal values."""
+
+    folder: str
+    description: str
+    map: str
+    fitted: tuple[str, ...]
+    held_out: tuple[str, ...]
+    settings: dict[str, dict[str, float]] = field(default_factory=dict)
+
+
+def damper(viscous: float) -> Case:
+    """The friction damper from another nominal viscous friction, Ns/m."""
+    settings = {"damper": {"viscous": viscous}}
+    files = (DAMPER, DAMPER_HELD_OUT)
+    return Case("friction_damper", "damper.toml", "map.toml", *files, settings)
+
+
+def bench(part: str, description: str, map_name: str) -> Case:
+    """A body of the quarter car on its bench."""
+    fitted, held_out = ([f"{part}_{each}" for each in names] for names in (BENCH, BENCH_HELD_OUT))
+    return Case("quarter_car_bench", description, map_name, tuple(fitted), tuple(held_out))
+
+
+def pendulum(test: str, description: str, map_name: str) -> Case:
+    """The pendulum on its servo, fitted at two gains and judged at two others."""
+    fitted, held_out = ([f"{test}_{kp}" for kp in gains] for gains in ((200, 400), (100, 800)))
+    return Case("pendulum_servo", description, map_name, tuple(fitted), tuple(held_out))
+
+
+CASES = {
+    "damper-0": damper(0.0),
+    "damper-150": damper(150e3),
+    "damper-277": damper(277e3),
+    "body": bench("body", "quarter.toml", "map.toml"),
+    "wheel": bench("wheel", "wheel.toml", "wheel_map.toml"),
+    "swing": pendulum("lift_and_drop", "pendulum.toml", "map.toml"),
+    "held": pendulum("sin_sin", "held.toml", "held_{}.toml"),
+    "emps": Case("emps", "emps", "", ("DATA_EMPS",), ("DATA_EMPS_PULSES",)),
+}
+
+
+def imported(case: Case, name: str, folder: Path) -> rigtwin.Recording:
+    """One of a case's files as a recording."""
+    data = next(path for path in folder.iterdir() if path.stem == name)
+    if case.folder == "emps":
+        mapping = SHIPPED / "maps" / f"{name.removeprefix('DATA_').lower()}.toml"
+    else:
+        mapping = folder / case.map.format(name.rpartition("_")[2])
+    return rigtwin.import_data(data, mapping, folder / f"{name}.mcap")
+
+
+def errors(
+    machine: rigtwin.Machine,
+    recordings: list[rigtwin.Recording],
+    settings: rigtwin.Configuration,
+    corrected: rigtwin.Configuration,
+) -> str:
+    """100 · rms(measured − predicted) / std(measured) of each recording, worst signal."""
+    configurations = [machine.configuration_of(recording, settings) for recording in recordings]
+    evidence = Evidence(machine, recordings, configurations)
+    found = []
+    for line, predicted in zip(evidence.lines, evidence.predict(corrected.plant), strict=True):
+        rms = np.sqrt(np.mean((line.measured - predicted) ** 2, axis=1))
+        found.append(f"{100.0 * np.max(rms / np.std(line.measured, axis=1)):.1f}")
+    return ", ".join(found)
+
+
+def tell(name: str, case: Case, data: Path) -> None:
+    """Diagnoses a case and prints what came of it."""
+    with tempfile.TemporaryDirectory() as work:
+        folder = Path(shutil.copytree(data / case.folder, Path(work) / case.folder))
+        for path in (folder, *folder.iterdir()):
+            path.chmod(0o755)
+        if name == "held":
+            (folder / "held.toml").write_text(HELD)
+            for kp in (100, 200, 400, 800):
+                (folder / f"held_{kp}.toml").write_text(HELD_MAP.format(kp))
+        on = rigtwin.machine(folder / case.description if name != "emps" else "emps")
+        fitted = [imported(case, each, folder) for each in case.fitted]
+        held_out = [imported(case, each, folder) for each in case.held_out]
+        nominal = override(on.configuration, case.settings)
+        began = time.perf_counter()
+        answer = rigtwin.diagnose(fitted, machine=on, settings=case.settings, held_out=held_out)
+        seconds = time.perf_counter() - began
+        before = errors(on, held_out, nominal, nominal)
+        after = errors(on, held_out, nominal, answer.corrected)
+    print(f"{name}: {answer.verdict}, {before} -> {after} %, {seconds:.0f} s")
+    for effect in answer.effects:
+        values = ", ".join(f"{each.value:.4g} {each.unit}" for each in effect.parameters.values())
+        alike = [str(each) for each in effect.alternatives if str(each) != str(effect.name)]
+        other = f", or {', '.join(alike)}" if alike else ""
+        print(f"    {effect.name} {values}{other}: {100 * effect.confidence:.0f} %")
+
+
+def main() -> None:
+    """Prints a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CASES))
+    parsed = parser.parse_args()
+    for name in parsed.names or CASES:
+        if name not in CASES:
+            parser.error(f"unknown machine {name!r}; there are {', '.join(CASES)}")
+        tell(name, CASES[name], parsed.folder)
+
+
+if __name__ == "__main__":
+    main()
