@@ -38,7 +38,7 @@ if TYPE_CHECKING:
         machines,
     )
     from rigtwin.api.recordings import Recording, import_data, load
-    from rigtwin.api.rig import Campaign, faults
+    from rigtwin.api.rig import Campaign, DryRun, dry_run, faults
     from rigtwin.api.running import run
     from rigtwin.api.studies import (
         ModelStability,
@@ -57,6 +57,7 @@ __all__ = [
     "Comparison",
     "Configuration",
     "Diagnosis",
+    "DryRun",
     "Effect",
     "Experiment",
     "Machine",
@@ -72,6 +73,7 @@ __all__ = [
     "compare",
     "compare_recordings",
     "diagnose",
+    "dry_run",
     "effects",
     "experiments",
     "faults",
@@ -112,6 +114,8 @@ _MODULES = {
     ),
     "rig": (
         "Campaign",
+        "DryRun",
+        "dry_run",
         "faults",
     ),
     "studies": (

@@ -206,7 +206,7 @@ def test_the_notebook_runs(tmp_path):
 
 FUNCTIONS = {
     "list": ("machines", "experiments"),
-    "run": ("run",),
+    "run": ("run", "dry_run"),
     "faults": ("faults",),
     "effects": ("effects",),
     "info": ("load", "Recording"),

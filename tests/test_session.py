@@ -14,6 +14,7 @@ from datetime import date
 import numpy as np
 import pytest
 
+import rigtwin
 from controllers import Measurements
 from experiments import find
 from rigtwin.cli import main
@@ -99,6 +100,23 @@ def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
     force = np.abs(recording.column("/sensor", "load_cell"))
     assert figures["force"].peak == pytest.approx(float(force.max()))
     assert figures["force"].margin == pytest.approx(1.0 - float(force.max()) / 1500.0)
+
+
+def test_a_dry_run_in_python_is_that_of_the_command(card, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    short = {"timing": {"duration": 1}, "safety": {"ramp": 0.3, "hold": 0.1}}
+    run = dict(path=tmp_path / "d.mcap", settings=short)
+    found = rigtwin.dry_run("imposed", card, **run)
+    assert found.passed
+    assert {"force", "travel"} <= {peak.name for peak in found.peaks}
+    assert any("driver is missing" in line for line in found.obstacles)
+    # So the rig may be armed for just that: it is the driver that is missing then.
+    assert main(["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]) == 1
+    assert "driver is missing" in capsys.readouterr().err
+    assert len(json.loads(ledger(card).read_text())) == 1
+    noted = rigtwin.dry_run("imposed", card, **run, effects={"coulomb@rail": 60})
+    assert noted.passed
+    assert len(json.loads(ledger(card).read_text())) == 1
 
 
 def test_another_setting_is_another_session(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from rigtwin.api.rig import key_of, rehearse
 from rigtwin.console import late, table
 from rigtwin.description.changes import read_toml
 from rigtwin.errors import RigtwinError
@@ -19,12 +20,11 @@ from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table, require_trust
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import list_shortcomings
-from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
+from rigtwin.hardware.session.dry_run import has_passed, ledger
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.hardware.session.record import (
     Test,
     open_card,
-    open_virtual_card,
     record_at_leisure,
     record_in_real_time,
 )
@@ -57,48 +57,25 @@ def _run_on_twin(parsed: Namespace, test: Test, path: Path) -> int:
             )
         else:
             ended = record_at_leisure(twin, test, path, stop, bar.update)
-    return _report(test, path, ended)
+    return _report_end(test, path, ended)
 
 
 def _dry_run(parsed: Namespace, test: Test, path: Path) -> int:
-    card, _ = open_virtual_card(test)
     with stop_requests(parsed.stop_file) as stop, _bar(test) as bar:
-        ended = record_at_leisure(card, test, path, stop, bar.update)
-    code = _report(test, path, ended)
-    if ended.ticks:
+        found = rehearse(test, parsed.card, path, bar.update, stop)
+    ticks = found.recording.ticks if found.recording is not None else 0
+    code = _report(test, path, ticks, found.cause, found.passed)
+    if found.peaks:
         rows: list[tuple[str, ...]] = [("predicted", "peak", "limit", "margin")]
-        for quantity in predict_peaks(load(path), test.card_configuration):
-            peak, limit = (
-                f"{quantity.peak:.4g} {quantity.unit}",
-                f"{quantity.limit:g} {quantity.unit}",
-            )
-            rows.append((quantity.name, peak, limit, f"{100 * quantity.margin:.0f} %"))
+        for peak in found.peaks:
+            values = (f"{peak.peak:.4g} {peak.unit}", f"{peak.limit:g} {peak.unit}")
+            rows.append((peak.name, *values, f"{100 * peak.margin:.0f} %"))
         print(table(rows))
-    for lacking in _list_obstacles(test):
+    for lacking in found.obstacles:
         print(f"before the rig may be armed: {lacking}")
-    if ended.cause == COMPLETED and not test.effects:
-        enter(
-            parsed.card,
-            _dry_run_key(test),
-            {"experiment": test.experiment, "date": date.today().isoformat()},
-        )
+    if found.passed and not test.effects:
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code
-
-
-def _list_obstacles(test: Test) -> list[str]:
-    """What would keep this test off the real rig, and what this computer lacks."""
-    lacking: list[str] = []
-    for look in (lambda: require_trust(test.table, date.today()), lambda: open_card(test)):
-        try:
-            look()
-        except RigtwinError as error:
-            lacking.append(str(error))
-    return lacking
-
-
-def _dry_run_key(test: Test) -> str:
-    return digest(test.experiment, test.configuration, test.demands, test.table)
 
 
 def require_permission(
@@ -114,7 +91,7 @@ def require_permission(
     _ = test.card_configuration
     card = open_card(test)
     notes: list[tuple[str, dict[str, str]]] = []
-    if not has_passed(parsed.card, _dry_run_key(test)):
+    if not has_passed(parsed.card, key_of(test)):
         if not parsed.without_dry_run:
             raise RigtwinError(
                 f"{test.experiment} with these settings has had no dry run; do it first: "
@@ -136,7 +113,7 @@ def _run_on_rig(parsed: Namespace, test: Test, path: Path) -> int:
         ended = record_in_real_time(
             card, test, path, stop, guarded=True, notes=notes, live=parsed.live, progress=bar.update
         )
-    return _report(test, path, ended)
+    return _report_end(test, path, ended)
 
 
 def _ask_to_arm(test: Test) -> bool:
@@ -165,13 +142,17 @@ def _bar(test: Test) -> tqdm:
     )
 
 
-def _report(test: Test, path: Path, ended: SessionEnd) -> int:
-    seconds = ended.ticks * test.configuration.timing.period
-    print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {ended.cause.reason}")
-    lateness = load(path).lateness if ended.ticks else {}
+def _report_end(test: Test, path: Path, ended: SessionEnd) -> int:
+    return _report(test, path, ended.ticks, ended.cause.reason, ended.cause == COMPLETED)
+
+
+def _report(test: Test, path: Path, ticks: int, cause: str, completed: bool) -> int:
+    seconds = ticks * test.configuration.timing.period
+    print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {cause}")
+    lateness = load(path).lateness if ticks else {}
     if lateness:
         print(late(lateness))
-    return 0 if ended.cause == COMPLETED else 3
+    return 0 if completed else 3
 
 
 def plan_test(parsed: Namespace, name: str) -> Test:
