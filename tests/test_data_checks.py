@@ -14,7 +14,6 @@ from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording, load
-from rigtwin.signals.runs import longest_run
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import once_a_sort, text
 from tests.helpers.recordings import BESIDE, SHIPPED, beside, replace_sensors, shipped
@@ -154,9 +153,3 @@ def test_a_recording_of_another_machine_is_called_that_whatever_settings_it_hold
     found = diagnose(machine, [recording])
     assert found.verdict == "unusable"
     assert "it is of machine 'suspension-rig'; this twin is 'emps'" in found.sentence
-
-
-def test_longest_run():
-    signal = np.array([1.0, 2.0, 2.0, 2.0, 3.0, 3.0])
-    assert longest_run(signal, np.ones(6, bool)) == (1, 3)
-    assert longest_run(np.arange(5.0), np.ones(5, bool)) == (0, 1)

@@ -12,7 +12,6 @@ from rigtwin.diagnosis.evidence import Evidence, despike
 from rigtwin.diagnosis.fit import Fit, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import BEYOND, Space
-from rigtwin.signals.runs import find_cut_off
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
@@ -136,14 +135,6 @@ def test_spikes_go_and_steps_stay():
     despike(signal, 4.0)
     assert not signal[:50].any()
     assert (signal[50:] == 20.0).all()
-
-
-def test_ticks_where_a_sensor_is_cut_off_do_not_count():
-    noise = 1e-3 * np.random.default_rng(0).standard_normal(2000)
-    signal = np.sin(np.linspace(0, 20, 2000)) + noise
-    assert not find_cut_off(signal).any()
-    clipped = np.minimum(signal, 0.8)
-    assert np.array_equal(find_cut_off(clipped), clipped == 0.8)
 
 
 def test_two_effects_are_told_apart():

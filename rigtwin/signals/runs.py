@@ -9,9 +9,9 @@ from rigtwin.signals.noise import smallest_step, white_noise
 
 FLAT = 8
 """Equal samples in a row at a signal's very end of range: it is cut off there."""
-BEFORE, SLOWED = 9, 0.4
+BEFORE, SLOWED = 9, 0.55
 """Samples before such a stretch, and the share of their mean speed that the last ones have at
-least: a sine that is cut off has two thirds, what comes to rest a tenth."""
+least: a sine that is cut off for that long has 0.65, what comes to rest 0.45."""
 STAIR, STAIRS = 3, 0.25
 """Equal samples in a row beside a stretch, and their share of its length, with which the signal
 moves by stairs."""
