@@ -114,6 +114,7 @@ def test_a_model_in_the_loop_is_diagnosed_too():
     assert names(outcome) == {"coulomb@rail"}
 
 
+@SLOW
 def test_three_seconds_are_enough_for_a_large_effect():
     assert names(answer(recorded("imposed", ("gain@load_cell=1.08",), 3.0))) == {"gain@load_cell"}
 
