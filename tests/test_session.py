@@ -105,8 +105,8 @@ def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
 def test_a_dry_run_in_python_is_that_of_the_command(card, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     short = {"timing": {"duration": 1}, "safety": {"ramp": 0.3, "hold": 0.1}}
-    run = dict(path=tmp_path / "d.mcap", settings=short)
-    found = rigtwin.dry_run("imposed", card, **run)
+    path = tmp_path / "d.mcap"
+    found = rigtwin.dry_run("imposed", card, path=path, settings=short)
     assert found.passed
     assert {"force", "travel"} <= {peak.name for peak in found.peaks}
     assert any("driver is missing" in line for line in found.obstacles)
@@ -114,7 +114,8 @@ def test_a_dry_run_in_python_is_that_of_the_command(card, tmp_path, monkeypatch,
     assert main(["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]) == 1
     assert "driver is missing" in capsys.readouterr().err
     assert len(json.loads(ledger(card).read_text())) == 1
-    noted = rigtwin.dry_run("imposed", card, **run, effects={"coulomb@rail": 60})
+    worn = {"coulomb@rail": 60.0}
+    noted = rigtwin.dry_run("imposed", card, path=path, settings=short, effects=worn)
     assert noted.passed
     assert len(json.loads(ledger(card).read_text())) == 1
 
