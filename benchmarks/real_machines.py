@@ -162,9 +162,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CASES))
     parsed = parser.parse_args()
-    for name in parsed.names or CASES:
+    for name in parsed.names:
         if name not in CASES:
             parser.error(f"unknown machine {name!r}; there are {', '.join(CASES)}")
+    for name in parsed.names or CASES:
+        if not (parsed.folder / CASES[name].folder).is_dir():
+            parser.error(f"{parsed.folder} holds no folder {CASES[name].folder!r}")
         tell(name, CASES[name], parsed.folder)
 
 

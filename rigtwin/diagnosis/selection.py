@@ -294,17 +294,7 @@ def select(
 
 
 def conclude(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Selection:
-    """What is chosen of everything judged, and what does as well.
-
-    Parameters
-    ----------
-    pool
-        All that were judged, the empty one among them.
-    plant
-        Without any effect.
-    rules
-        What "as well" means.
-    """
+    """What is chosen of everything judged, and what does as well; arguments as of `choose`."""
     chosen = choose(pool, plant, rules)
     ranked = sorted(pool, key=lambda each: each.score)
     alike = tuple(
