@@ -64,8 +64,8 @@ def test_the_list_is_that_of_the_design():
         "carriage": {"mass"},
         "tyre": {"stiffness", "damping", "hardening"},
         "motor": slides | actuators | {"cogging", "load_friction"},
-        "structure_cylinder": actuators | {"compliance"},
-        "ground_cylinder": actuators | {"compliance"},
+        "structure_cylinder": actuators | {"compliance", "backlash"},
+        "ground_cylinder": actuators | {"compliance", "backlash"},
         **dict.fromkeys(("load_cell", "suspension_lvdt", "structure_lvdt", "ground_lvdt"), sensors),
         "controller": {"missed_ticks", "delay"},
     }
@@ -236,7 +236,7 @@ def steady_force(plant: RigPlant, velocity: float) -> float:
     model = build(plant, STEP)
     data = mujoco.MjData(model)
     view = handles(model, data)
-    now = contacts(plant, 0.0, 0.0)
+    now = contacts(plant, 0.0, 0.0, 0.0)
     view.qpos[view.ground] = -1.0
     for number in range(50):
         drive(view, view.carriage, number * velocity * STEP, (number + 1) * velocity * STEP)
@@ -270,7 +270,7 @@ def test_tyre_law(damping, hardening):
         (-0.001, 0.1),
     ):
         view.qpos[view.carriage], view.qvel[view.carriage] = -deflection, -rate
-        touch(view, contacts(plant, -deflection, deflection))
+        touch(view, contacts(plant, -deflection, deflection, 0.0))
         mujoco.mj_forward(model, data)
         law = (
             50_000 * deflection * (1 + hardening * deflection) + damping * rate

@@ -133,6 +133,10 @@ def _deadband(at: Context) -> Starts:
     return Starts.single([share * size for share in (0.003, 0.01, 0.03, 0.1, 0.3)], 0.001 * size)
 
 
+def _yielding(_: Context) -> Starts:
+    return Starts(tuple(product((2e-7, 1e-6, 5e-6), (0.0, 0.005))), (2e-8, 2e-4))
+
+
 def _offset(at: Context) -> Starts:
     sizes = {ForceSensor: at.scales.force, VelocitySensor: at.scales.speed}
     size = sizes.get(at.effect.of, at.scales.stroke)
@@ -217,9 +221,16 @@ KINDS = (
     Kind(
         "compliance",
         "compliance",
-        ("compliance",),
-        "yields under load",
-        {Cylinder: fixed_starts((2e-7, 1e-6, 5e-6), 2e-8)},
+        ("compliance", "yield_lag"),
+        "yields under load, at once or a little later",
+        {Cylinder: _yielding},
+    ),
+    Kind(
+        "backlash",
+        "backlash",
+        ("backlash",),
+        "a play between piston and plate",
+        {Cylinder: fixed_starts((1e-4, 3e-4, 1e-3, 3e-3, 1e-2), 4e-5)},
     ),
     Kind(
         "two_lags",

@@ -1,6 +1,6 @@
 """Hydraulic cylinders under position control: H(s) scaled to unit static gain, sampled exactly for
-a held command, then a limit of the speed. MJCF has no actuator of fourth order, so this runs beside
-MuJoCo and prescribes the plates' motion."""
+a held command, then a limit of the speed and a play at the output. MJCF has no actuator of fourth
+order, so this runs beside MuJoCo and prescribes the plates' motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ H_OF_S = "identified closed loop H(s), thesis Eq. 6.2"
 
 class Cylinder(NamedTuple):
     """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s +
-    a0), scaled to unit static gain, then a limit of the speed."""
+    a0), scaled to unit static gain, then a limit of the speed, a play between piston and plate, and
+    a plate that yields by compliance·load, `yield_lag` behind it."""
 
     b2: Annotated[float, Quantity("1/s^2", -1e6, 1e6, H_OF_S)] = 1817.0
     b1: Annotated[float, Quantity("1/s^3", -1e8, 1e8, H_OF_S)] = 7.719e4
@@ -39,22 +40,26 @@ class Cylinder(NamedTuple):
     compliance: Annotated[
         float, Quantity("m/N", 0.0, 2e-5, "0: a cylinder in position control does not yield, §3.2")
     ] = 0.0
+    yield_lag: Annotated[float, Quantity("s", 0.0, 0.1, "0: yields at once; assumed")] = 0.0
+    backlash: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
 
 
 class CylinderModel(NamedTuple):
-    """Sampled cylinder: z⁺ = transition·z + entry·command; y⁺ = ahead·z + direct·command; the plate
-    follows y⁺ by at most `step` metres. Shapes (4, 4), (4,), (4,), scalar, scalar."""
+    """Sampled cylinder: z⁺ = transition·z + entry·command; y⁺ = ahead·z + direct·command; the
+    piston follows y⁺ by at most `step` metres, the plate stays within ±`slack` of the piston.
+    Shapes (4, 4), (4,), (4,), scalars."""
 
     transition: Array
     entry: Array
     ahead: Array
     direct: float
     step: float
+    slack: float
 
 
 class CylinderState(NamedTuple):
-    """filter: states z of H(s), shape (4,); position: of the plate in m, shape (1,). Changed in
-    place."""
+    """filter: states z of H(s), shape (4,); position: of the plate and of the piston in m, shape
+    (2,). Changed in place."""
 
     filter: Array
     position: Array
@@ -82,29 +87,49 @@ def discretise(cylinder: Cylinder, timestep: float) -> CylinderModel:
     step = expm(both * timestep)
     transition, entry = np.ascontiguousarray(step[:4, :4]), np.ascontiguousarray(step[:4, 4])
     return CylinderModel(
-        transition, entry, c @ transition, float(c @ entry), cylinder.speed_limit * timestep
+        transition=transition,
+        entry=entry,
+        ahead=c @ transition,
+        direct=float(c @ entry),
+        step=cylinder.speed_limit * timestep,
+        slack=0.5 * cylinder.backlash,
     )
 
 
 def rest_state(cylinder: Cylinder, position: float) -> CylinderState:
     """At rest at `position` (m) under a command of that value."""
-    return CylinderState(np.array([position / cylinder.a0, 0.0, 0.0, 0.0]), np.array([position]))
+    return CylinderState(
+        np.array([position / cylinder.a0, 0.0, 0.0, 0.0]), np.array([position, position])
+    )
+
+
+@compilable
+def next_piston(model: CylinderModel, state: CylinderState, command: float) -> float:
+    """The piston's position one timestep ahead, m; changes nothing."""
+    wanted = model.direct * command
+    for i in range(4):
+        wanted += model.ahead[i] * state.filter[i]
+    here = state.position[1]
+    return here + min(max(wanted - here, -model.step), model.step)
+
+
+@compilable
+def follow(model: CylinderModel, state: CylinderState, piston: float) -> float:
+    """Where the plate is once the piston is there, m: with it but for the play."""
+    return min(max(state.position[0], piston - model.slack), piston + model.slack)
 
 
 @compilable
 def next_position(model: CylinderModel, state: CylinderState, command: float) -> float:
     """Plate position one timestep ahead, m; changes nothing."""
-    wanted = model.direct * command
-    for i in range(4):
-        wanted += model.ahead[i] * state.filter[i]
-    here = state.position[0]
-    return here + min(max(wanted - here, -model.step), model.step)
+    return follow(model, state, next_piston(model, state, command))
 
 
 @compilable
 def advance_cylinder(model: CylinderModel, state: CylinderState, command: float) -> None:
     """One timestep, in place."""
-    state.position[0] = next_position(model, state, command)
+    piston = next_piston(model, state, command)
+    state.position[0], state.position[1] = follow(model, state, piston), piston
     z0, z1, z2, z3 = state.filter[0], state.filter[1], state.filter[2], state.filter[3]
     for i in range(4):
         row = model.transition[i]

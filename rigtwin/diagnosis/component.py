@@ -172,7 +172,7 @@ def _run(
     out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
     _mechanics(
         mechanics=view,
-        contacts=contacts(plant, wheel, float(structure[0]) - wheel),
+        contacts=contacts(plant, wheel, float(structure[0]) - wheel, preload),
         motor_drive=conditioning,
         motor_command=hold(conditioning, preload / plant.motor.constant),
         substeps=substeps,

@@ -10,8 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from controllers import Commands, Measurements
+from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import apply_sensor, undo_sensor
+from rigtwin.components.sensors import Lvdt, apply_sensor, undo_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.component import (
@@ -32,7 +33,7 @@ from rigtwin.signals.noise import (
     rms,
     white_noise,
 )
-from rigtwin.simulation.plant import initial_deflection
+from rigtwin.simulation.plant import initial_deflection, initial_yield
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
@@ -108,7 +109,7 @@ class ComponentReplays:
         tyre = self.configuration.plant.tyre.stiffness * (
             self._clean(self._sensor("ground_lvdt") - self.wheel)
         )
-        return unloaded - cylinder.compliance * np.maximum(tyre, 0.0)
+        return unloaded - self._yielded(cylinder, np.maximum(tyre, 0.0))
 
     @cached_property
     def structure_cylinder_output(self) -> Array:
@@ -116,13 +117,18 @@ class ComponentReplays:
         cylinder = self.configuration.plant.structure_cylinder
         # A test starts with its spring uncompressed: the plate stands where the preload holds the
         # wheel.
-        uncompressed = self._ground_start - initial_deflection(
-            self.configuration.plant, self.preload
-        )
+        plant = self.configuration.plant
+        uncompressed = self._ground_start - initial_deflection(plant, self.preload)
+        uncompressed += initial_yield(plant, self.preload)[0]
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
-        return unloaded + cylinder.compliance * self._clean(self._sensor("load_cell"))
+        return unloaded + self._yielded(cylinder, self._clean(self._sensor("load_cell")))
+
+    def _yielded(self, cylinder: Cylinder, load: Array) -> Array:
+        """How far a cylinder yields to a load that was measured, m."""
+        behind = Lvdt(lag=cylinder.yield_lag)
+        return cylinder.compliance * apply_sensor(behind, load, self.period)
 
     @cached_property
     def ground_motion(self) -> EstimatedMotion:

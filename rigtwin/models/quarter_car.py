@@ -34,6 +34,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
 from rigtwin.components.sensors import apply_sensor
+from rigtwin.components.yielding import share_of_load, solve_yielding, yielding_rate
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
@@ -42,10 +43,10 @@ from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import (
-    YIELDING,
     Contacts,
     contacts,
     initial_deflection,
+    initial_yield,
     stiffness_ratio,
 )
 
@@ -273,9 +274,10 @@ def _mechanics(
     shape (4, ticks)."""
     h = carriage.timestep
     x, v, force = start, 0.0, preload
-    ground_before = structure_before = 0.0
+    yielding = 0.0
     inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
-    share = h / (YIELDING + h)
+    ground_share = share_of_load(now.ground_compliance, now.ground_lag, h)
+    structure_share = share_of_load(now.structure_compliance, now.structure_lag, h)
     for tick in range(len(voltage)):
         for step in range(-1, steps):
             # Before the tick's commands act, once as if the old ones went on: that is what the
@@ -292,9 +294,10 @@ def _mechanics(
                 structure_here + now.yielded[1],
                 ground_here + now.yielded[0],
             )
-            if step > 0 or (step == 0 and tick > 0):
-                plate_velocity += (now.yielded[1] - structure_before) / h
-                ground_velocity += (now.yielded[0] - ground_before) / h
+            # How fast the plates would give up what they have yielded, without load.
+            ground_loss = yielding_rate(0.0, 0.0, now.yielded[0], now.ground_lag, h)
+            structure_loss = yielding_rate(0.0, 0.0, now.yielded[1], now.structure_lag, h)
+            ground_velocity += ground_loss
             travel = structure_now - x
             deflection = ground_now - x
             rail, motor = (
@@ -302,11 +305,12 @@ def _mechanics(
                 (h * now.motor.coulomb, h * now.motor.coulomb),
             )
             bias = beside = 0.0
+            forward = backward = now.motor.coulomb
             if now.changing:
                 forward, backward = breakaway(now.rail, now.rail_gap, x, v, force)
                 rail = (h * forward, h * backward)
                 forward, backward = breakaway(
-                    now.motor, now.motor_gap, travel, plate_velocity - v, force
+                    now.motor, now.motor_gap, travel, plate_velocity + yielding - v, force
                 )
                 motor = (h * forward, h * backward)
                 bias = now.cogging * math.sin(
@@ -317,22 +321,37 @@ def _mechanics(
             free = carriage.mass * v + h * (
                 carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick]
             )
-            rhs, total, spring = free, inertia, 0.0
+            spring = damping = 0.0
             if deflection > 0.0:
-                spring = now.stiffness * deflection * stiffness_ratio(now, deflection)
-                rhs, total = (
-                    free + h * (spring + now.damping * ground_velocity),
-                    inertia + h * now.damping,
-                )
-            velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
-            tyre = 0.0
-            if deflection > 0.0:
-                tyre = spring + now.damping * (ground_velocity - velocity)
-                if tyre < 0.0:
-                    tyre, rhs, total = 0.0, free, inertia
+                ratio = stiffness_ratio(now, deflection)
+                given = 1.0 + ground_share * (h * now.stiffness * ratio + now.damping)
+                spring = now.stiffness * (deflection + h * ground_loss) * ratio / given
+                damping = now.damping / given
+            while True:
+                push, resisted = h * (spring + damping * ground_velocity), h * damping
+                if now.structure_compliance > 0.0:
+                    velocity, cell = solve_yielding(
+                        rhs=carriage.mass * v + h * (pushed[tick] - beside) + push,
+                        inertia=carriage.mass + h * carriage.rail_viscous + resisted,
+                        timestep=h,
+                        rail=rail,
+                        free=plate_velocity + structure_loss,
+                        share=structure_share,
+                        force=force + bias,
+                        viscous=carriage.motor_viscous,
+                        forward=forward,
+                        backward=backward,
+                    )
+                else:
+                    rhs, total = free + push, inertia + resisted
                     velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
-            dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
-            cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
+                    dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
+                    cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
+                tyre = spring + damping * (ground_velocity - velocity)
+                if tyre >= 0.0:
+                    break
+                # A tyre does not pull.
+                spring = damping = 0.0
             if step < 0:
                 out[0, tick], out[1, tick], out[2, tick], out[3, tick] = (
                     ground_now,
@@ -341,9 +360,9 @@ def _mechanics(
                     cell,
                 )
                 continue
-            ground_before, structure_before = now.yielded[0], now.yielded[1]
-            now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
-            now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
+            yielding = structure_loss + structure_share * cell
+            now.yielded[0] += h * (ground_loss - ground_share * tyre)
+            now.yielded[1] += h * yielding
             asked = condition(motor_drive, motor_command, voltage[tick])
             asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
             force += carriage.motor_share * (carriage.motor_constant * asked - force)
@@ -415,7 +434,7 @@ class QuarterCarModel:
         start: float,
         at: float | None,
     ) -> Plate:
-        unloaded = cylinder._replace(compliance=0.0)
+        unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0)
         key = (unloaded, computer.delay, id(commands), at)
         found = self._plates.get(key)
         if found is None:
@@ -442,6 +461,7 @@ class QuarterCarModel:
         )
         # The spring is uncompressed at the start, the tyre carries the preload.
         start = float(ground.position[0]) - initial_deflection(plant, self._preload)
+        start += initial_yield(plant, self._preload)[0]
         structure = self._plate(
             plant.structure_cylinder, plant.computer, self._structure, self._start, start
         )
@@ -465,7 +485,7 @@ class QuarterCarModel:
         out = np.empty((4, len(self._voltage)))
         _mechanics(
             carriage=carriage,
-            now=contacts(plant, start, 0.0),
+            now=contacts(plant, start, 0.0, self._preload),
             motor_drive=conditioning,
             motor_command=hold(conditioning, self._preload / motor.constant),
             start=start,

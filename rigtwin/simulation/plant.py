@@ -27,13 +27,10 @@ from rigtwin.components.cylinder import (
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import Friction, breakaway, friction, gap_at
 from rigtwin.components.tyre import SCALE
+from rigtwin.components.yielding import share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
-
-YIELDING = 5e-3
-"""s; a compliant cylinder yields to its load with this lag, so that load and yielding need no
-common solution."""
 
 
 class Contacts(NamedTuple):
@@ -57,7 +54,12 @@ class Contacts(NamedTuple):
     hardening: float
     hardening_power: float
     ground_compliance: float
+    ground_lag: float
     structure_compliance: float
+    structure_lag: float
+    mass: float
+    rail_viscous: float
+    motor_viscous: float
     gas: GasSpring
     yielded: Array
 
@@ -86,7 +88,7 @@ class PlantState(NamedTuple):
     contacts: Contacts
 
 
-def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
+def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) -> Contacts:
     """Gives a plant's contacts before anything moves.
 
     Parameters
@@ -95,6 +97,8 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
         Whose.
     carriage, travel : float
         Where they are, m.
+    preload : float
+        What the motor pushes with, N.
 
     Returns
     -------
@@ -118,9 +122,14 @@ def contacts(plant: RigPlant, carriage: float, travel: float) -> Contacts:
         hardening=tyre.hardening,
         hardening_power=tyre.hardening_power,
         ground_compliance=compliances[0],
+        ground_lag=plant.ground_cylinder.yield_lag,
         structure_compliance=compliances[1],
+        structure_lag=plant.structure_cylinder.yield_lag,
+        mass=plant.carriage.mass,
+        rail_viscous=plant.rail.viscous,
+        motor_viscous=plant.motor.viscous,
         gas=plant.gas_spring,
-        yielded=np.zeros(2),
+        yielded=np.array(initial_yield(plant, preload)),
     )
 
 
@@ -131,6 +140,15 @@ def initial_deflection(plant: RigPlant, preload: float) -> float:
     gas spring.
     """
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
+
+
+def initial_yield(plant: RigPlant, preload: float) -> tuple[float, float]:
+    """How far ground and structure plate have yielded at the start, m, under a preload in N."""
+    tyre = preload + plant.gas_spring.force
+    return (
+        -plant.ground_cylinder.compliance * tyre,
+        plant.structure_cylinder.compliance * preload,
+    )
 
 
 class Simulation:
@@ -169,11 +187,10 @@ class Simulation:
         ]
         here = float(held[0].memory[3])
         view.qpos[view.ground] = here
-        view.qpos[view.carriage] = view.qpos[view.structure] = carriage = here - initial_deflection(
-            plant, preload
-        )
+        carriage = here + initial_yield(plant, preload)[0] - initial_deflection(plant, preload)
+        view.qpos[view.carriage] = view.qpos[view.structure] = carriage
         view.activation[0] = view.control[0] = preload / plant.motor.constant
-        touching = contacts(plant, carriage, 0.0)
+        touching = contacts(plant, carriage, 0.0, preload)
         self.state = PlantState(
             mechanics=view,
             substeps=substeps,
@@ -249,17 +266,60 @@ def touch(mechanics: Handles, now: Contacts) -> None:
 
 
 @compilable
-def give_way(mechanics: Handles, now: Contacts) -> None:
-    """Lets compliant cylinders yield to the load of the last step."""
-    share = mechanics.timestep / (YIELDING + mechanics.timestep)
-    tyre = -mechanics.constraint[mechanics.ground]
-    cell = (
-        mechanics.constraint[mechanics.structure]
-        + mechanics.passive[mechanics.structure]
-        + motor_force(mechanics)
+def give_way(
+    mechanics: Handles, now: Contacts, ground: float, structure: float
+) -> tuple[float, float]:
+    """How far compliant cylinders will have yielded one timestep ahead: ground and structure, m.
+
+    Their loads are worked out here, as MuJoCo takes the plates' motion as given.
+
+    Parameters
+    ----------
+    mechanics : Handles
+        Whose state is that before the timestep.
+    now : Contacts
+        As they are now; `yielded` is not changed.
+    ground, structure : float
+        The plates' velocities without load, m/s.
+    """
+    h, v, place = (
+        mechanics.timestep,
+        mechanics.qvel[mechanics.carriage],
+        mechanics.qpos[mechanics.carriage],
     )
-    now.yielded[0] += share * (-now.ground_compliance * tyre - now.yielded[0])
-    now.yielded[1] += share * (now.structure_compliance * cell - now.yielded[1])
+    load, inertia, tyre = motor_force(mechanics), now.mass + h * now.rail_viscous, 0.0
+    deflection = mechanics.qpos[mechanics.ground] - place
+    share = share_of_load(now.ground_compliance, now.ground_lag, h)
+    unloaded = ground - now.yielded[0] / (now.ground_lag + h)
+    if deflection > 0.0:
+        slope = now.stiffness * stiffness_ratio(now, deflection)
+        tyre = slope * (deflection + h * (unloaded - ground)) + now.damping * (unloaded - v)
+        tyre = max(tyre / (1.0 + share * (slope * h + now.damping)), 0.0)
+    ground_ahead = now.yielded[0] + h * (unloaded - ground - share * tyre)
+    if now.structure_compliance == 0.0:
+        return ground_ahead, 0.0
+    share = share_of_load(now.structure_compliance, now.structure_lag, h)
+    travel = mechanics.qpos[mechanics.structure] - place
+    sliding = mechanics.qvel[mechanics.structure] - v
+    up, down = breakaway(now.rail, now.rail_gap, place, v, load)
+    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
+    # What friction has more in one direction stands among the motor's forces already.
+    load -= 0.5 * (backward - forward)
+    push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
+    free = structure - now.yielded[1] / (now.structure_lag + h)
+    _, cell = solve_yielding(
+        rhs=now.mass * v + h * push,
+        inertia=inertia,
+        timestep=h,
+        rail=(h * up, h * down),
+        free=free,
+        share=share,
+        force=load,
+        viscous=now.motor_viscous,
+        forward=forward,
+        backward=backward,
+    )
+    return ground_ahead, now.yielded[1] + h * (free - structure + share * cell)
 
 
 @compilable
@@ -278,21 +338,44 @@ def sense(state: PlantState) -> Measurements:
     passes on the force that accelerates the carriage with the plate, which a velocity one timestep
     old would not show.
     """
-    mechanics, yielded = state.mechanics, state.contacts.yielded
-    ground, structure = (
-        state.ground_state.position[0] + yielded[0],
-        state.structure_state.position[0] + yielded[1],
+    onward = (
+        next_position(state.ground, state.ground_state, state.ground_command.memory[3]),
+        next_position(state.structure, state.structure_state, state.structure_command.memory[3]),
     )
-    onward = next_position(state.ground, state.ground_state, state.ground_command.memory[3])
-    drive(mechanics, mechanics.ground, ground, onward + yielded[0])
-    onward = next_position(
-        state.structure, state.structure_state, state.structure_command.memory[3]
-    )
-    drive(mechanics, mechanics.structure, structure, onward + yielded[1])
-    touch(mechanics, state.contacts)
+    move_plates(state, (state.ground_state.position[0], state.structure_state.position[0]), onward)
+    forward(state.mechanics.model, state.mechanics.data, 0, 0)
+    return true_measurements(state.mechanics)
+
+
+@compilable
+def move_plates(
+    state: PlantState, here: tuple[float, float], there: tuple[float, float]
+) -> tuple[float, float]:
+    """Prescribes the plates' motion over the coming timestep, ground and structure, m.
+
+    Parameters
+    ----------
+    state : PlantState
+        Whose mechanics are written into.
+    here, there : tuple
+        Where the cylinders hold them without load, now and one timestep ahead.
+
+    Returns
+    -------
+    tuple
+        How far they will have yielded then.
+    """
+    mechanics, now = state.mechanics, state.contacts
+    ahead = (0.0, 0.0)
+    if now.ground_compliance > 0.0 or now.structure_compliance > 0.0:
+        h = mechanics.timestep
+        touch(mechanics, now)
+        ahead = give_way(mechanics, now, (there[0] - here[0]) / h, (there[1] - here[1]) / h)
+    drive(mechanics, mechanics.ground, here[0] + now.yielded[0], there[0] + ahead[0])
+    drive(mechanics, mechanics.structure, here[1] + now.yielded[1], there[1] + ahead[1])
+    touch(mechanics, now)
     brace(mechanics)
-    forward(mechanics.model, mechanics.data, 0, 0)
-    return true_measurements(mechanics)
+    return ahead
 
 
 @compilable
@@ -315,28 +398,16 @@ def advance(
         state.ground_command.memory[3] = ground_command
         state.structure_command.memory[3] = structure_command
         return
-    mechanics, yielded = state.mechanics, state.contacts.yielded
+    mechanics, now = state.mechanics, state.contacts
     for _ in range(state.substeps):
-        ground, structure = (
-            state.ground_state.position[0] + yielded[0],
-            state.structure_state.position[0] + yielded[1],
-        )
+        here = state.ground_state.position[0], state.structure_state.position[0]
         asked = condition(state.ground_drive, state.ground_command, ground_command)
         advance_cylinder(state.ground, state.ground_state, asked)
         asked = condition(state.structure_drive, state.structure_command, structure_command)
         advance_cylinder(state.structure, state.structure_state, asked)
         mechanics.control[0] = condition(state.motor_drive, state.motor_command, voltage)
-        if state.contacts.changing:
-            give_way(mechanics, state.contacts)
-        drive(mechanics, mechanics.ground, ground, state.ground_state.position[0] + yielded[0])
-        drive(
-            mechanics,
-            mechanics.structure,
-            structure,
-            state.structure_state.position[0] + yielded[1],
-        )
-        touch(mechanics, state.contacts)
-        brace(mechanics)
+        there = state.ground_state.position[0], state.structure_state.position[0]
+        now.yielded[0], now.yielded[1] = move_plates(state, here, there)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)
 

@@ -36,6 +36,7 @@ NOTICEABLE = {
     "deadband@cylinder": "0.001",
     "rate_limit@cylinder": "0.03",
     "compliance@cylinder": "1e-6",
+    "backlash@cylinder": "0.002",
     "gain@lvdt": "1.05",
     "offset@lvdt": "0.001",
     "lag@lvdt": "0.01",
