@@ -123,6 +123,10 @@ def _actuator(
             "compliance", component, value, 0.0, True, _to(f"{path}_hydraulic", yields=value)
         )
 
+    def play() -> Defect:
+        value = _log(random, 6e-4, 6e-3)
+        return Defect("backlash", component, value, 0.0, True, _to(f"{path}_hydraulic", lost=value))
+
     def cogging() -> Defect:
         value = _log(random, 2.0, 15.0)
         change = _to(
@@ -133,7 +137,8 @@ def _actuator(
         )
         return Defect("cogging", component, value, 0.0, True, change)
 
-    return [gain, lag, delay, saturation, deadband, rate_limit, cogging if motor else compliance]
+    own = [cogging] if motor else [compliance, play]
+    return [gain, lag, delay, saturation, deadband, rate_limit, *own]
 
 
 def _sensor(component: str, random: Random) -> list[Callable[[], Defect]]:

@@ -53,11 +53,12 @@ class Drive(NamedTuple):
 
 
 class Hydraulic(NamedTuple):
-    """speed m/s; yields m/N; slower: its natural frequencies are lower by this share; creep: m/s of
-    its own motion."""
+    """speed m/s; yields m/N; lost: play between piston and plate, m; slower: its natural
+    frequencies are lower by this share; creep: m/s of its own motion."""
 
     speed: float = 0.3
     yields: float = 0.0
+    lost: float = 0.0
     slower: float = 0.0
     creep: float = 0.0
 
@@ -224,6 +225,16 @@ def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> flo
 
 
 @numba.njit(cache=True, nogil=True)
+def take_up(of: Hydraulic, plate: float, piston: float) -> float:
+    """Where a piston with play leaves the plate, m."""
+    if piston - plate > 0.5 * of.lost:
+        return piston - 0.5 * of.lost
+    if plate - piston > 0.5 * of.lost:
+        return piston + 0.5 * of.lost
+    return plate
+
+
+@numba.njit(cache=True, nogil=True)
 def settle(z: Array, at: float, of: Hydraulic) -> None:
     """At rest with its output at `at`."""
     w, scale = 1.0 - of.slower, 6.281e5 / 6.243e5
@@ -269,7 +280,7 @@ def reading(
 
 
 class Body(NamedTuple):
-    """What the rig is at a moment, changed in place. motion: see ENTRIES, shape (17,); histories:
+    """What the rig is at a moment, changed in place. motion: see ENTRIES, shape (19,); histories:
     of the three commands under way, shape (3, 2048); memories: of their rate limit, lag and dead
     zone, shape (3, 3); sensed: past values of the sensors, shape (4, 64); lags: of the sensors,
     shape (4, 1); ground_z, structure_z: of the hydraulics, shape (4,)."""
@@ -304,10 +315,12 @@ ENTRIES = (
         "acceleration",
         "cell",
         "steps",
+        "ground_piston",
+        "structure_piston",
     ),
 )
 """Of `Body.motion`: plates, carriage, motor, tyre's relaxed part, bristles, ends of the play,
-yielding now and a step ago, carriage's acceleration, load cell, steps made; m, N, s."""
+yielding now and a step ago, carriage's acceleration, load cell, steps made, pistons; m, N, s."""
 
 
 @numba.njit(cache=True, nogil=True)
@@ -315,7 +328,7 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
     """Before the first tick: all at rest, tyre and motor carrying the preload, N; commands, m, held
     for long."""
     body = Body(
-        np.zeros(17),
+        np.zeros(19),
         np.empty((3, 2048)),
         np.zeros((3, 3)),
         np.empty((4, 64)),
@@ -336,6 +349,7 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
     body.memories[1, 2], body.memories[2, 2] = first[1], first[2]
     body.motion[0], body.motion[1], body.motion[2], body.motion[8] = ground, x, x, x
     body.motion[4] = body.motion[15] = preload
+    body.motion[17], body.motion[18] = ground, x
     return body
 
 
@@ -400,10 +414,12 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
             truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late
         )
         count += 1
-        next_ground = hydraulic_step(truth.ground_hydraulic, ground_z, ground, asked_ground)
-        next_structure = hydraulic_step(
-            truth.structure_hydraulic, structure_z, structure, asked_structure
+        motion[17] = hydraulic_step(truth.ground_hydraulic, ground_z, motion[17], asked_ground)
+        motion[18] = hydraulic_step(
+            truth.structure_hydraulic, structure_z, motion[18], asked_structure
         )
+        next_ground = take_up(truth.ground_hydraulic, ground, motion[17])
+        next_structure = take_up(truth.structure_hydraulic, structure, motion[18])
 
         deflection = ground + ground_yield - x
         squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
