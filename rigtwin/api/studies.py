@@ -10,8 +10,11 @@ from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
 from experiments.vehicles import find_vehicle
 from referee import check, wild
+from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import load_posterior
 from rigtwin.errors import RigtwinError
+from rigtwin.studies.identifiability import Identifiability as Identifiability
+from rigtwin.studies.identifiability import find_identifiable
 from rigtwin.studies.stability.judgement import ModelStability as ModelStability
 from rigtwin.studies.stability.judgement import Stability, judge
 from rigtwin.studies.stability.vehicle import QuarterCar, believable, checked_time
@@ -27,6 +30,23 @@ Progress = Callable[[int, int], object]
 
 def _nothing(*_: object) -> None:
     """Tells nobody."""
+
+
+def identifiability(of: Machine) -> Identifiability:
+    """What a machine's sensors can never show, whatever it does: before there are any data.
+
+    Parameters
+    ----------
+    of
+        The machine, see `machine`.
+
+    Returns
+    -------
+    Identifiability
+        Effects that leave a trace of their own, those that leave none, and those whose trace others
+        can leave as well.
+    """
+    return find_identifiable(of)
 
 
 def tune(

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigtwin.console import table
+
+if TYPE_CHECKING:
+    from rigtwin.description.machine import Machine
 
 SUMMARY = "check a machine's description"
 MORE = """\
 rigtwin machine check F.toml explains every mistake in one line each; without
-any, what will be looked for."""
+any, what will be looked for, and what its sensors can never show whatever the
+machine does: worked out by made-up motions within the range of its joints."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,5 +61,21 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"{name}: {source}")
     if found.control is not None:
         print(f"controller: {found.control.text}")
+    _print_never(found)
     print("no mistakes")
     return 0
+
+
+def _print_never(machine: Machine) -> None:
+    """What can never be identified, before there are any data."""
+    import rigtwin
+
+    can = rigtwin.identifiability(machine)
+    if not can.motions:
+        print("never identifiable: not worked out; give its joints a range")
+    for name in can.unseen:
+        print(f"never identifiable: {name}; nothing that is recorded changes with it")
+    for name, others in can.alike.items():
+        print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
+    if can.motions and not can.unseen and not can.alike:
+        print("never identifiable: none; what a recording does not excite, its diagnosis says")

@@ -1,0 +1,286 @@
+"""What a machine's sensors can never show, whatever it does: before there are any data.
+
+Every effect is given to the machine's model under made-up rich motions. One that changes nothing
+that is recorded can never be seen. One whose changes are those of others, in every one of these
+motions at once, can never be told from them: only what they do together is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rigtwin.components import Effect
+from rigtwin.components.effect import Scales, Starts, Swing
+from rigtwin.components.plant import Plant
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.diagnosis.fit import is_possible, with_values
+from rigtwin.diagnosis.next_test import record_on_twin
+from rigtwin.diagnosis.swing import swings
+from rigtwin.errors import RigtwinError
+from rigtwin.models.choose import model_of
+from rigtwin.models.machine_twin import demanded_channels, run_machine
+from rigtwin.models.model import Model
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording, reader
+from rigtwin.signals.excitation import multisine
+from rigtwin.simulation.experiment import find_experiment
+
+SECONDS = 8.0
+"""Of each made-up motion."""
+REACHES = (0.3, 0.08)
+"""rms of the made-up motions, in shares of half a joint's range."""
+BAND = (0.15, 12.0)
+"""Hz, of the made-up motions."""
+SLOPE = 1.0
+"""Their amplitudes fall with this power of the frequency."""
+NOTHING = 1e-7
+"""rms of a change, in units of the signals' own rms, below which an effect does nothing."""
+LEFT = 0.01
+"""Share of an effect's change that others have to leave at most for it not to be told from
+them."""
+NEAR = 0.1
+"""The same of what a little of it changes, from which it is tried whether they do."""
+TOGETHER = 3
+"""Others that may have to act together."""
+BASIC = ("coulomb", "viscous")
+"""Kinds that others refine."""
+FORCELESS = 1e-9
+"""N, rms, below which no force is predicted at all."""
+RANK = 1e-10
+"""Of a set of changes: what is smaller is rounding."""
+EVALUATIONS = 12
+"""Of a fit of others to what an effect does."""
+STEPS = 4
+"""Of integration a tick."""
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """What made-up motions say of a machine's effects.
+
+    Parameters
+    ----------
+    seen : tuple of str
+        Effects that leave a trace of their own.
+    unseen : tuple of str
+        Those that change nothing that is recorded.
+    alike : mapping
+        Effect → others that together do what it does.
+    motions : tuple of str
+        What it was tried on; empty where nothing says how far the machine may move.
+    """
+
+    seen: tuple[str, ...]
+    unseen: tuple[str, ...]
+    alike: Mapping[str, tuple[str, ...]]
+    motions: tuple[str, ...]
+
+
+def find_identifiable(machine: Machine) -> Identifiability:
+    """What the sensors of a machine can show of its effects, and what they never can.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+
+    Returns
+    -------
+    Identifiability
+        Of all effects that are searched for; empty where the description does not say how far the
+        machine may move: its joints need a range, or it needs an experiment.
+
+    Raises
+    ------
+    RigtwinError
+        If one of its own experiments cannot be run.
+    """
+    recordings = list(_make_up(machine))
+    if not recordings:
+        return Identifiability((), (), {}, ())
+    tried = _Tried(machine, recordings)
+    responses = {e.name: tried.response(e) for e in machine.effects() if e.searched}
+    unseen = [name for name, own in responses.items() if own is None]
+    shapes = {name: own for name, own in responses.items() if own is not None}
+    effects = {e.name: e for e in machine.effects() if e.name in shapes}
+    alike = {}
+    for name, own in shapes.items():
+        rivals = {n: s for n, s in shapes.items() if not _shares(effects[n], effects[name])}
+        for others in _propose(own, rivals):
+            if tried.stands_for([effects[n] for n in others], effects[name]):
+                alike[name] = others
+                break
+    seen = [name for name in responses if name not in unseen and name not in alike]
+    return Identifiability(
+        tuple(seen), tuple(unseen), alike, tuple(str(r.experiment) for r in recordings)
+    )
+
+
+def _make_up(machine: Machine) -> Iterator[Recording]:
+    """Rich motions within the machine's limits, without noise where it can be had without."""
+    if machine.structure is Structure.QUARTER_CAR:
+        for name in machine.next_tests[:1]:
+            test = find_experiment(machine, name)
+            timing = test.configuration.timing._replace(duration=0.5 * SECONDS)
+            configuration = test.configuration._replace(timing=timing, plant=machine.plant)
+            for seed in (1, 2):
+                demands = test.demands(configuration, seed)
+                yield record_on_twin(machine, name, configuration, demands, seed)
+        return
+    timing = machine.configuration.timing._replace(duration=SECONDS)
+    configuration = machine.configuration._replace(timing=timing)
+    time = np.arange(configuration.ticks) * timing.period
+    with TemporaryDirectory(prefix="rigtwin-") as folder:
+        for number, reach in enumerate(REACHES, 1):
+            random = np.random.default_rng([number, 17])
+            demands = {}
+            for topic, field in demanded_channels(machine):
+                size = _reach(machine, (topic, field))
+                if size is None:
+                    return
+                highest = min(BAND[1], 0.2 / timing.period)
+                wave = multisine(time, BAND[0], highest, BAND[0], SLOPE, 1.0, random)
+                middle, half = size
+                demands[f"{topic}.{field}"] = middle + reach * half * wave
+            path = Path(folder) / f"{number}.mcap"
+            try:
+                run_machine(path, machine, f"multisine {number}", configuration, demands, number)
+            except RigtwinError:
+                return
+            yield reader.load(path)
+
+
+def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
+    """(middle, half) of what a channel may demand; None if nothing says it."""
+    for replay in machine.replays:
+        joint, mover = replay.joint, machine.components[replay.moved_by[0]]
+        low, high = joint.positions[0], joint.positions[-1]
+        middle = min(max(joint.rest, low), high)
+        half = max(min(high - middle, middle - low), 0.25 * (high - low))
+        if replay.closed and channel != mover.channel:
+            return middle, half
+        if channel == mover.channel:
+            constant = getattr(getattr(machine.plant, mover.name), "constant", None)
+            if constant is None:
+                return middle, half
+            # What moves it to and fro once a second; half of what lifts it, where it hangs.
+            lifts = 0.5 * max(np.abs(joint.gravity))
+            return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
+    return None
+
+
+class _Tried:
+    """A machine's model under made-up motions."""
+
+    def __init__(self, machine: Machine, recordings: Sequence[Recording]) -> None:
+        self._machine, self.plant = machine, machine.plant
+        self._period = recordings[0].period
+        self._models: list[Model[Any]] = [
+            model_of(machine, recording, machine.configuration_of(recording), STEPS)
+            for recording in recordings
+        ]
+        self._swings = swings(machine, recordings)
+        self._size = np.ones((len(machine.rows), 1))
+        moved = self._predict(self.plant)
+        rms = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
+        self._size = np.maximum(rms, 1e-12)
+        # Refinements of friction do nothing where there is none.
+        for effect in machine.effects():
+            if effect.kind.name in BASIC and not any(effect.nominal(machine.plant).values()):
+                values = self._starts(effect).values
+                self.plant = with_values(
+                    self.plant, (effect,), (min(v for v in values if v[0] > 0.0),)
+                )
+        self._here = self._predict(self.plant)
+
+    def _predict(self, plant: Plant) -> Array:
+        rows = np.concatenate([model.predict(plant) for model in self._models], axis=1)
+        return rows / self._size
+
+    def _scales(self, component: str) -> Scales:
+        motion = self._models[0].motion(component, self._machine.plant)
+        forces = [
+            float(size)
+            for row, size in zip(self._machine.rows, self._size[:, 0], strict=True)
+            if row.kind == "force"
+        ]
+        force = max(forces, default=0.0)
+        # A guide that nothing is known of bears no force; then any unit of it will do.
+        return Scales.of(motion, force if force > FORCELESS else 1.0, self._period)
+
+    def _starts(self, effect: Effect) -> Starts:
+        swing = self._swings.get(effect.component, Swing())
+        return effect.starts(self.plant, swing, lambda: self._scales(effect.group))
+
+    def response(self, effect: Effect) -> Array | None:
+        """What a little of an effect changes, of length 1, all signals one after another; if that
+        is nothing, what the smallest size does that does anything; None if none does."""
+        if not is_possible((effect,), self.plant):
+            return None
+        there = tuple(effect.nominal(self.plant).values())
+        starts = self._starts(effect)
+        sizes = sorted(starts.values, key=lambda values: abs(values[0] - there[0]))
+        little = (there[0] + starts.steps[0], *sizes[0][1:])
+        for values in (little, *sizes):
+            if values == there:
+                continue
+            change = self._predict(with_values(self.plant, (effect,), (values,))) - self._here
+            if float(np.sqrt(np.mean(change**2))) > NOTHING:
+                return np.ravel(change) / float(np.linalg.norm(change))
+        return None
+
+    def stands_for(self, others: Sequence[Effect], effect: Effect) -> bool:
+        """Whether others can do what a good deal of an effect does, not only what a little does:
+        as far as a delay is a lag at low frequencies."""
+        there = tuple(effect.nominal(self.plant).values())
+        sizes = sorted(self._starts(effect).values, key=lambda values: abs(values[0] - there[0]))
+        wanted = self._predict(with_values(self.plant, (effect,), (sizes[len(sizes) // 2],)))
+        change = float(np.linalg.norm(wanted - self._here))
+        rest = [tuple(each.nominal(self.plant).values()) for each in others]
+        steps = np.array([self._starts(each).steps[0] for each in others])
+        quantities = [each.quantities()[each.kind.parameters[0]] for each in others]
+
+        def left(point: Array) -> Array:
+            # About 1, since the solver's steps are shares of where it stands.
+            moved = point - 1.0
+            values = [
+                (min(max(own[0] + step * by, q.low), q.high), *own[1:])
+                for own, step, by, q in zip(rest, steps, moved, quantities, strict=True)
+            ]
+            return np.ravel(wanted - self._predict(with_values(self.plant, others, values)))
+
+        fit = least_squares(left, np.ones(len(others)), diff_step=1.0, max_nfev=EVALUATIONS)
+        return change > 0.0 and float(np.linalg.norm(fit.fun)) < LEFT * change
+
+
+def _shares(one: Effect, other: Effect) -> bool:
+    """Whether both are values of one parameter."""
+    common = set(one.kind.parameters) & set(other.kind.parameters)
+    return one.group == other.group and bool(common)
+
+
+def _propose(shape: Array, others: Mapping[str, Array]) -> Iterator[tuple[str, ...]]:
+    """Others that may do the same together, the fewest first: of all of them, the one that is
+    missed least is left out, one after another."""
+    names, columns = list(others), np.array(list(others.values()))
+    gram, shared = columns @ columns.T, columns @ shape
+
+    def left(chosen: list[int]) -> float:
+        part, own = gram[np.ix_(chosen, chosen)], shared[chosen]
+        return 1.0 - float(own @ np.linalg.lstsq(part, own, rcond=RANK)[0])
+
+    chosen = list(range(len(names)))
+    found: list[tuple[str, ...]] = []
+    while chosen and left(chosen) < NEAR**2:
+        if len(chosen) <= TOGETHER:
+            found.append(tuple(names[n] for n in chosen))
+        chosen.remove(min(chosen, key=lambda n: left([c for c in chosen if c != n])))
+    yield from reversed(found)

@@ -1,0 +1,83 @@
+"""What sensors can never show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import rigtwin
+
+CART = """
+<mujoco model="cart">
+  <option gravity="0 0 -9.81"/>
+  <worldbody>
+    <body name="cart">
+      <joint name="rail" type="slide" axis="1 0 0" range="-0.2 0.2" damping="4"/>
+      <geom type="box" size="0.1 0.1 0.1" mass="2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="push" joint="rail" gear="5"/></actuator>
+  <sensor><jointpos name="place" joint="rail"/></sensor>
+</mujoco>
+"""
+TABLE = """
+[machine]
+name = "cart"
+title = "a cart that is pushed"
+model = "cart.xml"
+nominal = "rough"
+
+[components]
+cart = { body = "cart" }
+rail = { joint = "rail" }
+push = { actuator = "push", command = "push" }
+place = { sensor = "place", channel = "place", effects = [] }
+
+[[replays]]
+name = "cart"
+moved_by = "push"
+observe = ["place"]
+"""
+
+
+def cart(folder: Path) -> rigtwin.Machine:
+    (folder / "cart.xml").write_text(CART)
+    (folder / "cart.toml").write_text(TABLE)
+    return rigtwin.machine(folder / "cart.toml")
+
+
+def test_two_zeros_and_a_gain_that_scales_all_there_is():
+    can = rigtwin.identifiability(rigtwin.machine("damper-bench"))
+    assert can.alike["offset@damper"] == ("offset@load_cell",)
+    assert can.alike["offset@load_cell"] == ("offset@damper",)
+    # Force over velocity is all that a damper bench measures.
+    assert set(can.alike["gain@load_cell"]) == {"viscous@damper", "coulomb@damper"}
+    assert {"viscous@damper", "coulomb@damper", "lag@load_cell"} <= set(can.seen)
+
+
+def test_a_mass_and_its_friction_scale_like_the_force_that_moves_them(tmp_path):
+    can = rigtwin.identifiability(cart(tmp_path))
+    assert set(can.alike["gain@push"]) <= {"mass@cart", "viscous@rail", "coulomb@rail"}
+    assert "viscous@rail" in can.seen
+    assert not can.unseen
+
+
+def test_an_actuator_that_is_watched_directly_hides_nothing():
+    can = rigtwin.identifiability(rigtwin.machine("position-actuator"))
+    assert not can.unseen
+    assert not can.alike
+
+
+def test_every_effect_that_is_looked_for_is_judged_once():
+    machine = rigtwin.machine("damper-bench")
+    can = rigtwin.identifiability(machine)
+    judged = [*can.seen, *can.unseen, *can.alike]
+    assert sorted(judged) == sorted(e.name for e in machine.effects() if e.searched)
+
+
+@pytest.mark.slow
+def test_the_suspension_rig_can_show_all_that_is_looked_for():
+    can = rigtwin.identifiability(rigtwin.machine("suspension-rig"))
+    assert not can.unseen
+    assert not can.alike
