@@ -19,12 +19,14 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rigtwin.api.answers import (
+        Changes,
         Comparison,
         Diagnosis,
         calibrate,
         compare,
         compare_recordings,
         diagnose,
+        what_changed,
     )
     from rigtwin.api.machines import (
         Configuration,
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Campaign",
+    "Changes",
     "Comparison",
     "Configuration",
     "Diagnosis",
@@ -85,6 +88,7 @@ __all__ = [
     "run",
     "stability",
     "tune",
+    "what_changed",
 ]
 _MODULES = {
     "machines": (
@@ -105,12 +109,14 @@ _MODULES = {
     ),
     "running": ("run",),
     "answers": (
+        "Changes",
         "Comparison",
         "Diagnosis",
         "calibrate",
         "compare",
         "compare_recordings",
         "diagnose",
+        "what_changed",
     ),
     "rig": (
         "Campaign",
