@@ -162,7 +162,9 @@ class ChangeSearch:
         left = self._left(self._plants)
         while len(changed) < self.thresholds.rough.most:
             tests = self._test([n for n in candidates if n not in changed], own)
-            if not any(self._is_sure(each) for each in tests):
+            # One model for all that leaves a gap may be so far off each that no test there is sure.
+            settled = bool(changed) or self.together.verdict in ("no gap", "explained")
+            if settled and not any(self._is_sure(each) for each in tests):
                 break
             # What promises most at the plants of before need not be what leaves least.
             tests.sort(key=lambda each: each.estimate.left)
