@@ -19,12 +19,14 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from rigtwin.api.answers import (
+        Changes,
         Comparison,
         Diagnosis,
         calibrate,
         compare,
         compare_recordings,
         diagnose,
+        what_changed,
     )
     from rigtwin.api.machines import (
         Configuration,
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Campaign",
+    "Changes",
     "Comparison",
     "Configuration",
     "Diagnosis",
@@ -89,6 +92,7 @@ __all__ = [
     "run",
     "stability",
     "tune",
+    "what_changed",
 ]
 _MODULES = {
     "machines": (
@@ -109,12 +113,14 @@ _MODULES = {
     ),
     "running": ("run",),
     "answers": (
+        "Changes",
         "Comparison",
         "Diagnosis",
         "calibrate",
         "compare",
         "compare_recordings",
         "diagnose",
+        "what_changed",
     ),
     "rig": (
         "Campaign",

@@ -8,6 +8,8 @@ from pathlib import Path
 from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, twin_of
 from rigtwin.description import catalogue
 from rigtwin.description.machine import Machine, Structure
+from rigtwin.diagnosis.change import Changes
+from rigtwin.diagnosis.changes import find_changes
 from rigtwin.diagnosis.compare import Comparison, differences
 from rigtwin.diagnosis.compare import compare as compare_with_twin
 from rigtwin.diagnosis.compare import compare_recordings as find_differences
@@ -70,6 +72,48 @@ def diagnose(
     base = twin_of(found, settings, without)
     tests = [find_experiment(found, name) for name in found.next_tests]
     return find_reasons(found, several, base, apart, tests, progress)
+
+
+def what_changed(
+    recordings: Sequence[reader.Recording],
+    *,
+    machine: Machine | str | Path | None = None,
+    settings: Settings = (),
+    without: Sequence[str] = (),
+    progress: Callable[[str, int], object] = lambda _stage, _steps: None,
+) -> Changes:
+    """Says what changed between recordings of one machine, and what that goes with.
+
+    Parameters
+    ----------
+    recordings
+        Two or more, in the order of time.
+    machine
+        That they are of; by default the one that they name.
+    settings
+        Changes of the twin that they are compared with: of its plant and `timing.timestep`.
+    without
+        Effects that are taken out of the twin first, such as "coulomb@rail".
+    progress
+        Called with a stage's name and the steps done in it.
+
+    Returns
+    -------
+    Every parameter in every recording, which are not the same, and of which these cannot tell.
+
+    Raises
+    ------
+    RigtwinError
+        For fewer than two recordings, one named twice, or data that cannot be diagnosed.
+    """
+    several = list(_several(recordings))
+    paths = [each.path.resolve() for each in several if each.path.exists()]
+    if len(set(paths)) < len(paths):
+        raise RigtwinError("a recording is named twice; it is the same as itself")
+    if not several:
+        raise RigtwinError("what changed is a question to two recordings or more; none was given")
+    found = described_machine(several[0], machine)
+    return find_changes(found, several, twin_of(found, settings, without), progress)
 
 
 def compare(

@@ -17,6 +17,7 @@ no gap, or none that it knows.
 examples:
   rigtwin diagnose rig.mcap --html report.html --save-twin calibrated.toml
   rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap
+  rigtwin diagnose monday.mcap friday.mcap --changed
   rigtwin compare rig.mcap --config calibrated.toml"""
 
 
@@ -50,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config"
     )
+    parser.add_argument(
+        "--changed",
+        action="store_true",
+        help="say instead what is not the same in all recordings, given in the order of time",
+    )
     add_machine(parser)
     add_settings(parser)
 
@@ -58,7 +64,13 @@ def execute(parsed: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     import rigtwin
+    from rigtwin.errors import RigtwinError
 
+    if parsed.changed and (parsed.held_out or parsed.html or parsed.save_twin):
+        raise RigtwinError(
+            "--changed compares recordings and writes --json only; "
+            "leave out --held-out, --html and --save-twin"
+        )
     inputs = [*parsed.recordings, *parsed.held_out]
     for out in (parsed.json, parsed.html, parsed.save_twin):
         if out is not None:
@@ -72,6 +84,18 @@ def execute(parsed: argparse.Namespace) -> int:
             bar.set_description(stage, refresh=False)
             bar.update(steps)
 
+        if parsed.changed:
+            changes = rigtwin.what_changed(
+                recordings,
+                settings=settings_of(parsed),
+                without=parsed.without,
+                progress=progress,
+            )
+            if parsed.json is not None:
+                write_json(parsed.json, changes.document())
+            bar.close()
+            print(changes)
+            return 0
         diagnosis = rigtwin.diagnose(
             recordings,
             held_out=held_out,

@@ -142,6 +142,19 @@ class Thresholds:
     something: float = 0.03
     """Share of what noise leaves that a free disturbance of one component must explain for
     something unnamed to be there."""
+    changed: float = 0.01
+    """Probability, corrected for the number of parameters, below which estimates of recordings
+    differ."""
+    instead: float = 24.0
+    """χ², in units of what is left, by which another parameter's change may do worse and be named
+    beside the best."""
+    seen: float = 1e-3
+    """Share of an effect's response that zeros, tolerances and what else is named must not be able
+    to take up for a recording to tell of it."""
+    trend_explains: float = 0.8
+    """Share of the differences between recordings that a quantity they go with explains,"""
+    trend_clear: float = 3.0
+    """and times what it leaves that every other must leave."""
     left_over: float = 1.3
     """Times its noise from which a signal has something left, if that is more than no model is
     held to."""
