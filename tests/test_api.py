@@ -13,19 +13,10 @@ import pytest
 import rigtwin
 from controllers import Commands, Demand, Measurements
 from rigtwin.cli import COMMANDS
-from tests.helpers.described import TOML, described
+from tests.helpers.described import NOISY, described
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = {"timing": {"duration": 3.0}}
-EXPERIMENT = """
-[experiments.shake]
-summary = "to and fro"
-duration = 4.0
-period = 1e-3
-[experiments.shake.demands]
-force = "30 * sin(7 * time) + 12 * sin(17 * time)"
-"""
-NOISY = TOML.replace('channel = "position"', 'channel = "position"\nwhite = 2e-5') + EXPERIMENT
 
 
 def folder_machine(folder: Path) -> rigtwin.Machine:

@@ -13,8 +13,7 @@ import pytest
 import rigtwin
 from rigtwin.cli import main
 from rigtwin.diagnosis.homogeneity import check_homogeneity, correct, fit_trends, name_trends
-from tests.helpers.described import described
-from tests.test_api import NOISY
+from tests.helpers.described import NOISY, described
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +88,13 @@ def test_friction_that_changed_is_named_with_its_values(
     assert values == pytest.approx([6.0, 6.6], rel=0.01)
     # Two recordings differ in more than one way.
     assert not changed[0]["named"]
+
+
+@pytest.mark.slow
+def test_friction_that_doubled_is_still_friction(machine: rigtwin.Machine):
+    (changed,) = rigtwin.what_changed(recorded(machine, (6.0, 12.0))).changed
+    assert str(changed.name) == "coulomb@guide"
+    assert [each.value for each in changed.values] == pytest.approx([6.0, 12.0], rel=0.02)
 
 
 @pytest.mark.slow

@@ -3,20 +3,19 @@ differ, beside what the diagnosis of all together names."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
 
-from rigtwin.components import measures
 from rigtwin.components.plant import Plant
-from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.by_recording import BLOCKS, ByRecording, Column, Estimate
 from rigtwin.diagnosis.change import Parameter
+from rigtwin.diagnosis.change_columns import columns_of
 from rigtwin.diagnosis.finding import Interval, Name
-from rigtwin.diagnosis.fit import is_possible
-from rigtwin.diagnosis.fitter import LIMITS, Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.homogeneity import check_homogeneity, correct
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.threads import Threads
@@ -26,9 +25,6 @@ from rigtwin.numerics.arrays import Array
 
 ROUNDS = 4
 """Times that responses are taken anew at the values of each recording."""
-WIDE = 3.0
-"""Times the steps of a search at which responses are taken: what sticks answers small ones by
-chance."""
 FOLLOWED = 6
 """Parameters that are followed to each recording's own value."""
 SMALL = 1e-3
@@ -57,31 +53,46 @@ class _Followed:
     plants: tuple[Plant, ...]
 
 
+@dataclass(frozen=True)
+class Compared:
+    """parameters: those that changed and those that are named; unseen: effects of which nobody can
+    tell; tested: how many were; left: χ² that stays."""
+
+    parameters: tuple[Parameter, ...]
+    unseen: tuple[Name, ...]
+    tested: int
+    left: float
+
+    def cost(self, pieces: float, price: float) -> float:
+        """What stays, as χ² of so many independent pieces, and a price for each change."""
+        count = sum(each.verdict == "changed" for each in self.parameters)
+        return pieces * math.log(max(self.left, 1e-300)) + price * count
+
+
 class ChangeSearch:
     """Looks for parameters that are not the same in all recordings."""
 
-    def __init__(self, together: Diagnosis, thresholds: Thresholds) -> None:
+    def __init__(
+        self, together: Diagnosis, thresholds: Thresholds, start: Diagnosis | None = None
+    ) -> None:
+        """start: whose effects and values the search starts from, by default those of all
+        together."""
         if together.evidence is None:
             raise RigtwinError(together.sentence)
+        start = start or together
         self.together, self.evidence, self.thresholds = together, together.evidence, thresholds
         self.machine = self.evidence.machine
         self.count = len(self.evidence.recordings)
-        self.plant: Plant = together.corrected.plant
-        named = {str(effect.name) for effect in together.effects}
+        self.plant: Plant = start.corrected.plant
+        self._settled = start is together and together.verdict in ("no gap", "explained")
+        named = {str(effect.name) for effect in start.effects}
         self._fitter = Fitter(self.evidence)
         searched = [effect for effect in self.machine.effects() if effect.searched]
         self._named = [effect for effect in searched if effect.name in named]
         self._others = [effect for effect in searched if effect not in self._named]
-        self.columns = [*self._effect_columns(), *self._zero_columns()]
-        taken = [
-            self.machine.tolerance_of(column.group, column.parameter) for column in self.columns
-        ]
-        self.columns += [
-            Column("tolerance", each.group, each.parameter, self.evidence.width(each))
-            for each in self.machine.tolerances
-            if each not in taken and self.evidence.width(each) > 0.0
-        ]
+        self.columns = columns_of(self._fitter, self._named, self._others, self.plant)
         self._stand([self.plant] * self.count)
+        self.pieces = float(self._equations.pieces.sum())
         self._common = [n for n, c in enumerate(self.columns) if c.effect in self._named]
         self._own = [n for n, c in enumerate(self.columns) if c.kind != "effect"]
 
@@ -89,44 +100,6 @@ class ChangeSearch:
         """Takes all responses at these plants, one a recording."""
         self._plants = tuple(plants)
         self._equations = ByRecording.at(self.evidence, self._plants, self.columns)
-
-    def _effect_columns(self) -> list[Column]:
-        found = []
-        for effect in (*self._named, *self._others):
-            zero = measures(effect.of()) and effect.kind.name == "offset"
-            starts = self._fitter.starts(effect)
-            there = effect in self._named
-            if zero or effect.kind.name in LIMITS or (starts.quadrature and not there):
-                continue
-            if not there and not is_possible((*self._named, effect), self.plant):
-                continue
-            steps = dict(zip(effect.kind.parameters, starts.steps, strict=True))
-            first, *rest = effect.kind.parameters
-            if there:
-                found += [
-                    Column("effect", effect.group, name, WIDE * step, effect)
-                    for name, step in steps.items()
-                ]
-            else:
-                given = dict(zip(effect.kind.parameters, starts.values[0], strict=True))
-                others = tuple((name, given[name]) for name in rest)
-                found.append(
-                    Column("effect", effect.group, first, WIDE * steps[first], effect, others)
-                )
-        return [column for column in found if column.step > 0.0]
-
-    def _zero_columns(self) -> list[Column]:
-        found = []
-        for name in sensors_of(self.machine):
-            component = self.machine.components[name]
-            assert component.channel is not None
-            spread = max(
-                float(np.std(recording.column(*component.channel)))
-                for recording in self.evidence.recordings
-            )
-            if spread > 0.0:
-                found.append(Column("zero", name, "offset", 0.02 * spread))
-        return found
 
     def _freedom(self) -> float:
         return float(BLOCKS - 1)
@@ -145,9 +118,8 @@ class ChangeSearch:
                 found[self.columns[number].group] = moves
         return found
 
-    def compare(self) -> tuple[list[Parameter], tuple[Name, ...], int]:
-        """The parameters that changed and those that the diagnosis names, the effects of which
-        nobody can tell, and how many were tested."""
+    def compare(self) -> Compared:
+        """Tests every parameter, and follows those that are not the same."""
         own, found, unseen = list(self._own), [], []
         candidates = []
         for number, column in enumerate(self.columns):
@@ -163,8 +135,7 @@ class ChangeSearch:
         while len(changed) < self.thresholds.rough.most:
             tests = self._test([n for n in candidates if n not in changed], own)
             # One model for all that leaves a gap may be so far off each that no test there is sure.
-            settled = bool(changed) or self.together.verdict in ("no gap", "explained")
-            if settled and not any(self._is_sure(each) for each in tests):
+            if (changed or self._settled) and not any(self._is_sure(each) for each in tests):
                 break
             # What promises most at the plants of before need not be what leaves least.
             tests.sort(key=lambda each: each.estimate.left)
@@ -199,7 +170,7 @@ class ChangeSearch:
             for number in unseen
             if (e := self.columns[number].effect) is not None and e not in self._named
         )
-        return found, tuple(names), len(candidates)
+        return Compared(tuple(found), tuple(names), len(candidates), left)
 
     def _test(self, numbers: Sequence[int], own: Sequence[int]) -> list[_Tested]:
         """Each parameter as the only one that may differ."""
@@ -342,14 +313,3 @@ class ChangeSearch:
             verdict="cannot tell",
             why="not every recording shows it apart from zeros, tolerances and what else is named",
         )
-
-
-def sensors_of(machine: Machine) -> list[str]:
-    """Sensors that may have another zero in each recording."""
-    return [
-        name
-        for name, component in machine.components.items()
-        if component.channel is not None
-        and measures(part := getattr(machine.plant, name, None))
-        and hasattr(part, "offset")
-    ]

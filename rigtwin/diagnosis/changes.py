@@ -14,7 +14,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.by_recording import BLOCKS
 from rigtwin.diagnosis.change import Changes, Parameter
-from rigtwin.diagnosis.change_search import ChangeSearch, sensors_of
+from rigtwin.diagnosis.change_columns import sensors_of
+from rigtwin.diagnosis.change_search import ChangeSearch
 from rigtwin.diagnosis.changes_text import change_sentence
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
@@ -78,21 +79,37 @@ def find_changes(
                 for n, recording in enumerate(aligned)
             ]
             search = look(aligned)
-        found, unseen, tested = search.compare()
+        compared = search.compare()
+        if search.together.verdict not in ("no gap", "explained") or any(
+            each.verdict == "changed" for each in compared.parameters
+        ):
+            # What changed much leaves a model for all that is that of none: one recording's own
+            # explanation is a better place to start from.
+            for recording in (aligned[0], aligned[-1]):
+                alone = diagnose(
+                    machine, [recording], base, progress=progress, thresholds=thresholds
+                )
+                if alone.evidence is not None and alone.effects:
+                    other = ChangeSearch(search.together, thresholds, start=alone).compare()
+                    compared = min(
+                        compared,
+                        other,
+                        key=lambda each: each.cost(search.pieces, thresholds.instead),
+                    )
     covariates = _covariates(search.evidence)
-    parameters = tuple(_with_trends(each, covariates, thresholds) for each in found)
+    parameters = tuple(_with_trends(each, covariates, thresholds) for each in compared.parameters)
     return Changes(
         recordings=tuple(str(recording.path) for recording in recordings),
         sentence=change_sentence(parameters),
         parameters=parameters,
-        unseen=unseen,
+        unseen=compared.unseen,
         zeros={
             name: tuple((values - values.mean()).tolist())
             for name, values in total.items()
             if values.any()
         },
         covariates={name: tuple(values.tolist()) for name, values in covariates.items()},
-        tested=tested,
+        tested=compared.tested,
         seconds=time.perf_counter() - began,
         together=search.together,
     )

@@ -63,3 +63,14 @@ def recording_of(
     return Recording(
         Path("bench"), machine.name, "", period, np.arange(len(command)) * period, columns, {}
     )
+
+
+EXPERIMENT = """
+[experiments.shake]
+summary = "to and fro"
+duration = 4.0
+period = 1e-3
+[experiments.shake.demands]
+force = "30 * sin(7 * time) + 12 * sin(17 * time)"
+"""
+NOISY = TOML.replace('channel = "position"', 'channel = "position"\nwhite = 2e-5') + EXPERIMENT
