@@ -70,13 +70,27 @@ class Selection:
 
     def half_widths(self, effect: Effect) -> tuple[float, ...]:
         """What the interval of each parameter of a chosen effect has to either side at least: by
-        the jackknife, and by the share of the signals that is left unexplained."""
+        the jackknife, by the share of the signals that is left unexplained, and by what other
+        explanations that do as well make of it."""
         place = self.chosen.fit.effects.index(effect)
         left = math.exp(self.chosen.score)
+        found = self.chosen.fit.values[place]
+        others = [
+            each.fit.values[each.fit.effects.index(effect)]
+            for each in self.pool
+            if effect in each.fit.effects
+            and each.score <= self.chosen.score + self.rules.alike
+            and not each.cancels
+            and not each.bounded
+        ]
         return tuple(
-            max(self.rules.jackknifed * width, left * abs(value))
-            for width, value in zip(
-                self.chosen.widths[place], self.chosen.fit.values[place], strict=True
+            max(
+                self.rules.jackknifed * width,
+                left * abs(value),
+                *(abs(other[number] - value) for other in others),
+            )
+            for number, (width, value) in enumerate(
+                zip(self.chosen.widths[place], found, strict=True)
             )
         )
 
