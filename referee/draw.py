@@ -119,9 +119,15 @@ def _actuator(
 
     def compliance() -> Defect:
         value = _log(random, 2e-7, 3e-6)
-        return Defect(
-            "compliance", component, value, 0.0, True, _to(f"{path}_hydraulic", yields=value)
-        )
+        at_once = random.random() < 0.5
+        hydraulic = _to(f"{path}_hydraulic", yields=value)
+
+        def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
+            # A stiff bristle between carriage and a plate that yields needs steps far smaller.
+            yielding = 0.0 if at_once else truth.yielding
+            return hydraulic(truth._replace(bristle=0.0, yielding=yielding), law)
+
+        return Defect("compliance", component, value, 0.0, True, change)
 
     def play() -> Defect:
         value = _log(random, 6e-4, 6e-3)

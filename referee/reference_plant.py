@@ -86,7 +86,8 @@ CELL = Sensor(1.5, 5.0, 0.076, full=400.0)
 
 class Truth(NamedTuple):
     """The whole rig. bristle: N/m, 0 for set-valued friction; relaxing: share of the tyre's
-    stiffness that relaxes, in `relaxing_time` s; yielding: s, a cylinder's lag behind its load;
+    stiffness that relaxes, in `relaxing_time` s; yielding: s, a cylinder's lag behind its load, 0
+    for none;
     late: computation delay, s; missed: share of ticks."""
 
     mass: float = 34.0
@@ -159,6 +160,71 @@ def solve(
         else:
             low = middle
     return 0.5 * (low + high)
+
+
+@numba.njit(cache=True, nogil=True)
+def slide(
+    truth: Truth,
+    v: float,
+    plate: float,
+    push: float,
+    rail_up: float,
+    rail_down: float,
+    rod_up: float,
+    rod_down: float,
+) -> tuple[float, float, float]:
+    """The carriage's next velocity, and the rod's smooth and dry friction on it, for a velocity of
+    the plate; push: all other forces on the carriage."""
+    sliding = plate - v
+    smooth = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
+    after = solve(
+        truth.mass * v + STEP * (push + smooth),
+        truth.mass,
+        STEP * rail_up,
+        STEP * rail_down,
+        STEP * rod_up,
+        STEP * rod_down,
+        plate,
+    )
+    if after > plate:
+        return after, smooth, -rod_down
+    if after < plate:
+        return after, smooth, rod_up
+    rail = rail_up if after > 0.0 else (-rail_down if after < 0.0 else 0.0)
+    dry_force = truth.mass * (after - v) / STEP - push - smooth + rail
+    if after == 0.0:
+        # Both stick: what the rail can bear, it bears.
+        dry_force = dry_force - max(-rail_up, min(rail_down, dry_force))
+    return after, smooth, max(-rod_down, min(rod_up, dry_force))
+
+
+@numba.njit(cache=True, nogil=True)
+def plate_under_load(
+    truth: Truth,
+    v: float,
+    unloaded: float,
+    yielded: float,
+    pull: float,
+    push: float,
+    rail_up: float,
+    rail_down: float,
+    rod_up: float,
+    rod_down: float,
+) -> float:
+    """The velocity of a structure plate that yields to its load, by bisection on that load: a
+    greater one lets the plate run ahead, which makes it smaller. pull: of the motor, N."""
+    slack = truth.yielding + STEP
+    wide = rod_up + rod_down + 1.0 + abs(pull)
+    low, high = pull - wide, pull + wide
+    for _ in range(45):
+        load = 0.5 * (low + high)
+        plate = unloaded + (truth.structure_hydraulic.yields * load - yielded) / slack
+        _, smooth, dry_force = slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+        if load > pull - smooth - dry_force:
+            high = load
+        else:
+            low = load
+    return unloaded + (truth.structure_hydraulic.yields * 0.5 * (low + high) - yielded) / slack
 
 
 @numba.njit(cache=True, nogil=True)
@@ -450,9 +516,24 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
             rod_up *= 1.0 if way - rod_end >= 0.5 * truth.motor.lost - 1e-12 else 0.0
             rod_down *= 1.0 if rod_end - way >= 0.5 * truth.motor.lost - 1e-12 else 0.0
         smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
-        smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-        push = tyre - force - ripple - smooth_rail + smooth_rod
+        push = tyre - force - ripple - smooth_rail
         before = v
+        unloaded = (next_structure - structure) / STEP
+        if truth.structure_hydraulic.yields > 0.0:
+            plate = plate_under_load(
+                truth,
+                v,
+                unloaded,
+                structure_yield,
+                force + ripple,
+                push,
+                rail_up,
+                rail_down,
+                rod_up,
+                rod_down,
+            )
+        sliding = plate - v
+        smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
         if truth.bristle > 0.0:
             bound = rail_up if v > 0.0 else rail_down
             bent = (bristle_rail + STEP * v) / (
@@ -472,39 +553,21 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
                 truth.bristle * bristle_rod
                 + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
             )
-            v += STEP / truth.mass * (push - rail_force + rod_force)
+            v += STEP / truth.mass * (push + smooth_rod - rail_force + rod_force)
         else:
-            v = solve(
-                truth.mass * v + STEP * push,
-                truth.mass,
-                STEP * rail_up,
-                STEP * rail_down,
-                STEP * rod_up,
-                STEP * rod_down,
-                plate,
+            v, smooth_rod, rod_force = slide(
+                truth, v, plate, push, rail_up, rail_down, rod_up, rod_down
             )
-            if v > plate:
-                rod_force = -rod_down
-            elif v < plate:
-                rod_force = rod_up
-            else:
-                rail_force = rail_up if v > 0.0 else (-rail_down if v < 0.0 else 0.0)
-                rod_force = truth.mass * (v - before) / STEP - push + rail_force
-                if v == 0.0:
-                    # Both stick: what the rail can bear, it bears.
-                    rod_force = rod_force - max(-rail_up, min(rail_down, rod_force))
-                rod_force = max(-rod_down, min(rod_up, rod_force))
         acceleration = (v - before) / STEP
         x += STEP * v
         force += (1.0 - math.exp(-STEP / truth.electrical)) * (truth.constant * asked - force)
         cell = force + ripple - smooth_rod - rod_force
         ground_before, structure_before = ground_yield, structure_yield
         ground_yield += (
-            STEP / truth.yielding * (-truth.ground_hydraulic.yields * tyre - ground_yield)
+            STEP / (truth.yielding + STEP) * (-truth.ground_hydraulic.yields * tyre - ground_yield)
         )
-        structure_yield += (
-            STEP / truth.yielding * (truth.structure_hydraulic.yields * cell - structure_yield)
-        )
+        if truth.structure_hydraulic.yields > 0.0:
+            structure_yield += STEP * (plate - unloaded)
         ground, structure = next_ground, next_structure
     motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (
         ground,
