@@ -56,5 +56,7 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"{name}: {source}")
     if found.control is not None:
         print(f"controller: {found.control.text}")
+    for line in found.overlooked:
+        print(f"not taken into account: {line}")
     print("no mistakes")
     return 0

@@ -31,6 +31,11 @@ class Model(Protocol[P]):
     every: int
     """Ticks of the recording from one that is predicted to the next."""
 
+    @property
+    def band(self) -> float:
+        """Hz, up to which signals are predicted and judged; infinite for all."""
+        ...
+
     def predict(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
         ...
@@ -62,6 +67,11 @@ class Model(Protocol[P]):
     def propagated_noise(self, plant: P) -> Array | None:
         """What the noise of the signals that drive the model makes of the observed ones, shape
         (rows, ticks); None if they are known exactly."""
+        ...
+
+    def undetermined(self) -> Array | None:
+        """Ticks at which the inputs do not determine what is observed, whatever the plant, shape
+        (rows, ticks); None if there are none."""
         ...
 
     def halve_steps(self) -> Model[P]:
