@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.cross_validation import gap_level
-from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.finding import Answer, Gap, Interval, Verdict
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.text import sentence
@@ -39,8 +41,8 @@ def join(evidence: Evidence, found: Sequence[Diagnosis], started: float) -> Diag
     """
     answers = [each.answer for each in found]
     corrected = found[0].corrected._replace(plant=_merge(evidence.plant, found))
-    gap = _join_gaps(evidence, corrected.plant, answers)
-    weights = _weights(answers)
+    weights = _weights(found)
+    gap = _join_gaps(evidence, corrected.plant, answers, weights)
     effects = tuple(
         replace(effect, share=weight * effect.share)
         for answer, weight in zip(answers, weights, strict=True)
@@ -95,12 +97,15 @@ def _merge(plant: Plant, found: Sequence[Diagnosis]) -> Plant:
     return plant._replace(**changed)
 
 
-def _weights(answers: Sequence[Answer]) -> list[float]:
-    """Each part's share of the whole gap, in power above the noise."""
-    powers = [
-        len(answer.units) * max(answer.gap.before**2 - 1.0, 0.0) if answer.gap else 0.0
-        for answer in answers
-    ]
+def _weights(found: Sequence[Diagnosis]) -> list[float]:
+    """Each part's share of the whole gap, its signals in units of their own: noise differs too much
+    from joint to joint to compare them by it."""
+    powers = []
+    for each in found:
+        evidence = each.evidence
+        assert evidence is not None
+        errors = relative_errors(evidence, evidence.plant)
+        powers.append(len(evidence.names) * float(np.mean(np.square(errors))))
     whole = max(sum(powers), 1e-300)
     return [power / whole for power in powers]
 
@@ -112,9 +117,10 @@ def _join_verdicts(verdicts: Sequence[Verdict], named: bool) -> Verdict:
     return "unknown" if "unknown" in verdicts else "no gap"
 
 
-def _join_gaps(evidence: Evidence, plant: Plant, answers: Sequence[Answer]) -> Gap:
+def _join_gaps(
+    evidence: Evidence, plant: Plant, answers: Sequence[Answer], weights: Sequence[float]
+) -> Gap:
     gaps = [answer.gap for answer in answers if answer.gap is not None]
-    weights = _weights(answers)
 
     def shrink(of: Callable[[Gap], float]) -> float:
         left = sum(w * (1.0 - of(gap)) ** 2 for w, gap in zip(weights, gaps, strict=True))
