@@ -194,7 +194,12 @@ class Machine:
     def effects(self) -> Iterator[Effect]:
         """All effects that this machine can have. A computer's delay is only told from an
         actuator's where there are several."""
-        movers = {mover for replay in self.replays for mover in replay.moved_by}
+        movers = {
+            mover
+            for replay in self.replays
+            for mover in replay.moved_by
+            if (channel := self.components[mover].channel) and channel[0] == "/command"
+        }
         for effect in candidates(self.plant):
             if effect.group == "computer" and len(movers) < 2:
                 continue

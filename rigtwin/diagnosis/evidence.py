@@ -126,7 +126,7 @@ def lines(
         ]
     )
     if (undetermined := model.undetermined()) is not None:
-        fade *= ~undetermined
+        fade *= np.logical_not(undetermined)
     if (carried := model.propagated_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
 from rigtwin.numerics.arrays import Array
@@ -69,7 +72,7 @@ class Model(Protocol[P]):
         (rows, ticks); None if they are known exactly."""
         ...
 
-    def undetermined(self) -> Array | None:
+    def undetermined(self) -> NDArray[np.bool_] | None:
         """Ticks at which the inputs do not determine what is observed, whatever the plant, shape
         (rows, ticks); None if there are none."""
         ...

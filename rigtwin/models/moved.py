@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from rigtwin.components import Guide, PositionSensor, Rotor, measures
@@ -31,6 +32,8 @@ from rigtwin.signals.noise import smooth, white_noise
 
 STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands, and s for which it does to be at rest."""
+ENDS = 0.3
+"""s at both ends of a recording, where smoothing does not know how a motion goes on."""
 Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
 
@@ -251,17 +254,20 @@ class MovedModel:
         (position, speed, _), _, force = self._passage(component, plant)
         return Motion(position, speed, force)
 
-    def undetermined(self) -> Array | None:
-        """Where a joint rests, dry friction bears what nobody knows, up to its limits."""
+    def undetermined(self) -> NDArray[np.bool_]:
+        """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both
+        ends, accelerations are not known."""
         speeds = self._moved(self._machine.plant)[0][1]
         found = np.zeros((len(self.rows), speeds.shape[1]), bool)
+        end = round(ENDS / self._apart)
+        found[:, :end] = found[:, -end:] = True
         window = max(round(RESTING / self._apart), 3)
         for name, onto in self._onto.items():
             if isinstance(getattr(self._machine.plant, name), Guide):
                 speed = np.abs(self._along[name] @ speeds)
                 stands = speed < STANDING * float(np.sqrt(np.mean(speed**2)))
                 found |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
-        return found if found.any() else None
+        return found
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of the measured motions makes of the forces, by its way through smoothing,
