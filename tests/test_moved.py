@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import machines
+import rigtwin
+from rigtwin import import_data, run
 from rigtwin.components import with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.document import examine
@@ -197,3 +202,88 @@ def test_joints_that_share_nothing_are_one_answer(tmp_path):
     assert found.gap is not None
     assert found.verdict == "explained"
     assert found.gap.after < 1.5  # dry friction that jumps a tick early or late
+
+
+EXPERIMENT = """
+[experiments.swing]
+duration = 4.0
+period = 2e-3
+[experiments.swing.demands]
+angle_1 = "0.9 * sin(2 * time)"
+angle_2 = "0.7 * sin(3 * time)"
+"""
+
+
+def test_the_twin_reads_what_its_motion_takes(tmp_path):
+    machine = described_arm(tmp_path, TOML + COUPLED + EXPERIMENT)
+    done = run(machine, "swing", effects={"viscous@belt": 0.5})
+    time = done.time
+    sizes, frequencies = np.array([[0.9], [0.7]]), np.array([[2.0], [3.0]])
+    position = sizes * np.sin(frequencies * time)
+    rate = sizes * frequencies * np.cos(frequencies * time)
+    wanted = torques(position, rate, -(frequencies**2) * position) + 0.5 * rate.sum(axis=0)
+    for joint in range(2):
+        read = done.column("/sensor", f"torque_{joint + 1}")
+        assert rms((read - wanted[joint])[INSIDE]) < 5e-3 * rms(wanted[joint])
+        angle = done.column("/sensor", f"angle_{joint + 1}")
+        assert np.allclose(angle, position[joint], rtol=0.0, atol=1e-9)
+
+
+def test_a_missing_demand_is_named(tmp_path):
+    missing = EXPERIMENT.replace('angle_2 = "0.7 * sin(3 * time)"', "")
+    machine = described_arm(tmp_path, TOML + missing)
+    with pytest.raises(RigtwinError, match=r"no demand for /sensor\.angle_2"):
+        run(machine, "swing")
+
+
+REAL = Path(__file__).parents[2] / "shared" / "real"
+PUBLISHED = {
+    "joint_1": (6.97, 8.11),
+    "joint_2": (8.12, 5.60),
+    "joint_3": (6.31, 1.98),
+    "joint_4": (2.48, 1.11),
+}
+"""Coulomb Nm and viscous Nms/rad of the TX40, as its authors identified them."""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (REAL / "tx40").is_dir(), reason="the arm's records are not here")
+def test_friction_of_a_real_arm_is_what_was_published(tmp_path):
+    files = [REAL / "tx40" / f"{name}_data.csv" for name in ("pos_read", "curr")]
+    maps = Path(machines.__file__).parent / "maps"
+    data = import_data(files, maps / "tx40.toml", tmp_path / "tx40.mcap")
+    found = rigtwin.diagnose(data)
+    values = {str(e.name): next(iter(e.parameters.values())).value for e in found.effects}
+    assert found.verdict == "partly explained"
+    kinds = {effect.name.kind for effect in found.effects if effect.name.component != "joint_2"}
+    assert kinds == {"coulomb", "viscous"}
+    for joint, (coulomb, viscous) in PUBLISHED.items():
+        assert values[f"coulomb@{joint}"] == pytest.approx(coulomb, rel=0.08)
+        assert values[f"viscous@{joint}"] == pytest.approx(viscous, rel=0.08)
+    # Published for q5' and q6' apart: what goes with their sum counts at joint 5 too.
+    assert values["coulomb@joint_5"] == pytest.approx(3.03, rel=0.08)
+    assert values["viscous@joint_5"] + values["viscous@wrist"] == pytest.approx(1.86, rel=0.08)
+    assert values["coulomb@wrist"] == pytest.approx(2.03, rel=0.08)
+    assert values["viscous@wrist"] == pytest.approx(0.60, rel=0.12)
+    assert found.gap is not None
+    assert found.gap.shrinkage_held_out.low > 0.85
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (REAL / "double_pendulum").is_dir(), reason="its records are not here")
+def test_friction_of_a_real_double_pendulum_is_part_of_what_is_there(tmp_path):
+    maps = Path(machines.__file__).parent / "maps"
+    records = [
+        import_data(
+            REAL / "double_pendulum" / f"{name}.csv",
+            maps / "double_pendulum.toml",
+            tmp_path / f"{name}.mcap",
+        )
+        for name in ("055640", "055903", "060143", "060245", "060329", "060440")
+    ]
+    found = rigtwin.diagnose(records[:4], held_out=records[4:])
+    assert found.verdict == "partly explained"
+    assert {str(effect.name) for effect in found.effects} == {"coulomb@shoulder", "coulomb@elbow"}
+    values = [next(iter(effect.parameters.values())).value for effect in found.effects]
+    assert all(0.09 < value < 0.155 for value in values)
+    assert any("torque_1" in place.component for place in found.answer.leftovers)
