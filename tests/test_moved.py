@@ -75,8 +75,8 @@ def test_a_friction_acts_where_it_is(tmp_path, moved, component, values, onto, f
     change = model.predict(with_parameters(plant, component, values)) - model.predict(plant)
     wanted = np.outer(onto, force(moved[1]))
     # Where it reverses, a tick early or late is no error of its size.
-    assert np.median(np.abs(change - wanted)[:, INSIDE]) < 1e-3
-    assert rms((change - wanted)[:, INSIDE]) < 0.05 * rms(wanted)
+    off = np.abs(change - wanted)[:, INSIDE] > 2e-3
+    assert float(np.mean(off)) < 0.01
 
 
 def test_a_rotor_turns_with_its_own_coordinate(tmp_path, moved):
