@@ -13,7 +13,7 @@ import numpy as np
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.finding import Answer, Gap, Interval, Verdict
+from rigtwin.diagnosis.finding import Answer, Gap, Interval, Step, Verdict
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.text import sentence
 
@@ -69,7 +69,7 @@ def join(evidence: Evidence, found: Sequence[Diagnosis], started: float) -> Diag
         recordings=answers[0].recordings,
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
-        steps=tuple(step for answer in answers for step in answer.steps),
+        steps=_join_steps(answers),
         units={name: unit for answer in answers for name, unit in answer.units.items()},
         leftovers=tuple(place for answer in answers for place in answer.leftovers),
         traces=tuple(trace for answer in answers for trace in answer.traces),
@@ -84,6 +84,20 @@ def join(evidence: Evidence, found: Sequence[Diagnosis], started: float) -> Diag
 def _chain(groups: Iterable[Iterable[Item]]) -> list[Item]:
     """All of them in order, each once."""
     return list(dict.fromkeys(item for group in groups for item in group))
+
+
+def _join_steps(answers: Sequence[Answer]) -> tuple[Step, ...]:
+    """What each part's effects leave of all signals, part after part, the nominal machine first."""
+    chains = [answer.steps for answer in answers if answer.steps]
+    if not chains:
+        return ()
+    left = {name: value for chain in chains for name, value in chain[0].left.items()}
+    found = [replace(chains[0][0], left=left)]
+    for chain in chains:
+        for step in chain[1:]:
+            left = {**left, **step.left}
+            found.append(replace(step, left=left))
+    return tuple(found)
 
 
 def _merge(plant: Plant, found: Sequence[Diagnosis]) -> Plant:
