@@ -12,7 +12,7 @@ import rigtwin
 from rigtwin import import_data, run
 from rigtwin.components import with_parameters
 from rigtwin.components.plant import Plant
-from rigtwin.description.document import examine
+from rigtwin.description.document import examine, load
 from rigtwin.description.machine import Structure
 from rigtwin.description.parts import parts
 from rigtwin.diagnosis.diagnose import diagnose
@@ -20,8 +20,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.models.moved import MovedModel
 from tests.helpers.arm import (
+    BELT,
     COUPLED,
     TOML,
+    URDF,
     described_arm,
     motion,
     recording,
@@ -91,6 +93,31 @@ def test_a_rotor_turns_with_its_own_coordinate(tmp_path, moved):
     )
     wanted = 0.04 * np.tile(moved[2].sum(axis=0), (2, 1))
     assert rms((change - wanted)[:, INSIDE]) < 5e-3 * rms(wanted)
+
+
+def test_a_urdf_is_read_and_its_joints_are_sensed(tmp_path, moved):
+    (tmp_path / "arm.urdf").write_text(URDF)
+    lines = ["[machine]", 'name = "arm"', 'model = "arm.urdf"']
+    for number, (joint, inertia) in enumerate((("shoulder", 0.05), ("elbow", 0.02)), start=1):
+        for name, more in (
+            (f"angle_{number}", 'type = "position sensor"'),
+            (f"torque_{number}", 'type = "force sensor"'),
+            (f"rotor_{number}", f'type = "rotor"\ninertia = {inertia}'),
+        ):
+            lines += [f"[components.{name}]", f'joint = "{joint}"', more, "effects = []"]
+    lines += ["[[replays]]", 'moved_by = ["angle_1", "angle_2"]']
+    lines += ['observe = ["torque_1", "torque_2"]']
+    (tmp_path / "arm.toml").write_text("\n".join(lines))
+    machine = load(tmp_path / "arm.toml")
+    true = (
+        torques(*moved)
+        - BELT * moved[2].sum(axis=0)
+        - np.stack([0.0 * moved[1][1], 0.1 * moved[1][1]])
+    )
+    data = recording(moved[0], true, (0.0, 0.0))
+    configuration = machine.configuration_of(data)
+    found = model_of(machine, data, configuration, 1).predict(configuration.plant)
+    assert rms((found - true)[:, INSIDE]) < 2e-3 * rms(true)
 
 
 def test_noise_of_measured_angles_is_carried_into_the_torques(tmp_path, moved):

@@ -64,7 +64,7 @@ def _joints(
 def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
     """Dry friction that no component stands for: it is none of what MuJoCo's inverse dynamics
     give without constraints."""
-    described = {(each.element, each.mjcf) for each in components.values()}
+    described = {(each.element, each.mjcf) for each in components.values() if each.channel is None}
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         lost = model.dof_frictionloss[model.jnt_dofadr[number]]

@@ -28,6 +28,22 @@ MJCF = """<mujoco model="arm"><compiler angle="radian"/><worldbody>
 <jointactuatorfrc name="torque_1" joint="shoulder"/>
 <jointactuatorfrc name="torque_2" joint="elbow"/></sensor></mujoco>
 """
+LINK = """<link name="{name}"><inertial><origin xyz="0 0 {centre}"/><mass value="{mass}"/>
+<inertia ixx="{about}" iyy="{about}" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="{joint}" type="continuous"><parent link="{parent}"/><child link="{name}"/>
+<origin xyz="0 0 {place}"/><axis xyz="0 -1 0"/></joint>"""
+URDF = (
+    '<robot name="arm"><link name="stand"/>'
+    + LINK.format(
+        name="upper", joint="shoulder", parent="stand", place=0, centre=-0.2, mass=2, about=0.03
+    )
+    + LINK.format(
+        name="lower", joint="elbow", parent="upper", place=-0.4, centre=-0.15, mass=1.2, about=0.012
+    )
+    + '<link name="tool"/><joint name="flange" type="fixed"><parent link="lower"/>'
+    '<child link="tool"/></joint></robot>'
+)
+"""The same arm, without rotors, belt and damper, and with a tool that has no mass."""
 TOML = """
 [machine]
 name = "arm"
