@@ -61,6 +61,8 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"{name}: {source}")
     if found.control is not None:
         print(f"controller: {found.control.text}")
+    for line in found.overlooked:
+        print(f"not taken into account: {line}")
     _print_never(found)
     print("no mistakes")
     return 0

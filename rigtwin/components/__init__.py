@@ -13,6 +13,7 @@ from rigtwin.components.motor import Motor
 from rigtwin.components.plant import Plant, with_parameters
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.rig import RigPlant
+from rigtwin.components.rotor import Rotor
 from rigtwin.components.sensors import (
     ForceSensor,
     LoadCell,
@@ -46,6 +47,7 @@ __all__ = [
     "PositionSensor",
     "Rail",
     "RigPlant",
+    "Rotor",
     "Scales",
     "Starts",
     "Swing",

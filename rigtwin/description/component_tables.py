@@ -19,6 +19,7 @@ from rigtwin.description.tolerance import Tolerance
 TYPES: dict[str, type] = {
     "mass": components.Mass,
     "guide": components.Guide,
+    "rotor": components.Rotor,
     "force actuator": components.ForceActuator,
     "position actuator": components.PositionActuator,
     "position sensor": components.PositionSensor,
@@ -108,7 +109,8 @@ class Components:
         self.values[name] = self._fill(
             name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
         )
-        turns = bool(joint) and bool(mechanism.model.joint(joint).type[0] == 3)
+        acts_on = mechanism.acts_on(element, mjcf)
+        turns = bool(acts_on) and all(mechanism.turns(each) for each, _ in acts_on)
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
             if key in table and not isinstance(table[key], str):
@@ -142,6 +144,8 @@ class Components:
             channel=channel,
             unit=unit,
             kinds=self._kinds(where, kind, table),
+            acts_on=acts_on,
+            turns=turns,
         )
 
     def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:
@@ -154,7 +158,7 @@ class Components:
             return str(table["type"])
         if element == "body":
             return "mass"
-        if element == "joint":
+        if element == "joint" or (element == "tendon" and self._mechanism.acts_on(element, mjcf)):
             return "guide"
         if element == "actuator":
             return "position actuator" if self._mechanism.positions(mjcf) else "force actuator"
@@ -200,8 +204,10 @@ class Components:
         }
         if kind == "mass" and joint:
             component = component._replace(mass=self._mechanism.joint(joint).inertia)
-        elif kind == "guide" and joint:
-            component = component._replace(**self._mechanism.friction(joint))
+        elif kind == "guide" and (element == "tendon" or joint):
+            component = component._replace(**self._mechanism.friction(element, mjcf))
+        elif kind == "rotor" and (element == "tendon" or joint):
+            component = component._replace(inertia=self._mechanism.armature(element, mjcf))
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
             if constant <= 0.0:

@@ -18,6 +18,7 @@ from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.overlooked import overlooked
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
 
@@ -95,6 +96,7 @@ class _Reader:
         control = self._control(components)
         reader = Replays(mechanism, components, control, self._mistakes)
         replays = reader.read(self._document.get("replays", []))
+        structure = reader.structure(replays)
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
         experiments = self._experiments()
@@ -102,11 +104,7 @@ class _Reader:
             return None
         reader.tolerate_timing(replays)
         values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
-        made = (
-            RigPlant
-            if components.structure is Structure.QUARTER_CAR
-            else namedtuple("Plant", list(values))
-        )  # type: ignore[misc]
+        made = RigPlant if structure is Structure.QUARTER_CAR else namedtuple("Plant", list(values))  # type: ignore[misc]
         plant: Any = made(**values)
         return Machine(
             name=name,
@@ -114,7 +112,7 @@ class _Reader:
             path=self._path,
             model=self._model_path(about),
             plant=plant,
-            structure=components.structure,
+            structure=structure,
             components=components.found,
             tolerances=tuple(components.tolerances),
             replays=replays,
@@ -125,6 +123,9 @@ class _Reader:
             told=components.told,
             experiments=experiments,
             next_tests=self._next_tests(),
+            overlooked=()
+            if structure is Structure.QUARTER_CAR
+            else overlooked(mechanism.model, components.found, replays),
         )
 
     def _next_tests(self) -> tuple[str, ...]:

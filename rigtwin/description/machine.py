@@ -43,13 +43,15 @@ class Structure(Enum):
 
     QUARTER_CAR = "a quarter car between two hydraulic cylinders"
     JOINTS = "joints that do not act on each other"
+    MOVED = "joints that act on each other, each moved as measured"
 
 
 @dataclass(frozen=True)
 class Component:
     """One component. element: what of the MJCF it is, with that name; joint: the joint that it
     belongs to; channel: where recordings hold its signal, topic and field; unit: of that signal;
-    kinds: of effects that it may have, None for all."""
+    kinds: of effects that it may have, None for all; acts_on: joints that a force along its
+    own coordinate acts on, how far that goes for each unit of theirs; turns: is it an angle?"""
 
     name: str
     element: str
@@ -58,6 +60,8 @@ class Component:
     channel: tuple[str, str] | None = None
     unit: str = ""
     kinds: frozenset[str] | None = None
+    acts_on: tuple[tuple[str, float], ...] = ()
+    turns: bool = False
 
 
 @dataclass(frozen=True)
@@ -86,9 +90,11 @@ class Joint:
 
 @dataclass(frozen=True)
 class ReplayOf:
-    """How a joint is replayed. moved_by: the components whose signals move it: a position sensor
-    prescribes its motion, a position actuator its motion through that actuator, a force actuator
-    pushes it. closed: whether the controller commands that actuator, or the recording does."""
+    """How a joint is replayed, or several that act on each other: then `joint` is the first of
+    them. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
+    position actuator its motion through that actuator, a force actuator pushes it. closed: whether
+    the controller commands that actuator, or the recording does; band: Hz up to which its signals
+    are judged, None for all that is measured."""
 
     name: str
     joint: Joint
@@ -97,6 +103,7 @@ class ReplayOf:
     guide: str | None
     mass: str | None
     closed: bool
+    band: float | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +114,8 @@ class Machine:
     rough: whether nominal values are only a start; form: share of a signal that no model is held
     to, None for the usual one; told: `component.parameter` → setting of the recording's controller
     that says its value; experiments: Python module that has them, or tables of the description;
-    next_tests: those that a diagnosis may propose.
+    next_tests: those that a diagnosis may propose; overlooked: what of the MJCF is not taken into
+    account, a line each.
     """
 
     name: str
@@ -126,6 +134,7 @@ class Machine:
     told: Mapping[str, str] = field(default_factory=dict, repr=False)
     experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
     next_tests: tuple[str, ...] = ()
+    overlooked: tuple[str, ...] = ()
 
     @property
     def configuration(self) -> Configuration:
@@ -185,7 +194,12 @@ class Machine:
     def effects(self) -> Iterator[Effect]:
         """All effects that this machine can have. A computer's delay is only told from an
         actuator's where there are several."""
-        movers = {mover for replay in self.replays for mover in replay.moved_by}
+        movers = {
+            mover
+            for replay in self.replays
+            for mover in replay.moved_by
+            if (channel := self.components[mover].channel) and channel[0] == "/command"
+        }
         for effect in candidates(self.plant):
             if effect.group == "computer" and len(movers) < 2:
                 continue
@@ -209,8 +223,7 @@ class Machine:
             return unit
         if "unit of the command" in unit:
             unit = unit.replace("unit of the command", component.unit or "1")
-        turning = any(r.joint.turns and r.joint.name == component.joint for r in self.replays)
-        return TURNING.get(unit, unit) if turning else unit
+        return TURNING.get(unit, unit) if component.turns else unit
 
 
 SAME_AS = {"gain": "constant"}

@@ -36,6 +36,19 @@ SENSORS = {
 """Sensor of an MJCF → what it measures."""
 
 
+MASSLESS = 1e-6
+"""kg, and kg m² times as much again, of a link that a URDF gives no mass: MuJoCo wants some."""
+
+
+def compile_model(path: Path) -> mujoco.MjModel:
+    """The model of an MJCF or a URDF. Raises ValueError if it is none."""
+    if path.suffix.lower() != ".urdf":
+        return mujoco.MjModel.from_xml_path(str(path))
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.boundmass, spec.compiler.boundinertia = MASSLESS, MASSLESS**2
+    return spec.compile()
+
+
 class Mechanism:
     """An MJCF, compiled."""
 
@@ -44,7 +57,7 @@ class Mechanism:
         if not path.is_file():
             raise RigtwinError(f"model {path} does not exist")
         try:
-            self.model = mujoco.MjModel.from_xml_path(str(path))
+            self.model = compile_model(path)
         except ValueError as error:
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
 
@@ -120,14 +133,48 @@ class Mechanism:
             limit = min(limit, abs(gear) * float(self.model.actuator_forcerange[number, 1]))
         return gear * gain, limit
 
-    def friction(self, joint: str) -> dict[str, float]:
-        """What the MJCF gives a joint of friction and stiffness, by the parameters of a Guide."""
-        number = self.number("joint", joint)
-        at = int(self.model.jnt_dofadr[number])
+    def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:
+        """Joints that a force along an element's own coordinate acts on, and how far that goes for
+        each unit of theirs: a fixed tendon has several; none where there is no such coordinate."""
+        if element != "tendon":
+            joint = self.joint_of(element, name)
+            return ((joint, 1.0),) if joint else ()
+        model, number = self.model, self.number(element, name)
+        first = int(model.tendon_adr[number])
+        wraps = range(first, first + int(model.tendon_num[number]))
+        if any(model.wrap_type[at] != mujoco.mjtWrap.mjWRAP_JOINT for at in wraps):
+            return ()
+        return tuple(
+            (self.joint_name(int(model.wrap_objid[at])), float(model.wrap_prm[at])) for at in wraps
+        )
+
+    def turns(self, joint: str) -> bool:
+        """Whether a joint is a hinge."""
+        kind = int(self.model.jnt_type[self.number("joint", joint)])
+        return kind == mujoco.mjtJoint.mjJNT_HINGE
+
+    def armature(self, element: str, name: str) -> float:
+        """The inertia that the MJCF gives a joint or a tendon for itself, kg or kg m²."""
+        number = self.number(element, name)
+        if element == "tendon":
+            return float(self.model.tendon_armature[number])
+        return float(self.model.dof_armature[int(self.model.jnt_dofadr[number])])
+
+    def friction(self, element: str, name: str) -> dict[str, float]:
+        """What the MJCF gives a joint or a tendon of friction and stiffness, by the parameters of a
+        Guide."""
+        model, number = self.model, self.number(element, name)
+        if element == "tendon":
+            dry, damping = model.tendon_frictionloss[number], model.tendon_damping[number]
+            stiffness = model.tendon_stiffness[number]
+        else:
+            at = int(model.jnt_dofadr[number])
+            dry, damping = model.dof_frictionloss[at], model.dof_damping[at]
+            stiffness = model.jnt_stiffness[number]
         return {
-            "coulomb": float(self.model.dof_frictionloss[at]),
-            "viscous": float(np.ravel(self.model.dof_damping[at])[0]),
-            "stiffness": float(np.ravel(self.model.jnt_stiffness[number])[0]),
+            "coulomb": float(dry),
+            "viscous": float(np.ravel(damping)[0]),
+            "stiffness": float(np.ravel(stiffness)[0]),
         }
 
     def joint(self, name: str) -> Joint:

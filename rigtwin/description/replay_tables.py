@@ -58,7 +58,7 @@ class Replays:
 
     def _replay(self, where: str, table: Mapping[str, Any], number: int) -> ReplayOf | None:
         before = len(self._mistakes)
-        self._mistakes.unknown(where, table, ("name", "moved_by", "observe"))
+        self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band"))
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
         known = [
@@ -91,12 +91,11 @@ class Replays:
         quarter_car = self._components.structure is Structure.QUARTER_CAR
         joint_name = "" if quarter_car else self._components.found[movers[0]].joint
         if len(movers) > 1 and not quarter_car:
+            return self._moved_together(where, table, number, movers, rows)
+        if "band" in table:
             self._mistakes.note(
-                where,
-                f"moved by {len(movers)} components; expected one, "
-                "and another replay for each other joint",
+                where, "band is for joints that move together; this replay moves one"
             )
-            return None
         if not joint_name and not quarter_car:
             self._mistakes.note(
                 where, f"{movers[0]} acts on no joint of its own; expected one that does"
@@ -157,6 +156,74 @@ class Replays:
             closed=closed,
         )
 
+    def _moved_together(
+        self,
+        where: str,
+        table: Mapping[str, Any],
+        number: int,
+        movers: list[str],
+        rows: list[Row],
+    ) -> ReplayOf | None:
+        """A replay of joints that act on each other: each moved as its position sensor measured."""
+        found, types = self._components.found, self._components.types
+        before = len(self._mistakes)
+        joints = [found[mover].joint for mover in movers]
+        for mover, joint in zip(movers, joints, strict=True):
+            if SENSED.get(types[mover]) != "position" or not joint:
+                self._mistakes.note(
+                    where,
+                    f"moved by {len(movers)} components, {mover} among them, which is a "
+                    f"{types[mover]}{'' if joint else ' of no joint'}; where joints act on each "
+                    "other, expected a position sensor of each",
+                )
+            elif joints.count(joint) > 1:
+                self._mistakes.note(where, f"joint {joint} is moved by two sensors; expected one")
+        for row in rows:
+            if row.kind != "force" or found[row.name].joint not in joints:
+                self._mistakes.note(
+                    where,
+                    f"{row.name} cannot be observed where all joints move as measured; expected "
+                    f"sensors of the force on {', '.join(filter(None, joints))}",
+                )
+        if len(self._mistakes) > before:
+            return None
+        try:
+            first = self._mechanism.joint(joints[0])
+        except RigtwinError as error:
+            self._mistakes.note(where, str(error))
+            return None
+        return ReplayOf(
+            name=str(table.get("name", f"replay {number}")),
+            joint=first,
+            moved_by=tuple(movers),
+            rows=tuple(rows),
+            guide=None,
+            mass=None,
+            closed=False,
+            band=self._mistakes.number(f"{where} band", table["band"], 0.1, 1e4)
+            if "band" in table
+            else None,
+        )
+
+    def structure(self, replays: tuple[ReplayOf, ...]) -> Structure:
+        """What the components and their replays make up."""
+        if self._components.structure is Structure.QUARTER_CAR:
+            return Structure.QUARTER_CAR
+        together = [replay for replay in replays if len(replay.moved_by) > 1]
+        if together and len(replays) > 1:
+            self._mistakes.note(
+                f"[[replays]] {together[0].name}",
+                "its joints act on each other; expected no replay beside it",
+            )
+        if not together and any(
+            component.element == "tendon" for component in self._components.found.values()
+        ):
+            self._mistakes.note(
+                "[components]",
+                "a tendon couples joints; expected one replay, moved by all their sensors",
+            )
+        return Structure.MOVED if together else Structure.JOINTS
+
     def _closes(self, mover: str) -> bool:
         """Whether the described controller commands it, and can be run along."""
         control, channel = self._control, self._components.found[mover].channel
@@ -207,8 +274,10 @@ class Replays:
         the period is the recording's."""
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
+            # Of joints that move together only what is observed is timed: against all of them.
+            alone = () if self.structure(replays) is Structure.MOVED else replay.moved_by[:1]
             names = [
-                *replay.moved_by[:1],
+                *alone,
                 *(row.name for row in replay.rows if row.kind != "command"),
             ]
             for name in names:

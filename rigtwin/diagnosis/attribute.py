@@ -13,7 +13,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.held_out_judge import HeldOutJudge
+from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.selection import Selection, select
@@ -352,7 +352,11 @@ def _conclude_rough(
     found = (
         bool(best.effects)
         and nothing.misfit - best.misfit > least
-        and (not more or empty.score - chosen.score > rules.least)
+        and (
+            not more
+            or empty.score - chosen.score > rules.least
+            or _is_in_every_recording(selection, empty)
+        )
     )
     # What adds to the chosen one is no rival of it.
     rivals = [
@@ -380,6 +384,18 @@ def _conclude_rough(
         silent=silent,
         chain=tuple(chain),
         selection=selection,
+    )
+
+
+def _is_in_every_recording(selection: Selection, empty: Judged) -> bool:
+    """Whether each of several recordings asks for the same: then it is there, though much more is
+    left."""
+    chosen, rules = selection.chosen, selection.rules
+    nominal = [e.nominal(selection.nominal)[e.kind.parameters[0]] for e in chosen.fit.effects]
+    return (
+        len(chosen.errors) >= rules.several
+        and bool(np.all(chosen.errors < empty.errors))
+        and chosen.is_stable(nominal, rules.certain)
     )
 
 

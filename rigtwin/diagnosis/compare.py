@@ -67,7 +67,7 @@ def compare(
     notes = (*recording.notes, *(fault.message for fault in faults))
     evidence = Evidence(machine, [recording], [configuration])
     gap = gap_level(evidence, configuration.plant)
-    if machine.structure is Structure.JOINTS:
+    if machine.structure is not Structure.QUARTER_CAR:
         return Comparison(signal_residuals(evidence), {}, notes, gap)
     replays = ComponentReplays(recording, configuration)
     left_out: dict[str, str] = {}

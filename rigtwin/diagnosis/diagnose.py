@@ -16,6 +16,7 @@ from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.parts import parts
 from rigtwin.diagnosis.attribute import Attribution, attribute, prefer_held_out
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
@@ -39,6 +40,7 @@ from rigtwin.diagnosis.findings import (
     list_unobservable,
 )
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.join import join
 from rigtwin.diagnosis.leftover import leftovers, steps
 from rigtwin.diagnosis.levels import compute_levels
 from rigtwin.diagnosis.localisation import locate
@@ -132,9 +134,16 @@ def diagnose(
         others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
             require_fit(machine, recording, configuration)
-        evidence = Evidence(machine, recordings, configurations)
-        apart = Evidence(machine, held_out, others) if held_out else None
-        return _diagnose(evidence, apart, tests, progress, thresholds, started)
+
+        def diagnose_part(part: Machine) -> Diagnosis:
+            evidence = Evidence(part, recordings, configurations)
+            apart = Evidence(part, held_out, others) if held_out else None
+            return _diagnose(evidence, apart, tests, progress, thresholds, started)
+
+        found = [diagnose_part(part) for part in parts(machine)]
+        if len(found) == 1:
+            return found[0]
+        return join(Evidence(machine, recordings, configurations), found, started)
 
 
 def _diagnose(

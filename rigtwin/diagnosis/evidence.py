@@ -9,6 +9,7 @@ says nothing of the plant and is left out.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
+from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import remove_mains, smallest_step, white_noise
 from rigtwin.signals.runs import find_cut_off
 
@@ -105,12 +107,13 @@ def lines(
         The recording in the frequency domain.
     """
     whole = np.stack([recording.column(*row.channel) for row in machine.rows])
-    measured = whole[:, :: model.every].copy()
+    measured = limit_band(whole, model.band, recording.period)[:, :: model.every].copy()
     rows, ticks = measured.shape
     period = model.every * recording.period
+    limited = math.isfinite(model.band)
     length = int(next_fast_len(ticks, real=True) or ticks)
     frequency = rfftfreq(length, period)
-    kept = frequency <= min(HIGHEST, 0.4 / period)
+    kept = frequency <= min(HIGHEST, 0.4 / period, model.band)
     width = max(MAINS_WIDTH, 2.0 / (ticks * period))
     off_mains = np.abs(frequency[kept] - plant.mains.frequency) > width
     noise = np.array([white_noise(row) for row in whole])
@@ -122,6 +125,8 @@ def lines(
             for row in whole
         ]
     )
+    if (undetermined := model.undetermined()) is not None:
+        fade *= np.logical_not(undetermined)
     if (carried := model.propagated_noise(plant)) is not None:
         # A controller's command has no noise but its sensors'.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
@@ -130,7 +135,9 @@ def lines(
         form = machine.form_of(machine.rows[row])
         swing = fade[row] * (measured[row] - np.mean(measured[row]))
         power = np.abs(rfft(swing, length)[kept]) ** 2
-        spread[row] = 0.5 * float(fade[row] @ fade[row]) * floor[row] ** 2
+        # Noise was filtered before ticks were left out, so none is folded into the band.
+        folded = 1.0 / model.every if limited else 1.0
+        spread[row] = 0.5 * float(fade[row] @ fade[row]) * folded * floor[row] ** 2
         if carried is not None:
             spread[row] += 0.5 * _smooth(
                 np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY
@@ -143,6 +150,10 @@ def lines(
             # What a signal's swing is held to says nothing of its mean.
             variance[0] = spread[row, 0] + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
+    if limited:
+        # Of white noise only what lies in the band is left, and no bits.
+        floor = floor * math.sqrt(min(2.0 * model.band * recording.period, 1.0))
+        resolution = np.zeros_like(resolution)
     if carried is not None:
         floor = np.sqrt(floor**2 + np.var(carried, axis=1))
     floor = np.maximum(floor, 1e-300)

@@ -54,7 +54,7 @@ def compute_levels(
         Level of each component's replay, or of each signal of joints; and that of the closed
         loop's spectra, None where the machine has no twin of it or the test is too short.
     """
-    if evidence.machine.structure is Structure.JOINTS:
+    if evidence.machine.structure is not Structure.QUARTER_CAR:
         return _signal_levels(evidence, plant), None
     recording, nominal = evidence.recordings[0], evidence.configurations[0]
     replays = _component_levels(recording, nominal, nominal._replace(plant=plant))

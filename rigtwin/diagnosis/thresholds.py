@@ -68,7 +68,12 @@ class SelectionRules:
     needed: float = 0.03
     """Difference on held-out recordings that an effect must bring to stay."""
     least: float = 0.35
-    """Difference from the nominal machine that an explanation must bring to be named at all."""
+    """Difference from the nominal machine that an explanation must bring to be named at all,"""
+    several: int = 3
+    """unless each of so many recordings is predicted better with it,"""
+    certain: float = 10.0
+    """and its magnitudes, from recording to recording, are off nominal by that many standard
+    errors."""
 
     def confidence(self, margin: float) -> float:
         """Of an effect without which everything does worse by a margin."""

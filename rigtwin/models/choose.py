@@ -3,6 +3,7 @@ structure alone."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.models.joint import JointModel
 from rigtwin.models.model import Form, Model
+from rigtwin.models.moved import MovedModel
 from rigtwin.models.quarter_car import QuarterCarModel
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -38,7 +40,7 @@ def model_of(
     Returns
     -------
     Model
-        That of a quarter car, or of one or several joints.
+        That of a quarter car, of one or several joints, or of joints that act on each other.
 
     Raises
     ------
@@ -47,6 +49,8 @@ def model_of(
     """
     if machine.structure is Structure.QUARTER_CAR:
         return QuarterCarModel.of(recording, configuration, steps)
+    if machine.structure is Structure.MOVED:
+        return MovedModel(machine, machine.replays[0], recording)
     joints = [
         JointModel(machine, replay, recording, configuration, steps) for replay in machine.replays
     ]
@@ -59,6 +63,11 @@ class Joints:
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)
         self.every = joints[0].every
+
+    @property
+    def band(self) -> float:
+        """Infinite."""
+        return math.inf
 
     def predict(self, plant: Plant) -> Array:
         return np.concatenate([each.predict(plant) for each in self._joints])
@@ -96,6 +105,9 @@ class Joints:
 
     def motion(self, component: str, plant: Plant) -> Motion:
         return self._joints[self._index_of(component)].motion(component, plant)
+
+    def undetermined(self) -> None:
+        """None, as of each."""
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         parts = [each.propagated_noise(plant) for each in self._joints]

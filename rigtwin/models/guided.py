@@ -80,6 +80,45 @@ def gravity(inertia: Inertia, position: float) -> float:
 
 
 @kernel
+def resist(
+    guide: Guide,
+    dry_friction: Friction,
+    spring: float,
+    rest: float,
+    period: float,
+    motion: Array,
+    out: Array,
+) -> None:
+    """Adds a guide's forces to the load that it transmits.
+
+    Parameters
+    ----------
+    guide, dry_friction
+        What resists the motion.
+    spring
+        In series with the dry friction, N/m.
+    rest
+        Where the guide's own spring is slack, m.
+    period
+        s, of a tick.
+    motion
+        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+    out
+        The load, N, shape (ticks,); the whole force is written here.
+    """
+    slider, viscous = motion[0, 0], 0.0
+    share = period / (guide.relaxation + period)
+    for tick in range(motion.shape[1]):
+        x, v = motion[0, tick], motion[1, tick]
+        transmitted = out[tick] + position_force(guide, x, rest)
+        forward, backward = dry_limits(dry_friction, v, transmitted)
+        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
+        slider += by
+        viscous += share * (damping(guide, v) * v - viscous)
+        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+
+
+@kernel
 def inverse_dynamics(
     guide: Guide,
     dry_friction: Friction,
@@ -104,18 +143,10 @@ def inverse_dynamics(
     out
         The force is written here, N, shape (ticks,).
     """
-    slider, viscous = motion[0, 0], 0.0
-    share = period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
-        x, v, a = motion[0, tick], motion[1, tick], motion[2, tick]
-        transmitted = (
-            inertia.mass * a + gravity(inertia, x) + position_force(guide, x, inertia.rest)
-        )
-        forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
-        slider += by
-        viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+        x, a = motion[0, tick], motion[2, tick]
+        out[tick] = inertia.mass * a + gravity(inertia, x)
+    resist(guide, dry_friction, spring, inertia.rest, period, motion, out)
 
 
 @kernel

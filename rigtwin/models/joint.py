@@ -3,6 +3,7 @@ actuator."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -57,6 +58,32 @@ def _contain(signals: Array) -> Array:
     if float(np.abs(signals).max()) <= RUNAWAY:
         return signals
     return np.clip(np.nan_to_num(signals, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+
+
+def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
+    """The motion behind a measured one that was smoothed before.
+
+    Parameters
+    ----------
+    sensor
+        Whose offset, gain, lag and delay are undone.
+    measured
+        Shape (ticks,).
+    period
+        s, of a tick.
+
+    Returns
+    -------
+    array
+        Shape (ticks,).
+    """
+    signal = measured
+    if sensor.lag > 0.0:
+        signal = signal + sensor.lag * np.gradient(signal, period)
+    if sensor.delay != 0.0:
+        ticks = np.arange(len(signal))
+        signal = np.interp(ticks + sensor.delay / period, ticks, signal)
+    return (signal - sensor.offset) / sensor.gain
 
 
 class JointModel:
@@ -119,6 +146,11 @@ class JointModel:
         self._starts: dict[tuple[object, ...], Start] = {}
         self._remembered = recording.ticks
         self._held = self._find_held()
+
+    @property
+    def band(self) -> float:
+        """Infinite."""
+        return math.inf
 
     def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
@@ -268,13 +300,7 @@ class JointModel:
         """The position behind a measured motion: the sensor's offset, gain, lag and delay undone.
         Of a velocity its mean is no motion, as what is tested does not move away."""
         assert self._motion is not None
-        signal = self._motion
-        if sensor.lag > 0.0:
-            signal = signal + sensor.lag * np.gradient(signal, self._period)
-        if sensor.delay != 0.0:
-            ticks = np.arange(len(signal))
-            signal = np.interp(ticks + sensor.delay / self._period, ticks, signal)
-        signal = (signal - sensor.offset) / sensor.gain
+        signal = recover_motion(sensor, self._motion, self._period)
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
@@ -464,6 +490,9 @@ class JointModel:
             _, inertia = self._parts(plant)
             force = inertia.mass * np.gradient(moved[1], self._apart)
         return Motion(moved[0], moved[1], force)
+
+    def undetermined(self) -> None:
+        """None: a joint alone is judged at rest too."""
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors

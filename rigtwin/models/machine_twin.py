@@ -14,9 +14,10 @@ from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import Channel
 from rigtwin.description.effects import apply_effects
-from rigtwin.description.machine import OWN, Machine, ReplayOf
+from rigtwin.description.machine import OWN, Machine, ReplayOf, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.models.joint import RUNAWAY
+from rigtwin.models.moved_twin import move_together
 from rigtwin.models.mujoco import MujocoModel, Tick
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording, Writer
@@ -41,6 +42,10 @@ def demanded_channels(machine: Machine) -> list[Channel]:
     """
     found: list[Channel] = []
     for replay in machine.replays:
+        if machine.structure is Structure.MOVED:
+            channels = [machine.components[name].channel for name in replay.moved_by]
+            found += [channel for channel in channels if channel is not None]
+            continue
         mover = machine.components[replay.moved_by[0]]
         own = {
             c.channel
@@ -104,7 +109,9 @@ def run_machine(
     columns = _check_demands(machine, wanted, demands)
     ticks = len(next(iter(next(iter(columns.values())).values())))
     random = np.random.default_rng([seed, 3])
-    for replay in machine.replays:
+    if machine.structure is Structure.MOVED:
+        _move(machine, actual, columns, ticks, random)
+    for replay in () if machine.structure is Structure.MOVED else machine.replays:
         _simulate(
             machine=machine,
             replay=replay,
@@ -232,9 +239,39 @@ def _simulate(
             reading = (
                 apply_sensor(getattr(plant, name), moved[row], period) + model.sensor_noise[name]
             )
-            bit = getattr(plant, name).resolution
-            reading = np.round(reading / bit) * bit if bit > 0.0 else reading
+            reading = _round(plant, name, reading)
         columns.setdefault(topic, {})[field] = reading
+
+
+def _move(
+    machine: Machine,
+    configuration: Configuration,
+    columns: Columns,
+    ticks: int,
+    random: np.random.Generator,
+) -> None:
+    """Puts what the sensors of joints that move together read into the columns."""
+    plant, period = configuration.plant, configuration.timing.period
+    channels = {
+        name: component.channel
+        for name, component in machine.components.items()
+        if component.channel is not None
+    }
+    motions = {
+        name: columns[channel[0]][channel[1]]
+        for name, channel in channels.items()
+        if name in machine.replays[0].moved_by
+    }
+    for name, reading in move_together(machine, configuration, motions).items():
+        topic, field = channels[name]
+        noisy = reading + _noise(plant, name, ticks, period, random)
+        columns.setdefault(topic, {})[field] = _round(plant, name, noisy)
+
+
+def _round(plant: Plant, name: str, reading: Array) -> Array:
+    """A reading to the sensor's bit."""
+    bit = getattr(plant, name).resolution
+    return np.round(reading / bit) * bit if bit > 0.0 else reading
 
 
 def _noise(

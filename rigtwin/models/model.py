@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
 from rigtwin.numerics.arrays import Array
@@ -30,6 +33,11 @@ class Model(Protocol[P]):
 
     every: int
     """Ticks of the recording from one that is predicted to the next."""
+
+    @property
+    def band(self) -> float:
+        """Hz, up to which signals are predicted and judged; infinite for all."""
+        ...
 
     def predict(self, plant: P) -> Array:
         """What the signals should be, noise apart, shape (rows, ticks)."""
@@ -62,6 +70,11 @@ class Model(Protocol[P]):
     def propagated_noise(self, plant: P) -> Array | None:
         """What the noise of the signals that drive the model makes of the observed ones, shape
         (rows, ticks); None if they are known exactly."""
+        ...
+
+    def undetermined(self) -> NDArray[np.bool_] | None:
+        """Ticks at which the inputs do not determine what is observed, whatever the plant, shape
+        (rows, ticks); None if there are none."""
         ...
 
     def halve_steps(self) -> Model[P]:

@@ -571,6 +571,14 @@ class QuarterCarModel:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
 
+    @property
+    def band(self) -> float:
+        """Infinite."""
+        return math.inf
+
+    def undetermined(self) -> None:
+        """None: what moves the wheel is known throughout."""
+
     def propagated_noise(self, plant: RigPlant) -> None:
         """Sensors' noise reaches the plant only through recorded commands, which are known
         exactly."""

@@ -61,6 +61,8 @@ forward = types.ExternalFunction(
     "mj_forwardSkip", types.void(*_STRUCTURES, types.int32, types.int32)
 )
 """mj_forwardSkip(model, data, stage to skip up to, whether to skip sensors)."""
+inverse = types.ExternalFunction("mj_inverse", types.void(*_STRUCTURES))
+"""mj_inverse(model, data): the forces that a motion takes."""
 step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
 """mj_step(model, data): a whole step."""
 integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))

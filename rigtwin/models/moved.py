@@ -1,0 +1,290 @@
+"""Joints that act on each other, each moved as its sensor measured: the forces that this takes.
+
+The bodies' own share is MuJoCo's inverse dynamics of the measured motions. What the description
+names of joints and couplings (guides with their friction and springs, rotors) comes on top, each
+along its own coordinate: that of a joint, or the sum of joints that a fixed tendon makes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_opening
+
+from rigtwin.components import Guide, PositionSensor, Rotor, measures
+from rigtwin.components.effect import Motion
+from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import apply_sensor
+from rigtwin.description.machine import Component, Machine, ReplayOf, Row
+from rigtwin.models.basis import Passage, forms
+from rigtwin.models.guided import resist
+from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
+from rigtwin.models.model import Form
+from rigtwin.models.rigid import RigidBodies
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+from rigtwin.signals.band import limit_band
+from rigtwin.signals.noise import smooth, white_noise
+
+STANDING, RESTING = 0.02, 0.1
+"""Share of its rms speed below which a joint stands, and s for which it does to be at rest."""
+ENDS = 0.3
+"""s at both ends of a recording, where smoothing does not know how a motion goes on."""
+Kinematics = Array
+"""Positions, velocities and accelerations, shape (3, joints, ticks)."""
+
+
+class MovedModel:
+    """All joints of one recording."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        replay: ReplayOf,
+        recording: Recording,
+        every: int = 1,
+        like: MovedModel | None = None,
+    ) -> None:
+        """every: ticks from one that is predicted to the next; like: one of the same recording,
+        whose motions were smoothed already. Raises RigtwinError if a channel is missing."""
+        self._machine, self._replay, self._recording = machine, replay, recording
+        self._period = recording.period
+        self.every = every
+        self.rows: tuple[Row, ...] = replay.rows
+        components = machine.components
+        self._movers = replay.moved_by
+        joints = [components[name].joint for name in self._movers]
+        self._place = {joint: number for number, joint in enumerate(joints)}
+        self._row_of = {
+            components[row.name].joint: number for number, row in enumerate(replay.rows)
+        }
+        at: dict[type, list[Component]] = {Guide: [], Rotor: []}
+        for component in components.values():
+            at.get(type(getattr(machine.plant, component.name)), []).append(component)
+        self._bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
+        self._along: dict[str, Array] = {}
+        """Component → how far it goes for each joint's unit, shape (joints,)."""
+        self._onto: dict[str, Array] = {}
+        """Component → what its force does to each row, shape (rows,)."""
+        for component in (*at[Guide], *at[Rotor]):
+            along, onto = np.zeros(len(joints)), np.zeros(len(self.rows))
+            for joint, coefficient in component.acts_on:
+                if joint in self._place:
+                    along[self._place[joint]] = coefficient
+                if joint in self._row_of:
+                    onto[self._row_of[joint]] = coefficient
+            if onto.any():
+                self._along[component.name], self._onto[component.name] = along, onto
+        self._read: Mapping[str, tuple[Array, float]] = (
+            like._read
+            if like is not None
+            else {name: self._smooth(self._measured(name)) for name in self._movers}
+        )
+        self._motions: dict[tuple[object, ...], tuple[Kinematics, Array]] = {}
+        self._shares: dict[tuple[object, ...], Array] = {}
+
+    @property
+    def band(self) -> float:
+        return math.inf if self._replay.band is None else self._replay.band
+
+    @property
+    def _apart(self) -> float:
+        """s, from one tick that is predicted to the next."""
+        return self.every * self._period
+
+    def _measured(self, name: str) -> Array:
+        channel = self._machine.components[name].channel
+        assert channel is not None
+        return self._recording.column(*channel)
+
+    def _smooth(self, signal: Array) -> tuple[Array, float]:
+        return smooth(signal, self._period)
+
+    def halve_steps(self) -> MovedModel:
+        """The same: nothing is integrated."""
+        return self
+
+    def double_steps(self) -> MovedModel:
+        return self
+
+    def thin(self, longest: float) -> MovedModel:
+        every = max(int(longest / self._period), 1)
+        if every <= self.every:
+            return self
+        return MovedModel(self._machine, self._replay, self._recording, every, self)
+
+    def _move(self, plant: Plant, shifts: Mapping[str, Array] | None = None) -> Kinematics:
+        """How the joints move. shifts: of measured motions, shape (ticks,) of the recording."""
+        positions = []
+        for name in self._movers:
+            signal = self._read[name][0]
+            if shifts is not None and name in shifts:
+                signal = signal + shifts[name]
+            sensor: PositionSensor = getattr(plant, name)
+            positions.append(recover_motion(sensor, signal, self._period))
+        position = np.stack(positions)
+        # Differences of the recording's own ticks: what is left out is not differentiated over.
+        velocity = np.gradient(position, self._period, axis=1)
+        acceleration = np.gradient(velocity, self._period, axis=1)
+        return np.stack([position, velocity, acceleration])[:, :, :: self.every]
+
+    def _moved(self, plant: Plant) -> tuple[Kinematics, Array]:
+        """How the joints move, and the forces that this takes of the bodies, shape (joints,
+        ticks)."""
+        key = tuple(getattr(plant, name) for name in self._movers)
+        if key not in self._motions:
+            motion = self._move(plant)
+            self._motions = {
+                **dict(list(self._motions.items())[-KEPT:]),
+                key: (motion, self._bodies.forces(motion)),
+            }
+        return self._motions[key]
+
+    def _share_of(self, name: str, plant: Plant, motion: Kinematics, bodies: Array) -> Array:
+        """The force along a component's own coordinate, shape (ticks,)."""
+        component, along = getattr(plant, name), self._along[name]
+        if isinstance(component, Rotor):
+            return component.inertia * (along @ motion[2])
+        guide = Guide(*(float(value) for value in component))
+        if guide == Guide(
+            stribeck_velocity=guide.stribeck_velocity,
+            cogging_pitch=guide.cogging_pitch,
+            cogging_phase=guide.cogging_phase,
+        ):
+            return np.zeros(motion.shape[2])
+        own = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
+        load = along @ bodies / float(along @ along)
+        out = load.copy()
+        resist(
+            guide=guide,
+            dry_friction=friction(guide),
+            spring=1.0 / self._softest(guide, own, load, along),
+            rest=0.0,
+            period=self._apart,
+            motion=own,
+            out=out,
+        )
+        return out - load
+
+    def _softest(self, guide: Guide, own: Array, load: Array, along: Array) -> float:
+        """Compliance over which friction that reverses builds up: no less than what the measured
+        motions' errors hide."""
+        size = max(friction_size(friction(guide), float(np.sqrt(np.mean(load**2)))), 1e-300)
+        errors = np.array([self._read[name][1] for name in self._movers])
+        error = float(np.sqrt(np.sum((along * errors) ** 2)))
+        stroke = max(float(np.ptp(own[0])), 1e-12)
+        return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
+
+    def _force_of(self, name: str, plant: Plant) -> Array:
+        """The same, remembered."""
+        key = (name, getattr(plant, name), *(getattr(plant, mover) for mover in self._movers))
+        found = self._shares.get(key)
+        if found is None:
+            found = self._share_of(name, plant, *self._moved(plant))
+            most = KEPT * max(len(self._along), 1)
+            self._shares = {**dict(list(self._shares.items())[-most:]), key: found}
+        return found
+
+    def _rows_of(self, bodies: Array) -> Array:
+        places = [self._place[self._machine.components[row.name].joint] for row in self.rows]
+        return bodies[places]
+
+    def predict_true(self, plant: Plant) -> Array:
+        found = self._rows_of(self._moved(plant)[1]).copy()
+        for name, onto in self._onto.items():
+            force = self._force_of(name, plant)
+            for row in np.nonzero(onto)[0]:
+                found[row] += onto[row] * force
+        return found
+
+    def _apply_sensors(self, plant: Plant, true: Array) -> Array:
+        sensed = np.stack(
+            [
+                apply_sensor(getattr(plant, row.name), signal, self._apart)
+                for row, signal in zip(self.rows, true, strict=True)
+            ]
+        )
+        return limit_band(sensed, self.band, self._apart)
+
+    def predict(self, plant: Plant) -> Array:
+        return self._apply_sensors(plant, self.predict_true(plant))
+
+    def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+        if entry in self._onto:
+            true = self.predict_true(plant) + self._onto[entry][:, None] * amount
+            return self._apply_sensors(plant, true)
+        found = self.predict(plant)
+        found[[row.name for row in self.rows].index(entry)] += amount
+        return found
+
+    def components(self) -> tuple[str, ...]:
+        return (*self._onto, *(row.name for row in self.rows))
+
+    def _passage(self, component: str, plant: Plant) -> tuple[Kinematics, Array, Array]:
+        """How a component's coordinate moves, shape (3, ticks), its load, and the force there."""
+        motion, bodies = self._moved(plant)
+        along = self._along.get(component)
+        if along is None:
+            row = [row.name for row in self.rows].index(component)
+            along = np.zeros(len(self._place))
+            along[self._place[self._machine.components[component].joint]] = 1.0
+            force = self.predict(plant)[row]
+        else:
+            onto = self._onto[component]
+            force = onto @ self.predict_true(plant) / float(onto @ onto)
+        own = np.einsum("j,kjt->kt", along, motion)
+        return own, along @ bodies / float(along @ along), force
+
+    def forms(self, component: str, plant: Plant) -> list[Form]:
+        (position, speed, _), load, force = self._passage(component, plant)
+        part = getattr(plant, component)
+        role = "sensor" if measures(part) else "mass" if isinstance(part, Rotor) else "guide"
+        return forms(role, component, Passage(force, position, speed, load, self._apart))
+
+    def disturbance_size(self, entry: str) -> float:
+        return SMALL * max(float(np.std(self._passage(entry, self._machine.plant)[2])), 1e-9)
+
+    def motion(self, component: str, plant: Plant) -> Motion:
+        if component not in self._along and component not in {row.name for row in self.rows}:
+            component = self.rows[0].name
+        (position, speed, _), _, force = self._passage(component, plant)
+        return Motion(position, speed, force)
+
+    def undetermined(self) -> NDArray[np.bool_]:
+        """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both
+        ends, accelerations are not known."""
+        speeds = self._moved(self._machine.plant)[0][1]
+        found = np.zeros((len(self.rows), speeds.shape[1]), bool)
+        end = round(ENDS / self._apart)
+        found[:, :end] = found[:, -end:] = True
+        window = max(round(RESTING / self._apart), 3)
+        for name, onto in self._onto.items():
+            if isinstance(getattr(self._machine.plant, name), Guide):
+                speed = np.abs(self._along[name] @ speeds)
+                stands = speed < STANDING * float(np.sqrt(np.mean(speed**2)))
+                found |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
+        return found
+
+    def propagated_noise(self, plant: Plant) -> Array | None:
+        """What the noise of the measured motions makes of the forces, by its way through smoothing,
+        differentiation and the dynamics of all joints."""
+        random = np.random.default_rng(SEED)
+        shifts = {}
+        for name in self._movers:
+            signal, error = self._read[name]
+            if error > 0.0:
+                level = white_noise(self._measured(name))
+                again, _ = self._smooth(signal + level * random.standard_normal(len(signal)))
+                shifts[name] = again - signal
+        if not shifts:
+            return None
+        motion = self._move(plant, shifts)
+        bodies = self._bodies.forces(motion)
+        found = self._rows_of(bodies).copy()
+        for name, onto in self._onto.items():
+            found += onto[:, None] * self._share_of(name, plant, motion, bodies)
+        return limit_band(found - self.predict_true(plant), self.band, self._apart)

@@ -1,0 +1,59 @@
+"""The twin of joints that act on each other: what their sensors read while a test moves them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rigtwin.components.sensors import apply_sensor
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine
+from rigtwin.models.moved import MovedModel
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+
+
+def move_together(
+    machine: Machine, configuration: Configuration, motions: dict[str, Array]
+) -> dict[str, Array]:
+    """What the sensors read, noise and bits apart.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        With the effects that it has.
+    motions
+        Component that senses a joint's motion → where that joint goes, rad or m, shape (ticks,).
+
+    Returns
+    -------
+    dict
+        Component → reading, shape (ticks,): of the motions' sensors and of the observed forces'.
+    """
+    (replay,) = machine.replays
+    plant, period = configuration.plant, configuration.timing.period
+    found = {
+        name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
+    }
+    columns: dict[str, dict[str, Array]] = {}
+    for name, reading in found.items():
+        channel = machine.components[name].channel
+        assert channel is not None
+        columns.setdefault(channel[0], {})[channel[1]] = reading
+    ticks = len(next(iter(found.values())))
+    recording = Recording(
+        path=Path("test"),
+        machine=machine.name,
+        experiment="",
+        period=period,
+        time=np.arange(ticks) * period,
+        columns=columns,
+        controller={},
+    )
+    forces = MovedModel(machine, replay, recording).predict_true(plant)
+    for row, force in zip(replay.rows, forces, strict=True):
+        found[row.name] = apply_sensor(getattr(plant, row.name), force, period)
+    return found
