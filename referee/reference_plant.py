@@ -211,8 +211,8 @@ def plate_under_load(
     rod_up: float,
     rod_down: float,
 ) -> float:
-    """The velocity of a structure plate that yields to its load, by bisection on that load: a
-    greater one lets the plate run ahead, which makes it smaller. pull: of the motor, N."""
+    """The load of a structure plate that yields to it, N, by bisection: a greater one lets the
+    plate run ahead, which makes it smaller. pull: of the motor, N."""
     slack = truth.yielding + STEP
     wide = rod_up + rod_down + 1.0 + abs(pull)
     low, high = pull - wide, pull + wide
@@ -224,7 +224,7 @@ def plate_under_load(
             high = load
         else:
             low = load
-    return unloaded + (truth.structure_hydraulic.yields * 0.5 * (low + high) - yielded) / slack
+    return 0.5 * (low + high)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -518,9 +518,9 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
         smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
         push = tyre - force - ripple - smooth_rail
         before = v
-        unloaded = (next_structure - structure) / STEP
+        unloaded, load = (next_structure - structure) / STEP, 0.0
         if truth.structure_hydraulic.yields > 0.0:
-            plate = plate_under_load(
+            load = plate_under_load(
                 truth,
                 v,
                 unloaded,
@@ -532,6 +532,8 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
                 rod_up,
                 rod_down,
             )
+            give = truth.structure_hydraulic.yields * load - structure_yield
+            plate = unloaded + give / (truth.yielding + STEP)
         sliding = plate - v
         smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
         if truth.bristle > 0.0:
@@ -568,6 +570,8 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
         )
         if truth.structure_hydraulic.yields > 0.0:
             structure_yield += STEP * (plate - unloaded)
+            # Where rod and rail both stick, only the plate's own spring says what it is.
+            cell = load
         ground, structure = next_ground, next_structure
     motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (
         ground,

@@ -69,6 +69,12 @@ def test_an_actuator_that_is_watched_directly_hides_nothing():
     assert not can.alike
 
 
+def test_joints_that_act_on_each_other_are_moved_too():
+    can = rigtwin.identifiability(rigtwin.machine("double-pendulum"))
+    assert {"coulomb@shoulder", "coulomb@elbow", "gain@torque_1"} <= set(can.seen)
+    assert not can.unseen
+
+
 def test_every_effect_that_is_looked_for_is_judged_once():
     machine = rigtwin.machine("damper-bench")
     can = rigtwin.identifiability(machine)

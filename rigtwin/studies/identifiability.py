@@ -20,7 +20,8 @@ from scipy.optimize import least_squares
 from rigtwin.components import Effect
 from rigtwin.components.effect import Scales, Starts, Swing
 from rigtwin.components.plant import Plant
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Joint, Machine, Structure
+from rigtwin.description.mechanism import Mechanism
 from rigtwin.diagnosis.fit import is_possible, with_values
 from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.diagnosis.swing import swings
@@ -58,6 +59,8 @@ RANK = 1e-10
 """Of a set of changes: what is smaller is rounding."""
 EVALUATIONS = 12
 """Of a fit of others to what an effect does."""
+SPARSE = 4e-3
+"""s, from tick to tick of joints that are moved as measured."""
 STEPS = 4
 """Of integration a tick."""
 
@@ -136,6 +139,9 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
                 yield record_on_twin(machine, name, configuration, demands, seed)
         return
     timing = machine.configuration.timing._replace(duration=SECONDS)
+    if machine.structure is Structure.MOVED:
+        # Nothing is integrated from tick to tick.
+        timing = timing._replace(period=max(timing.period, SPARSE))
     configuration = machine.configuration._replace(timing=timing)
     time = np.arange(configuration.ticks) * timing.period
     with TemporaryDirectory(prefix="rigtwin-") as folder:
@@ -160,11 +166,13 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
 
 def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
     """(middle, half) of what a channel may demand; None if nothing says it."""
+    if machine.structure is Structure.MOVED:
+        mechanism = Mechanism(machine.model)
+        moved = next(c.joint for c in machine.components.values() if c.channel == channel)
+        return _range(mechanism.joint(moved))
     for replay in machine.replays:
         joint, mover = replay.joint, machine.components[replay.moved_by[0]]
-        low, high = joint.positions[0], joint.positions[-1]
-        middle = min(max(joint.rest, low), high)
-        half = max(min(high - middle, middle - low), 0.25 * (high - low))
+        middle, half = _range(joint)
         if replay.closed and channel != mover.channel:
             return middle, half
         if channel == mover.channel:
@@ -175,6 +183,13 @@ def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | 
             lifts = 0.5 * max(np.abs(joint.gravity))
             return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
     return None
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    """(middle, half) of where a joint goes: its rest, if that lies well inside."""
+    low, high = joint.positions[0], joint.positions[-1]
+    middle = min(max(joint.rest, low), high)
+    return middle, max(min(high - middle, middle - low), 0.25 * (high - low))
 
 
 class _Tried:
