@@ -206,6 +206,7 @@ LEFT_OVER = {
     "compliance@structure_cylinder": "the load that bends it is measured; noise shakes the plate",
     "saturation@structure_cylinder": "while the plate stands, the motor's friction is not known",
     "deadband@structure_cylinder": "while the plate stands, the motor's friction is not known",
+    "backlash@structure_cylinder": "while the plate stands, the motor's friction is not known",
 }
 """Effects that a twin which has them explains only in part, and why."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigtwin.cli import main
-from rigtwin.components import RigPlant, Scales, Swing
+from rigtwin.components import RigPlant, Scales, Swing, with_parameters
 from rigtwin.components import find as effect_of
 from rigtwin.components.effect import SHARES
 from rigtwin.description.catalogue import find, shipped
@@ -18,6 +18,7 @@ from rigtwin.description.document import examine, load
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import is_possible
+from rigtwin.models.joint import JointModel
 from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
@@ -76,6 +77,26 @@ def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
     assert joint.inertia == pytest.approx(1.5 * 0.4**2 / 3, rel=0.06)
     load = np.interp(0.5, joint.positions, joint.gravity)
     assert load == pytest.approx(1.5 * 9.81 * 0.2 * np.sin(0.5), rel=1e-3)
+
+
+def test_a_rotor_behind_a_gear_has_inertia_and_no_weight(tmp_path: Path):
+    bare = described(tmp_path, "pendulum")
+    geared = (tmp_path / "bench.xml").read_text().replace("<joint ", '<joint armature="0.03" ')
+    (tmp_path / "bench.xml").write_text(geared)
+    machine = load(tmp_path / "bench.toml")
+    assert machine.plant.mass == bare.plant.mass
+    joint, own = machine.replays[0].joint, bare.replays[0].joint
+    assert joint.inertia == pytest.approx(own.inertia + 0.03)
+    assert joint.gravity == pytest.approx(own.gravity)
+    # Let go at a small angle it swings at sqrt(gravity / whole inertia).
+    time = np.arange(4000) * 1e-3
+    still = recording_of(machine, np.zeros_like(time), 0.05 * np.cos(time))
+    plant = with_parameters(machine.plant, "guide", {"viscous": 0.0})
+    model = JointModel(machine, machine.replays[0], still, machine.configuration_of(still), steps=4)
+    swing = model.predict_true(plant)[0]
+    crossings = time[1:][np.diff(np.sign(swing)) != 0]
+    expected = np.pi * np.sqrt(joint.inertia / (1.5 * 9.81 * 0.2))
+    assert np.mean(np.diff(crossings)) == pytest.approx(expected, rel=0.01)
 
 
 READ_OFF = {"hum", "noise", "quantisation"}

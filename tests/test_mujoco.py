@@ -20,7 +20,10 @@ TIME = np.arange(1000) * PERIOD
 COMMAND = 20.0 * np.sin(2 * np.pi * 1.1 * TIME) + 12.0 * np.sin(2 * np.pi * 2.3 * TIME)
 MOTION = 0.1 * np.sin(2 * np.pi * 0.9 * TIME) + 0.03 * np.sin(2 * np.pi * 2.7 * TIME)
 FRICTION = {"coulomb": 4.0, "viscous": 6.0, "stiffness": 150.0}
-CARRIED = TOML.replace(
+TURNED = TOML.replace(
+    "[components.drive]", '[components.rotor]\njoint = "axis"\ntype = "rotor"\n\n[components.drive]'
+)
+CARRIED = TURNED.replace(
     'moved_by = "drive"\nobserve = ["encoder"]', 'moved_by = "encoder"\nobserve = ["cell"]'
 ).replace("[[replays]]", '[components.cell]\nsensor = "cell"\n\n[[replays]]')
 SIZES = {
@@ -38,6 +41,7 @@ SIZES = {
     "cogging": 3.0,
     "load_friction": 0.3,
     "mass": 3.0,
+    "armature": 0.8,
     "gain": 1.3,
     "lag": 0.03,
     "delay": 0.02,
@@ -68,7 +72,7 @@ def with_effect(plant, effect: Effect):
 
 
 def mechanical(machine: Machine) -> list[Effect]:
-    groups = ("guide", "mass", "drive")
+    groups = ("guide", "mass", "rotor", "drive")
     return [e for e in candidates(machine.plant) if e.searched and e.group in groups]
 
 
@@ -78,7 +82,7 @@ def rms(signal: Array) -> float:
 
 @pytest.mark.parametrize("sort", ["slide", pytest.param("pendulum", marks=pytest.mark.slow)])
 def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
-    machine = described(tmp_path, sort)
+    machine = described(tmp_path, sort, TURNED)
     column = {"/command": {"force": COMMAND}, "/sensor": {"position": np.zeros_like(TIME)}}
     if sort == "pendulum":
         column["/command"]["force"] = 0.15 * COMMAND
@@ -98,7 +102,7 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
             size *= scale
         if sort == "pendulum" and effect.kind.name in ("saturation", "deadband", "rate_limit"):
             size *= scale
-        if sort == "pendulum" and effect.kind.name == "mass":
+        if sort == "pendulum" and effect.kind.name in ("mass", "armature"):
             size = 1.5 * machine.plant.mass.mass
         plant = with_parameters(plain, effect.group, {effect.kind.parameters[0]: size})
         ours, theirs = fast.move(plant)[0], reference.move(plant)[0]

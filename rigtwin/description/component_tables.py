@@ -203,7 +203,8 @@ class Components:
             if isinstance(meaning, Quantity)
         }
         if kind == "mass" and joint:
-            component = component._replace(mass=self._mechanism.joint(joint).inertia)
+            moving = self._mechanism.joint(joint)
+            component = component._replace(mass=moving.inertia - moving.armature)
         elif kind == "guide" and (element == "tendon" or joint):
             component = component._replace(**self._mechanism.friction(element, mjcf))
         elif kind == "rotor" and (element == "tendon" or joint):

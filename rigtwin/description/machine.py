@@ -77,8 +77,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Joint:
-    """What the MJCF says of a replay's joint. inertia: kg, or kg m² if it turns; gravity: load N or
-    Nm at each of `positions`; rest: where its spring is slack; low, high: its range."""
+    """What the MJCF says of a replay's joint. inertia: kg, or kg m² if it turns, `armature` of it
+    included, which turns with the motor alone and has no weight; gravity: load N or Nm at each of
+    `positions`, over its range; rest: where its spring is slack."""
 
     name: str
     turns: bool
@@ -86,6 +87,7 @@ class Joint:
     positions: tuple[float, ...]
     gravity: tuple[float, ...]
     rest: float
+    armature: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class ReplayOf:
     them. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
     position actuator its motion through that actuator, a force actuator pushes it. closed: whether
     the controller commands that actuator, or the recording does; band: Hz up to which its signals
-    are judged, None for all that is measured."""
+    are judged, None for all that is measured; rotor: the component that the joint's motor turns."""
 
     name: str
     joint: Joint
@@ -104,6 +106,7 @@ class ReplayOf:
     mass: str | None
     closed: bool
     band: float | None = None
+    rotor: str | None = None
 
 
 @dataclass(frozen=True)

@@ -202,4 +202,5 @@ class Mechanism:
         rest = float(model.qpos_spring[place])
         gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)
         where = tuple(positions.tolist()) if len(gravity) == GRID else (low, high)
-        return Joint(name, turns, float(full[at, at]), where, gravity, rest)
+        armature = self.armature("joint", name)
+        return Joint(name, turns, float(full[at, at]), where, gravity, rest, armature)

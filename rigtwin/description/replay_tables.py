@@ -116,7 +116,7 @@ class Replays:
                 for n, t in self._components.types.items()
                 if t == kind and self._components.found[n].joint == joint_name
             ]
-            for kind in ("mass", "guide")
+            for kind in ("mass", "guide", "rotor")
         }
         for kind, names in at.items():
             if len(names) > 1:
@@ -154,6 +154,7 @@ class Replays:
             guide=at["guide"][0] if at["guide"] else None,
             mass=at["mass"][0] if at["mass"] else None,
             closed=closed,
+            rotor=at["rotor"][0] if at["rotor"] else None,
         )
 
     def _moved_together(

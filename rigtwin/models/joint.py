@@ -250,16 +250,30 @@ class JointModel:
         guide = Guide() if replay.guide is None else getattr(plant, replay.guide)
         mass = 0.0 if replay.mass is None else getattr(plant, replay.mass).mass
         joint = replay.joint
-        share = mass / joint.inertia if replay.mass is not None and joint.inertia > 0.0 else 1.0
+        share = self._share_of_mass(plant)
+        if replay.mass is not None or replay.rotor is not None:
+            mass += self._armature(plant)
         load = share * np.array(joint.gravity)
         spacing = (joint.positions[-1] - joint.positions[0]) / max(len(joint.gravity) - 1, 1)
         guide = Guide(*(float(value) for value in guide))
         mass = max(float(mass), LIGHTEST)
         return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest)
 
+    def _share_of_mass(self, plant: Plant) -> float:
+        """How many times the MJCF's bodies there are; gravity acts on them, not on a rotor."""
+        joint, mass = self._replay.joint, self._replay.mass
+        own = joint.inertia - joint.armature
+        return getattr(plant, mass).mass / own if mass is not None and own > 0.0 else 1.0
+
+    def _armature(self, plant: Plant) -> float:
+        """The inertia of what turns with the motor alone, kg or kg m²."""
+        rotor = self._replay.rotor
+        return self._replay.joint.armature if rotor is None else getattr(plant, rotor).inertia
+
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """What the motion depends on."""
-        names = [self._replay.guide, self._replay.mass, self._mover.name, "computer"]
+        replay = self._replay
+        names = [replay.guide, replay.mass, replay.rotor, self._mover.name, "computer"]
         if self._control is not None:
             names += self._sensors
         if self._started_by is not None and self._started_by not in names:
@@ -450,7 +464,7 @@ class JointModel:
     def components(self) -> tuple[str, ...]:
         replay = self._replay
         moving = (
-            [replay.guide, replay.mass]
+            [replay.guide, replay.mass, replay.rotor]
             if any(row.kind != "position" for row in self.rows) or self._free
             else []
         )
@@ -471,7 +485,7 @@ class JointModel:
             role, entry, signal = (
                 ("force", "force", moved[2]) if self._free else ("position", "motion", moved[0])
             )
-        elif component == self._replay.mass:
+        elif component in (self._replay.mass, self._replay.rotor):
             role = "mass"
         return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._apart))
 

@@ -52,14 +52,13 @@ class MujocoModel(JointModel):
     ) -> tuple[mujoco.MjModel, mujoco.MjData, int, int]:
         """Model and data with the plant's mass, and where the joint's position and velocity are."""
         model = mujoco.MjModel.from_xml_path(str(self._machine.model))
-        joint, mass = self._replay.joint, self._replay.mass
+        joint = self._replay.joint
         number = model.joint(joint.name).id
         at, place = int(model.jnt_dofadr[number]), int(model.jnt_qposadr[number])
-        if mass is not None and joint.inertia > 0.0:
-            share = getattr(plant, mass).mass / joint.inertia
-            model.body_mass[:] *= share
-            model.body_inertia[:] *= share
-            model.dof_armature[at] *= share
+        share = self._share_of_mass(plant)
+        model.body_mass[:] *= share
+        model.body_inertia[:] *= share
+        model.dof_armature[at] = self._armature(plant)
         model.jnt_stiffness[:] = model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
         others = np.arange(model.nv) != at
         model.dof_armature[others] = FIXED
