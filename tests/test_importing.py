@@ -449,3 +449,17 @@ def test_thousands_are_no_columns():
     found = find_layout(["a;b", "1.234,5;2", "1.235,5;3", "1.236,5;4", "1.237,5;5", "1.238,5;6"])
     assert found is not None
     assert (found.separator, found.decimal) == (";", ",")
+
+
+def test_a_column_may_be_named_as_the_first_line_does_with_its_unit(tmp_path):
+    (tmp_path / "log.csv").write_text(
+        "time [s],force [kip]\n" + "".join(f"{n * 1e-3},{0.001 * n}\n" for n in range(50))
+    )
+    (tmp_path / "map.toml").write_text(
+        'machine = "damper-bench"\n[time]\ncolumn = "time [s]"\n[channels]\n'
+        '"/sensor.force" = { column = "force [kip]", unit = "lbf", scale = 1000 }\n'
+    )
+    out = tmp_path / "log.mcap"
+    convert([tmp_path / "log.csv"], tmp_path / "map.toml", out)
+    found = load(out)
+    assert found.column("/sensor", "force")[-1] == pytest.approx(0.049 * 4448.2216, rel=1e-6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
 from rigtwin.importing.oddities import find_oddities, looks_wrapped
 from rigtwin.importing.table import read
+from rigtwin.importing.text import split_unit
 from rigtwin.importing.timing import (
     Signals,
     drop_repeats,
@@ -60,8 +62,8 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     said = ", ".join(map(str, data))
     report = [f"{said}: {columns.form}; {columns.rows} rows, columns {', '.join(columns.values)}"]
     report += columns.notes
-    inputs = _inputs(wanted)
     try:
+        inputs = _inputs(wanted, columns)
         signals: Signals = {
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
@@ -94,7 +96,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     return report
 
 
-def _inputs(wanted: Map) -> dict[str, Column]:
+def _inputs(wanted: Map, columns: Columns) -> dict[str, Column]:
     """The columns that are read: of channels by the channel's name, of formulas by their own."""
     found = {}
     for channel, source in wanted.channels.items():
@@ -102,7 +104,16 @@ def _inputs(wanted: Map) -> dict[str, Column]:
             found[".".join(channel)] = source.column
         for name in source.formula.inputs if source.formula is not None else ():
             found[name] = wanted.columns.get(name, Column(name, None, None))
-    return found
+    return {key: replace(each, name=_named(columns, each.name)) for key, each in found.items()}
+
+
+def _named(columns: Columns, name: str) -> str:
+    """A column's name, also where the map has it as the file's first line does, its unit behind
+    it."""
+    if name in columns.values:
+        return name
+    bare, unit = split_unit(name, "")
+    return bare if columns.units.get(bare) == unit != "" else name
 
 
 def _column(columns: Columns, name: str) -> Array:
@@ -167,7 +178,7 @@ def _time(columns: Columns, wanted: Map, signals: Signals) -> Array:
     if wanted.period is not None:
         return np.arange(rows) * wanted.period
     total = np.zeros(rows)
-    for name in wanted.time:
+    for name in (_named(columns, each) for each in wanted.time):
         values = _column(columns, name)
         if len(values) != rows:
             raise RigtwinError(f"the time column has {len(values)} rows, the others {rows}")

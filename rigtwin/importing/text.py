@@ -193,11 +193,11 @@ def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
             names, units = above[1], nearest
         else:
             names = nearest
-    pairs = [_split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
+    pairs = [split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
     return replace(found, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
 
 
-def _split_unit(name: str, unit: str) -> tuple[str, str]:
+def split_unit(name: str, unit: str) -> tuple[str, str]:
     """A name and its unit, which may stand in brackets behind it."""
     match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     if match and not unit and match.group(1) and is_unit(match.group(2)):
