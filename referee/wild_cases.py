@@ -50,7 +50,7 @@ ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
     "load": ((*DRY, "load_friction"), (), ()),
     "warming": ((*DRY, "viscous"), (), ()),
     "rider": (("mass", "compliance", "relaxation"), ("resonance",), ()),
-    "frame": ((*DRY, "viscous", "relaxation", "compliance"), (), ()),
+    "frame": ((*DRY, "viscous", "relaxation", "compliance", "mount"), (), ()),
     "wearing": (("viscous",), (), ()),
     "coloured": ((), (), ("noise",)),
     "steps": ((), (), ("quantisation",)),

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 FINE = 10
 """Steps a tick."""
+FASTEST, HALVINGS = 50.0, 60
+"""m/s, and how often they are halved, of what moves behind a spring."""
 
 
 class Rubbing(NamedTuple):
@@ -99,15 +101,17 @@ def _hold(r: Rubbing, b: Bending, x: Array, h: float, mass: float) -> Array:
     for n in range(1, len(x)):
         time, v = n * h, (x[n] - x[n - 1]) / h
         if b.frame > 0.0:
-            # The end moves the damper through a spring: its speed by Newton's method.
-            v_in = v
-            for _ in range(12):
+            # The end moves the damper through a spring: its speed by bisection, as what resists
+            # grows with it.
+            low, high = -FASTEST, FASTEST
+            for _ in range(HALVINGS):
+                v_in = 0.5 * (low + high)
                 f, _z = rub(r, z, v_in, 0.0, time, h)
-                g, _z = rub(r, z, v_in + 1e-6, 0.0, time, h)
                 place = inner + v_in * h
-                error = b.frame * (x[n] - place) - f - bend(b, place)
-                slope = -b.frame * h - (g - f) / 1e-6 - b.rate * h
-                v_in -= error / slope
+                if b.frame * (x[n] - place) - f - bend(b, place) > 0.0:
+                    low = v_in
+                else:
+                    high = v_in
             f, z = rub(r, z, v_in, 0.0, time, h)
             inner += v_in * h
             force[n] = b.frame * (x[n] - inner)

@@ -8,13 +8,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from rigtwin.components import Guide, PositionActuator
+from rigtwin.components import Guide, PositionActuator, with_parameters
 from rigtwin.components.guide import dry_limits, friction, slide
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.choose import model_of
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import Inertia, inverse_dynamics
+from rigtwin.models.joint import JointModel
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
@@ -100,6 +101,45 @@ def test_viscous_friction_through_a_spring_lags():
         300.0 * 0.02 * w / np.hypot(1.0, 0.05 * w) * np.cos(w * TIME[1000:] - np.arctan(0.05 * w))
     )
     np.testing.assert_allclose(lagged, expected, atol=0.02 * np.max(expected))
+
+
+def test_a_mount_makes_viscous_friction_lag():
+    """Behind a spring of compliance c viscous friction b lags by b·c."""
+    yielding = moved(Guide(viscous=300.0, mount_compliance=1e-4), SINE)[1000:]
+    w = 2 * np.pi
+    expected = (
+        300.0 * 0.02 * w / np.hypot(1.0, 0.03 * w) * np.cos(w * TIME[1000:] - np.arctan(0.03 * w))
+    )
+    np.testing.assert_allclose(yielding, expected, atol=0.02 * np.max(expected))
+
+
+def test_a_mount_stretches_before_dry_friction_slips():
+    """Dry friction behind a mount is a spring until it slips, whatever else is behind it."""
+    there = np.concatenate([np.linspace(0.0, 0.02, 1000), np.linspace(0.02, 0.0, 1000)])
+    guide = Guide(coulomb=20.0, stiffness=500.0, mount_compliance=1e-4)
+    force = moved(guide, there, spring=1e9)
+    # Slipping, the guide is at x − c·F, and F = 20 + 500·(x − c·F).
+    slipping = (20.0 + 500.0 * 0.02) / 1.05
+    assert force[999] == pytest.approx(slipping, rel=1e-4)
+    back = 0.02 - there[1000:]
+    low = (500.0 * there[1000:] - 20.0) / 1.05
+    np.testing.assert_allclose(force[1000:], np.maximum(slipping - 1e4 * back, low), atol=0.02)
+
+
+def test_a_mass_pushed_against_a_stuck_guide_swings_on_its_mount(tmp_path):
+    """ω² = 1/(c·m), without numerical damping."""
+    machine = described(tmp_path, "slide")
+    pushed = {"/command": {"force": np.full(3000, 5.0)}, "/sensor": {"position": np.zeros(3000)}}
+    recording = Recording(Path("bench"), machine.name, "", PERIOD, TIME, pushed, {})
+    model = JointModel(
+        machine, machine.replays[0], recording, machine.configuration_of(recording), 4
+    )
+    values = {"coulomb": 1e4, "viscous": 0.0, "stiffness": 0.0, "mount_compliance": 1e-3}
+    plant = with_parameters(machine.plant, "guide", values)
+    mass = plant.mass.mass + machine.replays[0].joint.armature
+    expected = 5e-3 * (1.0 - np.cos(TIME / np.sqrt(1e-3 * mass)))
+    found = model.move(plant)[0]
+    np.testing.assert_allclose(found, expected, atol=0.02 * np.ptp(expected))
 
 
 # What follows a command.

@@ -34,6 +34,7 @@ SIZES = {
     "asymmetry": 3.0,
     "backlash": 0.01,
     "compliance": 2e-3,
+    "mount": 2e-3,
     "offset": 3.0,
     "viscous_asymmetry": 6.0,
     "drag": 8.0,

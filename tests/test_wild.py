@@ -62,6 +62,16 @@ def test_a_frame_that_yields_makes_a_maxwell_element_of_a_damper():
     assert np.max(np.abs(force - expected)[2:]) < 0.02 * c * speed
 
 
+def test_a_frame_is_a_spring_before_friction_slips_again():
+    """After a reversal the frame lets go over 2·F/k."""
+    slip, k, speed = 50.0, 1e4, 0.02
+    there = ramp(speed, 1.0)
+    force = hold(Rubbing(slip=slip), Bending(frame=k), np.concatenate([there, there[::-1]]), PERIOD)
+    back = np.arange(len(force) // 2) * PERIOD * speed
+    expected = np.maximum(slip - k * back, -slip)
+    assert np.max(np.abs(force[len(force) // 2 :] - expected)) < 0.02 * slip
+
+
 def test_a_rider_adds_its_mass_slowly():
     time = np.arange(40000) * PERIOD / FINE
     x = 0.01 * np.sin(2.0 * math.pi * time)

@@ -61,7 +61,8 @@ class Guide(NamedTuple):
     stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
     is coulomb + load_coefficient·|force transmitted| + stribeck·exp(−(v/stribeck_velocity)²), in
     positive direction ½·asymmetry more and in negative less, and acts through a play of `backlash`
-    and a spring of `compliance` in series with it.
+    and a spring of `compliance` in series with it. All of it acts through a spring of
+    `mount_compliance`.
     """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
@@ -75,6 +76,7 @@ class Guide(NamedTuple):
     load_coefficient: Annotated[float, Quantity("1", 0.0, 2.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 10.0, NONE)] = 0.0
     compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
+    mount_compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
     offset: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     viscous_asymmetry: Annotated[float, Quantity("Ns/m", -1e9, 1e9, NONE)] = 0.0
     drag: Annotated[float, Quantity("Ns^2/m^2", -1e9, 1e9, NONE)] = 0.0

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from rigtwin.components import computer, conditioning, guide, mass, rotor, tyre
+from rigtwin.components import computer, conditioning, guide, mass, mount, rotor, tyre
 from rigtwin.components.effect import Effect, Kind
 from rigtwin.components.plant import Plant
 from rigtwin.errors import RigtwinError
 
 KINDS: tuple[Kind, ...] = tuple(
-    kind for module in (guide, mass, rotor, tyre, conditioning, computer) for kind in module.KINDS
+    kind for module in (guide, mount, mass, rotor, tyre, conditioning, computer) for kind in module.KINDS
 )
 
 

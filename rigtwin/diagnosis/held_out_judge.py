@@ -14,6 +14,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, with_values
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.ranking import CONTAINED
 from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.numerics.arrays import Array
 
@@ -27,6 +28,9 @@ RIDGE = 1e-9
 """Share of the normal matrix' diagonal that is added to it."""
 STEPS = (1.0, 0.4, 0.0)
 """Shares of the step to a fold's own values that are tried."""
+DOUBT = 0.5
+"""Parameters that a kind costs besides its own if a simpler one may look like it and has as
+many."""
 WIDE = 5.0
 """Times the steps of the derivatives at which responses are compared again."""
 
@@ -182,8 +186,10 @@ class HeldOutJudge:
 
     def _size(self, effect: Effect) -> float:
         starts, count = self.fitter.starts(effect), len(effect.kind.parameters)
-        # Of a wave each pitch is a place of its own, looked at in two phases.
-        return count + (math.log2(len(starts.values) / 2) if starts.quadrature else 0.0)
+        if starts.quadrature:
+            # Of a wave each pitch is a place of its own, looked at in two phases.
+            return count + math.log2(len(starts.values) / 2)
+        return count + (DOUBT if count == 1 and effect.kind.name in CONTAINED else 0.0)
 
     def _jackknife(self, jacobian: Sequence[Array], here: Sequence[Array]) -> Array:
         """Standard errors in units of the steps: how far the values move, to first order, when one

@@ -9,8 +9,8 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-CONTAINED = {"two_lags": "lag"}
-"""Kind → the simpler one that it becomes at the end of its range."""
+CONTAINED = {"two_lags": ("lag",), "mount": ("compliance", "relaxation")}
+"""Kind → the simpler ones that it becomes at the end of its range, or where little else is there."""
 
 
 def penalised_cost(fit: Fit, price: float) -> float:
@@ -56,9 +56,9 @@ def drop_needless(
     for fit in tried:
         names = {(e.kind.name, e.group) for e in fit.effects}
         simpler = [
-            frozenset((names - {(kind, group)}) | {(CONTAINED[kind], group)})
+            frozenset((names - {(kind, group)}) | {(simpler, group)})
             for kind, group in names
-            if kind in CONTAINED
+            for simpler in CONTAINED.get(kind, ())
         ]
         enough = max(least, thresholds.slight * (most - fit.misfit))
         if not any(other in misfits and misfits[other] - fit.misfit < enough for other in simpler):

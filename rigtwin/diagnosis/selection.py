@@ -32,7 +32,7 @@ JUDGED = 4
 """Explanations of each number of parameters that are judged at first."""
 
 
-RARE = ("backlash", "compliance", "cogging", "relaxation", "drag", "load_friction")
+RARE = ("backlash", "compliance", "mount", "cogging", "relaxation", "drag", "load_friction")
 """Kinds that few guides have; what is left of other friction may be taken for them."""
 LATE = ("lag", "delay", "two_lags", "resonance")
 """Kinds that make a signal late, each in its own way."""

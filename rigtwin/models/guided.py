@@ -20,10 +20,13 @@ from controllers.formula import Program, run
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
+from rigtwin.components.mount import give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
+SHORTEST = 1.0
+"""Times step² / inertia, below which a mount's compliance cannot be told from a rigid one."""
 RIGID = 1e6
 """Times inertia / step², above which a spring cannot be told from a rigid one."""
 
@@ -108,6 +111,27 @@ def resist(
     """
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
+    if guide.mount_compliance > 0.0:
+        inner = motion[0, 0]
+        speed = 0.0
+        for tick in range(motion.shape[1]):
+            place, slider, viscous, force = give_way(
+                guide,
+                dry_friction,
+                spring,
+                rest,
+                share,
+                period,
+                inner,
+                speed,
+                slider,
+                viscous,
+                out[tick],
+                motion[0, tick],
+            )
+            speed, inner = (place - inner) / period, place
+            out[tick] += force
+        return
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
         transmitted = out[tick] + position_force(guide, x, rest)
@@ -205,6 +229,8 @@ def integrate_pushed(
     half = 0.5 * guide.backlash
     neutral = np.array([sensor.neutral for sensor in sensors])
     share = h / (guide.relaxation + h)
+    yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
+    inner, speed = x, 0.0
     for tick in range(len(command)):
         out[0, tick], out[1, tick], out[2, tick] = x, v, force
         if loop.closed:
@@ -222,6 +248,27 @@ def integrate_pushed(
         for _ in range(steps):
             earlier = force
             force = min(max(constant * condition(drive, held, command[tick]), -limit), limit)
+            if yields:
+                pushed = 0.5 * (earlier + force)
+                place, slider, viscous, held_back = give_way(
+                    guide,
+                    dry_friction,
+                    spring,
+                    inertia.rest,
+                    share,
+                    h,
+                    inner,
+                    speed,
+                    slider,
+                    viscous,
+                    pushed,
+                    x,
+                )
+                speed, inner = (place - inner) / h, place
+                load = pushed + besides[tick] - gravity(inertia, x) - held_back
+                v += h * load / inertia.mass
+                x += h * v
+                continue
             coefficient = damping(guide, v)
             # About this position half a step passes under the old force and half under the new one.
             load = (

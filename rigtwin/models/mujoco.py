@@ -17,6 +17,7 @@ from controllers.formula import run as run_formula
 from rigtwin.components import UNLIMITED, ForceActuator, Guide, measures
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
+from rigtwin.components.mount import give_way
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import start_transducer, transduce, transducer
 from rigtwin.models.guided import Inertia
@@ -96,6 +97,7 @@ class MujocoModel(JointModel):
         out[0], out[1] = position, velocity
         slider, viscous = float(position[0]), 0.0
         share = self._period / (guide.relaxation + self._period)
+        inner, speed = slider, 0.0
         for tick in range(len(position)):
             x, v = float(position[tick]), float(velocity[tick])
             data.qpos[place], data.qvel[at] = x, v
@@ -103,7 +105,26 @@ class MujocoModel(JointModel):
             if inertia.mass > 0.0:
                 data.qacc[at] = acceleration[tick]
             mujoco.mj_inverse(model, data)
-            load = float(data.qfrc_inverse[at]) + position_force(guide, x, inertia.rest)
+            load = float(data.qfrc_inverse[at])
+            if guide.mount_compliance > 0.0:
+                within, slider, viscous, held_back = give_way(
+                    guide=guide,
+                    dry_friction=dry,
+                    spring=1.0 / softest,
+                    rest=inertia.rest,
+                    share=share,
+                    period=self._period,
+                    inner=inner,
+                    speed=speed,
+                    slider=slider,
+                    viscous=viscous,
+                    load=load,
+                    outer=x,
+                )
+                inner, speed = within, (within - inner) / self._period
+                out[2, tick] = load + held_back
+                continue
+            load += position_force(guide, x, inertia.rest)
             forward, backward = dry_limits(dry, v, load)
             rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
@@ -212,6 +233,7 @@ class _Passive:
         if guide.compliance > 0.0:
             self._spring = min(self._spring, 1.0 / guide.compliance)
         self._slider, self._viscous = position, 0.0
+        self._inner, self._speed, self._timestep = position, 0.0, timestep
         self._share = timestep / (guide.relaxation + timestep)
 
     def act(
@@ -219,6 +241,9 @@ class _Passive:
     ) -> None:
         """Writes friction into the model and all other forces into the joint's applied force."""
         guide = self._guide
+        if guide.mount_compliance > 0.0:
+            data.qfrc_applied[at] = -self._hold_back(x, load)
+            return
         forward, backward = dry_limits(self._dry, v, load)
         force = -position_force(guide, x, self._rest) - guide.drag * v * abs(v)
         if guide.relaxation > 0.0:
@@ -236,3 +261,22 @@ class _Passive:
             model.dof_frictionloss[at] = 0.5 * (forward + backward)
             force += 0.5 * (backward - forward)
         data.qfrc_applied[at] = force
+
+    def _hold_back(self, x: float, load: float) -> float:
+        """The force of a guide behind its mount."""
+        place, self._slider, self._viscous, force = give_way(
+            guide=self._guide,
+            dry_friction=self._dry,
+            spring=self._spring,
+            rest=self._rest,
+            share=self._share,
+            period=self._timestep,
+            inner=self._inner,
+            speed=self._speed,
+            slider=self._slider,
+            viscous=self._viscous,
+            load=load,
+            outer=x,
+        )
+        self._inner, self._speed = place, (place - self._inner) / self._timestep
+        return force
