@@ -13,7 +13,9 @@ from rigtwin.components.plant import Plant
 from rigtwin.errors import RigtwinError
 
 KINDS: tuple[Kind, ...] = tuple(
-    kind for module in (guide, mount, mass, rotor, tyre, conditioning, computer) for kind in module.KINDS
+    kind
+    for module in (guide, mount, mass, rotor, tyre, conditioning, computer)
+    for kind in module.KINDS
 )
 
 
