@@ -10,7 +10,7 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 CONTAINED = {"two_lags": ("lag",), "mount": ("compliance", "relaxation")}
-"""Kind → the simpler ones that it becomes at the end of its range, or where there is little else."""
+"""Kind → the simpler ones that it becomes at the end of its range, or where little else acts."""
 
 
 def penalised_cost(fit: Fit, price: float) -> float:
