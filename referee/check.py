@@ -8,23 +8,24 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import IO, Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
-"""Contents of a case's recordings: the one that is diagnosed, and the one held out. A worker needs
-no disk in common."""
+"""Contents of a case's recordings: the one that is diagnosed, the one held out, and further ones to
+be diagnosed with the first. A worker needs no disk in common."""
 
 
 @dataclass(frozen=True)
 class Result:
     """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON
     document a case; crude: what the black-box baseline named, of the cases it was tried on;
+    settled: what it said of the cases for which it had proposed a next test, with that test;
     commitment: SHA-256 of salt and key, given before any answer."""
 
     seed: int
@@ -32,6 +33,7 @@ class Result:
     key: list[dict[str, Any]]
     answers: list[dict[str, Any]]
     crude: dict[int, str]
+    settled: dict[int, dict[str, Any]] = field(default_factory=dict)
 
 
 def check(
@@ -69,6 +71,7 @@ def check(
         (recordings / "commitment.txt").write_text(commitment + "\n")
         try:
             given = _diagnose_all(recordings, cases, workers, progress)
+            settled = _run_next_tests(recordings, given, referee.stdin, referee.stdout, workers)
             crude = _crude(recordings, cases, workers) if baselines else {}
         except BaseException:
             referee.kill()
@@ -80,7 +83,7 @@ def check(
     if hashlib.sha256((salt + opened).encode()).hexdigest() != commitment:
         raise RigtwinError("the referee's key is not the one that it committed itself to")
     (recordings / "key.json").write_text(opened + "\n")
-    return Result(seed, commitment, json.loads(opened), given, crude)
+    return Result(seed, commitment, json.loads(opened), given, crude, settled)
 
 
 def _diagnose_all(
@@ -97,31 +100,68 @@ def _diagnose_all(
         return [store[key] for key in keys]
 
 
-def _paths(recordings: Path, number: int) -> tuple[Path, Path]:
-    return recordings / f"{number:03d}.mcap", recordings / f"{number:03d}-held-out.mcap"
+def _run_next_tests(
+    recordings: Path,
+    given: Sequence[dict[str, Any]],
+    ask: IO[str],
+    answers: IO[str],
+    workers: Workers,
+) -> dict[int, dict[str, Any]]:
+    """What the diagnosis says with the test that it proposed, of the cases where it did."""
+    keys: dict[int, str] = {}
+    for number, said in enumerate(given):
+        if said["next_test"] is not None:
+            ask.write(f"next {number} {said['next_test']['experiment']}\n")
+            ask.flush()
+            if not answers.readline().startswith("recorded"):
+                raise RigtwinError("the referee ended before it recorded the test it was asked for")
+            keys[number] = _key(recordings, number, FURTHER)
+
+    def jobs() -> Iterator[tuple[str, Files]]:
+        for number, key in keys.items():
+            yield key, [path.read_bytes() for path in _paths(recordings, number, FURTHER)]
+
+    with Store(recordings / "answers.sqlite") as store:
+        run_jobs(store, workers, answer, jobs(), lambda _: None)
+        return {number: store[key] for number, key in keys.items()}
 
 
-def _key(recordings: Path, number: int) -> str:
+RECORDED = ("", "-held-out")
+"""Endings of the names of a case's recordings,"""
+FURTHER = (*RECORDED, "-next")
+"""and with the test that was proposed."""
+
+
+def _paths(recordings: Path, number: int, endings: Sequence[str] = RECORDED) -> list[Path]:
+    return [recordings / f"{number:03d}{ending}.mcap" for ending in endings]
+
+
+def _key(recordings: Path, number: int, endings: Sequence[str] = RECORDED) -> str:
     """Of a case: another recording is another question."""
     return hashlib.sha256(
-        b"".join(path.read_bytes() for path in _paths(recordings, number))
+        b"".join(path.read_bytes() for path in _paths(recordings, number, endings))
     ).hexdigest()
 
 
 def answer(files: Files) -> dict[str, Any]:
-    """One case's answer, of its recording and the one held out. Runs where there are neither the
-    key nor the other cases."""
+    """One case's answer, of its recording, the one held out, and a further one if there is one.
+    Runs where there are neither the key nor the other cases."""
     from machines import DEFAULT_MACHINE
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import load
+    from rigtwin.simulation.experiment import find_experiment
 
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
-        names = ("recording.mcap", "held-out.mcap")
-        for name, content in zip(names, files, strict=True):
-            (Path(folder) / name).write_bytes(content)
-        recording, held_out = (load(Path(folder) / name) for name in names)
-        found = diagnose(find(DEFAULT_MACHINE), [recording], held_out=[held_out])
+        recordings = []
+        for number, content in enumerate(files):
+            path = Path(folder) / f"{number}.mcap"
+            path.write_bytes(content)
+            recordings.append(load(path))
+        first, held_out, *further = recordings
+        machine = find(DEFAULT_MACHINE)
+        tests = [find_experiment(machine, name) for name in machine.next_tests]
+        found = diagnose(machine, [first, *further], held_out=[held_out], tests=tests)
         return found.document()
 
 

@@ -2,8 +2,9 @@
 and opens it when asked.
 
 Run as a process of its own: `python -m referee.referee FOLDER CASES SEED`. It answers on standard
-output: one line a case, then `commitment SHA-256`; after a line on its standard input, `salt S` and
-the key. It imports nothing of the twin, its effects or its controllers.
+output: one line a case, then `commitment SHA-256`. On its standard input `next NUMBER TEST` asks
+for that test on the rig of a case, and `open` for the salt and the key. It imports nothing of the
+twin, its effects or its controllers.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from __future__ import annotations
 import hashlib
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
@@ -26,9 +28,9 @@ from referee.draw import (
     library,
     summary,
 )
-from referee.reference_plant import Array
+from referee.reference_plant import Array, Truth
 from referee.reference_rig import Law, run
-from referee.test_signals import TESTS, draw_demands
+from referee.test_signals import PROPOSED, TESTS, draw_demands
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
 """Of all cases."""
@@ -51,11 +53,18 @@ def choose(groups: list[list[Any]], random: np.random.Generator) -> Defect:
     return group[int(random.integers(len(group)))]()
 
 
-def draw_case(
-    sort: str, random: np.random.Generator
-) -> tuple[dict[str, Any], list[tuple[Law, Array, Array]]]:
-    """The key's entry of one case, and its recordings: what the operator set, commands and sensors;
-    the second is held out."""
+class Case(NamedTuple):
+    """entry: of the key; recordings: what the operator set, commands and sensors, the second held
+    out; truth, change: the rig, and what becomes of a controller on it."""
+
+    entry: dict[str, Any]
+    recordings: list[tuple[Law, Array, Array]]
+    truth: Truth
+    change: Callable[[Law], Law]
+
+
+def draw_case(sort: str, random: np.random.Generator) -> Case:
+    """One case."""
     rig = draw_tolerated(random)
     test = str(random.choice(TESTS if sort != "pair" else TESTS[:3]))
     law, demands = draw_demands(test, random)
@@ -88,7 +97,20 @@ def draw_case(
         "bristle": truth.bristle,
         "effects": [summary(defect, size) for defect, size in zip(defects, sizes, strict=True)],
     }
-    return entry, recordings
+
+    def change(told: Law) -> Law:
+        own = rig, told
+        for defect in defects:
+            own = defect.change(*own)
+        return own[1]
+
+    return Case(entry, recordings, truth, change)
+
+
+def record_next(case: Case, test: str, random: np.random.Generator) -> tuple[Law, Array, Array]:
+    """A further test on the rig of a case."""
+    law, demands = draw_demands(test, random)
+    return law, *run(case.truth, case.change(law), demands, random)
 
 
 def operator(law: Law) -> dict[str, Any]:
@@ -153,20 +175,27 @@ def main(arguments: list[str]) -> int:
     folder, cases, seed = Path(arguments[0]), int(arguments[1]), int(arguments[2])
     folder.mkdir(parents=True, exist_ok=True)
     order = sorts(cases, np.random.default_rng([seed, 0]))
-    key = []
+    cases_drawn: list[Case] = []
     for number, sort in enumerate(order):
         # Each case has a stream of its own, so that one more case leaves the others as they are.
-        entry, recordings = draw_case(sort, np.random.default_rng([seed, 1, number]))
+        case = draw_case(sort, np.random.default_rng([seed, 1, number]))
         for name, recording in zip(
-            (f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), recordings, strict=True
+            (f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), case.recordings, strict=True
         ):
             write(folder / name, *recording)
-        key.append(entry)
+        cases_drawn.append(case)
         print(f"case {number}", flush=True)
     salt = hashlib.sha256(np.random.default_rng([seed, 2]).bytes(32)).hexdigest()
-    opened = json.dumps(key)
+    opened = json.dumps([case.entry for case in cases_drawn])
     print("commitment", hashlib.sha256((salt + opened).encode()).hexdigest(), flush=True)
-    sys.stdin.readline()
+    for line in sys.stdin:
+        word, *rest = line.split()
+        if word != "next":
+            break
+        number, test = int(rest[0]), rest[1]
+        random = np.random.default_rng([seed, 3, number, PROPOSED.index(test)])
+        write(folder / f"{number:03d}-next.mcap", *record_next(cases_drawn[number], test, random))
+        print("recorded", number, flush=True)
     print("salt", salt)
     print(opened, flush=True)
     return 0

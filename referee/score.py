@@ -146,6 +146,11 @@ def rows(result: Result) -> list[Row]:
             [not set(names(a)) - set(truths(k)) for k, a in traces],
             "none set",
         ),
+        share_of(
+            "proposed next test: the right name alone, and sure",
+            [_is_settled(result.key[n], a) for n, a in result.settled.items()],
+            "none set",
+        ),
         Row(
             "seconds a record in the check, median / largest",
             _span(seconds),
@@ -153,6 +158,13 @@ def rows(result: Result) -> list[Row]:
         ),
         *_baselines(result, single),
     ]
+
+
+def _is_settled(entry: dict[str, Any], answer: dict[str, Any]) -> bool:
+    """Whether nothing but the truth is named, and nothing stands beside it."""
+    alone = all(len(_class_of(effect)) == 1 for effect in answer["effects"])
+    sure = all(effect["confidence"] >= CONFIDENT for effect in answer["effects"])
+    return alone and sure and set(names(answer)) == set(truths(entry))
 
 
 def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]]]) -> list[Row]:

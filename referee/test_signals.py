@@ -10,7 +10,16 @@ from referee.reference_rig import Law
 
 TESTS = ("imposed", "imposed", "imposed", "road10", "road1.6", "drop", "tripped")
 """Half of all that last are imposed; one in seven is short."""
-SECONDS = {"imposed": 20.0, "road10": 20.0, "road1.6": 20.0, "drop": 12.0, "tripped": 6.0}
+PROPOSED = ("imposed", "imposed-fast", "road10", "road1.6", "drop")
+"""Tests that a diagnosis may propose, by its names."""
+SECONDS = {
+    "imposed": 20.0,
+    "imposed-fast": 20.0,
+    "road10": 20.0,
+    "road1.6": 20.0,
+    "drop": 12.0,
+    "tripped": 6.0,
+}
 
 
 def _sines(
@@ -49,6 +58,12 @@ def draw_demands(test: str, random: np.random.Generator) -> tuple[Law, Array]:
             # The operator's demand runs away, and the limit of the structure's position ends the
             # test.
             demands[:, 1] += 0.2 * np.maximum(time - random.uniform(1.8, 2.4), 0.0) ** 2
+        return Law(), demands
+    if test == "imposed-fast":
+        demands[:, 0] = _sines(time, 0.2, 10.0, 0.5, 0.0025, random)
+        demands[:, 1] = -0.004 + _sines(time, 0.2, 20.0, 0.5, 0.004, random)
+        demands[:, 2] = 230.0 + _sines(time, 0.5, 20.0, 0.5, 20.0, random)
+        demands[:, 2] += _sines(time, 20.0, 120.0, 0.0, 45.0, random)
         return Law(), demands
     if test == "road10":
         demands[:, 0] = _road(time, 15.0 / 3.6, 0.05, 10.0, random)

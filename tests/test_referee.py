@@ -110,7 +110,7 @@ def test_sorts_have_their_shares():
     ],
 )
 def test_cases_have_their_effects(sort, count):
-    entry, recordings = draw_case(sort, np.random.default_rng(8))
+    entry, recordings, *_ = draw_case(sort, np.random.default_rng(8))
     assert len(entry["effects"]) == count
     assert len(recordings) == 2
     assert entry["test"] in TESTS
@@ -135,13 +135,16 @@ def test_a_size_is_the_change_in_units_of_noise():
 
 def test_a_referees_key_is_committed_to_before_it_is_opened(tmp_path):
     command = [sys.executable, "-m", "referee.referee", str(tmp_path), "1", "3"]
-    done = subprocess.run(command, input="open\n", capture_output=True, text=True, check=True)
+    asked = "next 0 imposed-fast\nopen\n"
+    done = subprocess.run(command, input=asked, capture_output=True, text=True, check=True)
     lines = done.stdout.splitlines()
     assert lines[0] == "case 0"
-    commitment, salt = lines[1].partition(" ")[2], lines[2].partition(" ")[2]
-    assert hashlib.sha256((salt + lines[3]).encode()).hexdigest() == commitment
-    assert len(json.loads(lines[3])) == 1
-    assert {path.name for path in tmp_path.iterdir()} == {"000.mcap", "000-held-out.mcap"}
+    commitment, salt = lines[1].partition(" ")[2], lines[3].partition(" ")[2]
+    assert lines[2] == "recorded 0"
+    assert hashlib.sha256((salt + lines[4]).encode()).hexdigest() == commitment
+    assert len(json.loads(lines[4])) == 1
+    names = {"000.mcap", "000-held-out.mcap", "000-next.mcap"}
+    assert {path.name for path in tmp_path.iterdir()} == names
     text = (tmp_path / "000.mcap").read_bytes()
     for word in (b"seed", b"truth", b"effect"):
         assert word not in text
@@ -221,11 +224,15 @@ def test_scores_count_what_they_say():
         said("unknown", where="motor"),
         said("explained", ("gain", "motor", 1.1), ("mass", "carriage", 41.0), where="motor"),
     ]
-    result = Result(1, "x", key, answers, {})
+    unsettled = said("explained", ("viscous", "rail", 99.0))
+    unsettled["effects"][0]["class"] = [{"kind": "viscous", "component": "motor"}]
+    settled = {0: said("explained", ("coulomb", "rail", 60.0)), 1: unsettled}
+    result = Result(1, "x", key, answers, {}, settled)
     values = {row.measure: row.value for row in rows(result)}
     assert values["top-1 right, material single effects"].startswith("1 of 2")
     assert values["false alarms on nulls"].startswith("1 of 2")
     assert values["effect not in the library: flagged"].startswith("1 of 1")
+    assert values["proposed next test: the right name alone, and sure"].startswith("1 of 2")
     assert values["both of two effects"].startswith("1 of 1")
     assert values["a wrong name among them"].startswith("0 of 1")
     assert values["magnitude error, median / 90th percentile"].startswith("10.0 %")
