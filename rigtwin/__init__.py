@@ -28,6 +28,15 @@ if TYPE_CHECKING:
         diagnose,
         what_changed,
     )
+    from rigtwin.api.card import (
+        ServedCard,
+        TableCheck,
+        check_card,
+        release_card,
+        serve_card,
+        write_table,
+    )
+    from rigtwin.api.faults import Campaign, faults
     from rigtwin.api.machines import (
         Configuration,
         Effect,
@@ -40,8 +49,16 @@ if TYPE_CHECKING:
         machines,
     )
     from rigtwin.api.recordings import Recording, import_data, load
-    from rigtwin.api.rig import Campaign, DryRun, dry_run, faults
     from rigtwin.api.running import run
+    from rigtwin.api.session import (
+        DryRun,
+        SessionResult,
+        dry_run,
+        plan_test,
+        run_on_card,
+        run_on_twin,
+        run_session,
+    )
     from rigtwin.api.studies import (
         Identifiability,
         ModelStability,
@@ -71,11 +88,15 @@ __all__ = [
     "Recording",
     "Reproduction",
     "RigtwinError",
+    "ServedCard",
+    "SessionResult",
     "Stability",
+    "TableCheck",
     "TuningResult",
     "blindcheck",
     "blindcheck_wild",
     "calibrate",
+    "check_card",
     "compare",
     "compare_recordings",
     "diagnose",
@@ -88,11 +109,18 @@ __all__ = [
     "load",
     "machine",
     "machines",
+    "plan_test",
+    "release_card",
     "reproduce",
     "run",
+    "run_on_card",
+    "run_on_twin",
+    "run_session",
+    "serve_card",
     "stability",
     "tune",
     "what_changed",
+    "write_table",
 ]
 _MODULES = {
     "machines": (
@@ -122,11 +150,23 @@ _MODULES = {
         "diagnose",
         "what_changed",
     ),
-    "rig": (
-        "Campaign",
+    "card": (
+        "ServedCard",
+        "TableCheck",
+        "check_card",
+        "release_card",
+        "serve_card",
+        "write_table",
+    ),
+    "faults": ("Campaign", "faults"),
+    "session": (
         "DryRun",
+        "SessionResult",
         "dry_run",
-        "faults",
+        "plan_test",
+        "run_on_card",
+        "run_on_twin",
+        "run_session",
     ),
     "studies": (
         "Identifiability",

@@ -34,6 +34,7 @@ from rigtwin.hardware.daq.calibration import (
 from rigtwin.hardware.daq.table import load_table, to_toml
 from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
+from rigtwin.hardware.session import permission
 from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
 from rigtwin.hardware.session.plan import parse_plan
 from rigtwin.hardware.session.record import Test, record_in_real_time
@@ -197,9 +198,7 @@ def test_mistakes_are_said_before_anything_moves(
 
 
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
-    from rigtwin.cli import session_commands as commands
-
-    monkeypatch.setattr(commands, "open_card", lambda _: None)
+    monkeypatch.setattr(permission, "open_card", lambda _: None)
     monkeypatch.chdir(tmp_path)
     run = ["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]
     assert main(run) == 1

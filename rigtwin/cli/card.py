@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rigtwin.cli.options import add_effect, add_settings
+import rigtwin
+from rigtwin.cli.options import add_effect, add_settings, settings_of
+from rigtwin.console import apart, table, writable
+from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin.hardware.daq.calibration import Still
 
 SUMMARY = "a virtual card on a port, or the check of a channel table"
 MORE = "docs/rig.md"
+ARM = "the check moves ground, structure and motor a little; everybody clear? type arm to go: "
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -94,6 +105,106 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    from rigtwin.cli.card_commands import DEEDS
+    deeds = {"serve": _serve, "check": _check, "release": _release}
+    return deeds[parsed.deed](parsed)
 
-    return DEEDS[parsed.deed](parsed)
+
+def _serve(parsed: argparse.Namespace) -> int:
+    from rigtwin.hardware.session.stops import stop_requests
+
+    served = rigtwin.serve_card(
+        parsed.card,
+        port=parsed.port,
+        settings=settings_of(parsed),
+        effects=parsed.effect,
+        seed=parsed.seed,
+    )
+    print(
+        f"virtual card {served.device}: "
+        f'set address = "{served.address}" in the channel table. Ctrl-C ends it.',
+        flush=True,
+    )
+    with stop_requests() as stop:
+        while stop() is None:
+            time.sleep(0.1)
+    served.close()
+    print(f"{served.ticks()} ticks")
+    return 0
+
+
+def _release(parsed: argparse.Namespace) -> int:
+    left = rigtwin.release_card(parsed.card)
+    done = "what a dead program had is free" if left else "nothing had been left"
+    print(f"motor at zero, pressure off; {done}")
+    return 0
+
+
+def _check(parsed: argparse.Namespace) -> int:
+    writable(apart(parsed.out, parsed.card))
+    found = rigtwin.check_card(
+        parsed.card,
+        operator=parsed.operator,
+        note=parsed.note,
+        zero=parsed.zero,
+        references=_parse_values(parsed.reference, "--reference"),
+        spans=_parse_values(parsed.span, "--span"),
+        signs=parsed.signs,
+        stroke=parsed.stroke,
+        directions=_parse_directions(parsed.moved),
+        arm=lambda: parsed.arm or _ask(ARM, ("arm",)) == "arm",
+        ask=_ask_direction,
+        virtual=parsed.virtual,
+        show=_show,
+    )
+    for line in found.said or (("every sign is right",) if parsed.signs else ()):
+        print(line)
+    rigtwin.write_table(found.table, parsed.out)
+    print(f"channel table in {parsed.out}")
+    return 0
+
+
+def _show(rest: Sequence[Still]) -> None:
+    rows: list[tuple[str, ...]] = [("signal", "mean", "noise", "same in a row")]
+    rows += [(s.name, f"{s.mean:.5g}", f"{s.noise:.3g} rms", str(s.repeats)) for s in rest]
+    print(table(rows))
+
+
+def _parse_values(texts: Sequence[str], option: str) -> dict[str, float]:
+    """input → value of each NAME=VALUE. Raises RigtwinError."""
+    found = dict[str, float]()
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise RigtwinError(
+                f"{option} {text}: expected NAME=NUMBER, such as structure_lvdt=0.1"
+            ) from None
+    return found
+
+
+def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
+    """output → which way it went, of each OUTPUT=+ or OUTPUT=-; 0 for what is neither."""
+    pairs = (text.partition("=") for text in texts)
+    return {name: {"+": 1, "-": -1}.get(sign, 0) for name, _, sign in pairs}
+
+
+def _ask_direction(output: str) -> int:
+    what = {
+        "ground": "the ground plate go towards the wheel",
+        "structure": "the structure plate go away from the wheel",
+    }.get(output, "the motor push the plate away from the wheel")
+    return 1 if _ask(f"did {what} first? y/n: ", ("y", "n")) == "y" else -1
+
+
+def _ask(question: str, answers: tuple[str, ...]) -> str:
+    if not sys.stdin.isatty():
+        raise RigtwinError(
+            f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)"
+        )
+    try:
+        while (said := input(question).strip().lower()) not in answers:
+            pass
+    except EOFError:
+        raise RigtwinError(f"not answered: {question.strip()}") from None
+    return said

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
-from rigtwin.cli.rig_options import add_supervised
+from rigtwin.cli.supervised import add_supervised, require_card, run
 from rigtwin.console import apart, writable
 from rigtwin.errors import RigtwinError
 
@@ -97,8 +97,6 @@ def _fresh(stem: str) -> Path:
 
 
 def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) -> int:
-    from rigtwin.cli.session_commands import plan_test
-    from rigtwin.cli.session_commands import run as work
     from rigtwin.components import RigPlant
 
     if machine.plant != RigPlant():
@@ -106,8 +104,7 @@ def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) ->
             "--card, --real-time and --target daq run the nominal suspension rig alone; "
             f"{machine.name} has other components or values"
         )
-    if parsed.target == "daq" and parsed.card is None:
-        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
+    require_card(parsed)
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
@@ -117,4 +114,4 @@ def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) ->
         )
     given = [path for path in (parsed.card, parsed.config) if path is not None]
     writable(apart(path, *given))
-    return work(parsed, plan_test(parsed, parsed.name), path)
+    return run(parsed, parsed.name, path)

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import rigtwin
 from rigtwin.cli.options import add_effect, add_settings
-from rigtwin.cli.rig_options import add_supervised
+from rigtwin.cli.supervised import add_supervised, plan, require_card
+from rigtwin.cli.supervised import run as run_supervised
+from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin.hardware.session.plan import PlannedTest
 
 SUMMARY = "run a list of tests on the rig, one recording each"
 MORE = """\
@@ -31,6 +38,50 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    from rigtwin.cli.session_commands import session
+    """Runs the list and tells of each test what the twin says of it."""
+    from rigtwin.hardware.session.permission import require_permission
 
-    return session(parsed)
+    require_card(parsed)
+    real = parsed.target == "daq" and not parsed.dry_run
+    code = 0
+
+    def prepare(test: PlannedTest) -> None:
+        ready = plan(_command_line(parsed, test), test.experiment)
+        _ = ready.card_configuration
+        if real:
+            require_permission(ready, parsed.card, parsed.without_dry_run)
+
+    def run(test: PlannedTest, path: Path) -> bool:
+        nonlocal code
+        code = run_supervised(_command_line(parsed, test), test.experiment, path)
+        if code == 0:
+            _compare(path)
+        return code == 0
+
+    rigtwin.run_session(
+        parsed.list,
+        parsed.folder,
+        run,
+        resume=parsed.resume,
+        real=real,
+        prepare=prepare,
+        told=lambda line: print(line, flush=True),
+    )
+    return code
+
+
+def _command_line(parsed: argparse.Namespace, test: PlannedTest) -> argparse.Namespace:
+    """The command line of one test: its own settings after those of the session."""
+    settings = [*parsed.set, *test.settings]
+    return argparse.Namespace(**{**vars(parsed), "seed": test.seed, "set": settings})
+
+
+def _compare(path: Path) -> None:
+    """Says where the rig and the twin disagree, at once."""
+    from rigtwin.cli.compare import execute as compare
+
+    nothing = {"other": None, "json": None, "machine": None, "config": None}
+    try:
+        compare(argparse.Namespace(recording=path, effect=[], set=[], **nothing))
+    except RigtwinError as error:
+        print(f"not compared: {error}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rigtwin.description.changes import parse_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.experiment import Experiment
@@ -38,6 +39,11 @@ class PlannedTest:
     seed: int = 0
     pause: float = 0.0
     settings: list[str] = field(default_factory=list)
+
+    @property
+    def changes(self) -> list[dict[str, dict[str, str]]]:
+        """The settings, group → name → value, one after the other. Raises RigtwinError."""
+        return list(parse_assignments(self.settings))
 
 
 def parse_plan(

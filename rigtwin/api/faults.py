@@ -1,0 +1,91 @@
+"""Faults in sessions on the virtual card."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from experiments import find
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.card import require_client
+from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.faults.campaign import Fault, FaultResult, draw_faults, try_fault
+from rigtwin.hardware.faults.kinds import KINDS
+from rigtwin.hardware.faults.processes import try_process_fault
+
+MOST = 1000
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What faults did in sessions on the virtual card. undone: those that this computer could not
+    run, in words; drawn: how many there were to be."""
+
+    results: tuple[FaultResult, ...]
+    undone: tuple[str, ...]
+    drawn: int
+
+    @property
+    def failed(self) -> tuple[FaultResult, ...]:
+        """Those whose session did not end as it must."""
+        return tuple(result for result in self.results if not result.ok)
+
+
+def faults(
+    *,
+    seed: int = 0,
+    each: int = 11,
+    processes: int = 4,
+    card: str | Path = CARD,
+    progress: Callable[[str, int, int], object] = lambda *_: None,
+) -> Campaign:
+    """Puts faults into sessions on the virtual card, and sees whether each is stopped.
+
+    Interrupted, it gives back what was done.
+
+    Parameters
+    ----------
+    seed
+        Of the faults' times, tests and places.
+    each, processes
+        Sessions of each kind in one process, and of each kind that kills a process.
+    card
+        The channel table.
+    progress
+        Called with the kind that begins, the faults done and how many there are.
+
+    Raises
+    ------
+    RigtwinError
+        For a number that makes no sense, a mistake in the table, or a missing package.
+    """
+    require_client()
+    if seed < 0 or not 0 <= each <= MOST or not 0 <= processes <= MOST:
+        raise RigtwinError(f"--seed: expected 0 or more; --each and --processes: 0 to {MOST}")
+    channels = load_table(Path(card))
+    todo = _draw(seed, each, processes)
+    results, undone = list[FaultResult](), list[str]()
+    with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
+        try:
+            for number, fault in enumerate(todo):
+                progress(fault.kind.name, number, len(todo))
+                run = try_process_fault if fault.kind.place == "process" else try_fault
+                try:
+                    results.append(run(fault, find(fault.experiment), channels, Path(folder)))
+                except RigtwinError as error:
+                    undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
+        except KeyboardInterrupt:
+            undone.append(f"interrupted after {len(results)} of {len(todo)}")
+    return Campaign(tuple(results), tuple(undone), len(todo))
+
+
+def _draw(seed: int, each: int, processes: int) -> list[Fault]:
+    here = [kind for kind in KINDS if kind.place != "process"]
+    apart = [kind for kind in KINDS if kind.place == "process"]
+    return [
+        *draw_faults(each * len(here), seed, here),
+        *draw_faults(processes * len(apart), seed + 1, apart),
+    ]

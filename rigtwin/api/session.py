@@ -1,0 +1,351 @@
+"""Tests under supervision: on the rig's card, on its virtual copy, or on the twin behind the card's
+converters; one test, or a list of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+from experiments import find
+from rigtwin.api.machines import Effects, Settings, effect_texts
+from rigtwin.api.recordings import Recording, load
+from rigtwin.description.changes import read_toml, with_changes
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
+from rigtwin.hardware.session.dry_run import Peak, enter, predict_peaks
+from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
+from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
+from rigtwin.hardware.session.record import (
+    Test,
+    open_virtual_card,
+    record_at_leisure,
+    record_in_real_time,
+)
+from rigtwin.hardware.session.stops import stop_requests
+from rigtwin.hardware.supervision import SessionEnd
+from rigtwin.hardware.supervisor import COMPLETED
+
+PORTS = 65535
+Stop = Callable[[], str | None]
+"""Called in every tick; a text ends the test and is its reason."""
+
+
+@contextmanager
+def _stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
+    """By what a test is stopped: a function, or the operator's keys, signals and file."""
+    if stop is not None:
+        yield stop
+    else:
+        with stop_requests(None if file is None else Path(file)) as requests:
+            yield requests
+
+
+@dataclass(frozen=True)
+class SessionResult:
+    """A test under supervision. path: of its recording; ticks: that were recorded; cause: why it
+    ended, in words; completed: whether that was its end."""
+
+    path: Path
+    ticks: int
+    cause: str
+    completed: bool
+
+
+@dataclass(frozen=True)
+class DryRun:
+    """A session on the virtual card. cause: why it ended, in words; passed: whether that was its
+    end, so that the rig may be armed for it; peaks: how near it comes to every limit; obstacles:
+    what would keep it off the rig besides, a line each."""
+
+    recording: Recording | None
+    cause: str
+    passed: bool
+    peaks: tuple[Peak, ...]
+    obstacles: tuple[str, ...]
+
+
+def plan_test(
+    experiment: str,
+    *,
+    card: str | Path | None = None,
+    settings: Settings = (),
+    seed: int = 0,
+    effects: Effects = (),
+) -> Test:
+    """A test of the suspension rig, ready to be run under supervision.
+
+    Parameters
+    ----------
+    experiment
+        Its name.
+    card
+        The channel table, TOML; by default the shipped one.
+    settings
+        Changes, {"safety": {"force": 1200}}, or a TOML file that holds them, or several.
+    seed
+        Of the twin's noise, and of the road.
+    effects
+        What the twin has besides; the rig has its own.
+
+    Raises
+    ------
+    RigtwinError
+        For any mistake in these.
+    """
+    found = find(experiment)
+    configuration = with_changes(found.configuration, settings)
+    demands = found.demands(configuration, seed)
+    table = load_table(CARD if card is None else Path(card))
+    return Test(found.name, configuration, demands, seed, table, effect_texts(effects))
+
+
+def dry_run(
+    experiment: str,
+    card: str | Path,
+    *,
+    path: str | Path,
+    settings: Settings = (),
+    seed: int = 0,
+    effects: Effects = (),
+    progress: Callable[[int], object] = lambda _: None,
+    stop: Stop | None = None,
+    stop_file: str | Path | None = None,
+) -> DryRun:
+    """Runs the exact session of a test on the suspension rig on the virtual card, before the rig is
+    armed for it.
+
+    A session that passes is noted beside the channel table; the rig is armed by a person, for just
+    what has passed.
+
+    Parameters
+    ----------
+    experiment, card, settings, seed, effects
+        As of `run_on_card`; with any effects, nothing is noted.
+    path
+        Of the recording.
+    progress
+        Called with the ticks that were done since its last call.
+    stop, stop_file
+        Gives a reason to end the session; by default it ends at a key, at a signal such as
+        Ctrl-C's, or when that file appears.
+
+    Raises
+    ------
+    RigtwinError
+        For what the session could not be run with on the rig either.
+    """
+    test = plan_test(experiment, card=card, settings=settings, seed=seed, effects=effects)
+    virtual, _ = open_virtual_card(test)
+    with _stopped_by(stop, stop_file) as asked:
+        ended = record_at_leisure(virtual, test, Path(path), asked, progress)
+    recording = load(Path(path)) if ended.ticks else None
+    passed = ended.cause == COMPLETED
+    peaks = predict_peaks(recording, test.card_configuration) if recording is not None else ()
+    if passed and not test.effects:
+        said = {"experiment": test.experiment, "date": date.today().isoformat()}
+        enter(Path(card), key_of(test), said)
+    return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
+
+
+def run_on_twin(
+    experiment: str,
+    *,
+    path: str | Path,
+    card: str | Path | None = None,
+    real_time: bool = False,
+    settings: Settings = (),
+    seed: int = 0,
+    effects: Effects = (),
+    live: int = 0,
+    progress: Callable[[int], object] = lambda _: None,
+    stop: Stop | None = None,
+    stop_file: str | Path | None = None,
+) -> SessionResult:
+    """Runs a test under supervision on the twin, behind the card's converters.
+
+    Parameters
+    ----------
+    experiment, card, settings, seed, effects
+        As of `plan_test`.
+    path
+        Of the recording.
+    real_time
+        At the pace of the clock, or as fast as it goes.
+    live
+        Port of a live view; 0 for none.
+    progress
+        Called with the ticks that were done since its last call.
+    stop, stop_file
+        As of `dry_run`.
+
+    Raises
+    ------
+    RigtwinError
+        Before anything is run.
+    """
+    _require_port(live)
+    test = plan_test(experiment, card=card, settings=settings, seed=seed, effects=effects)
+    twin = WiredTwin(test.terminals(), test.table)
+    with _stopped_by(stop, stop_file) as asked:
+        if real_time:
+            timed = InRealTime(twin, test.configuration.timing.period)
+            ended = record_in_real_time(
+                timed, test, Path(path), asked, guarded=False, live=live, progress=progress
+            )
+        else:
+            ended = record_at_leisure(twin, test, Path(path), asked, progress)
+    return _result(Path(path), ended)
+
+
+def run_on_card(
+    experiment: str,
+    card: str | Path,
+    *,
+    path: str | Path,
+    arm: Callable[[Test], bool],
+    without_dry_run: str | None = None,
+    settings: Settings = (),
+    seed: int = 0,
+    live: int = 0,
+    progress: Callable[[int], object] = lambda _: None,
+    stop: Stop | None = None,
+    stop_file: str | Path | None = None,
+) -> SessionResult | None:
+    """Runs a test on the rig.
+
+    Parameters
+    ----------
+    experiment, settings, seed
+        As of `plan_test`.
+    card
+        The channel table that somebody answers for.
+    path
+        Of the recording.
+    arm
+        Asks whoever stands at the rig whether everybody is clear of it. Nothing has moved when it
+        is called, and nothing moves if it says no.
+    without_dry_run
+        Who answers for it that there was no dry run of just this, if there was none.
+    live
+        Port of a live view; 0 for none.
+    progress
+        Called with the ticks that were done since its last call.
+    stop, stop_file
+        As of `dry_run`.
+
+    Returns
+    -------
+    SessionResult or None
+        How it ended; None if the rig was not armed.
+
+    Raises
+    ------
+    RigtwinError
+        If the test must not be run on the rig, before anything moves.
+    """
+    _require_port(live)
+    test = plan_test(experiment, card=card, settings=settings, seed=seed)
+    permission = require_permission(test, Path(card), without_dry_run)
+    if not arm(test):
+        return None
+    with _stopped_by(stop, stop_file) as asked:
+        ended = record_in_real_time(
+            permission.card,
+            test,
+            Path(path),
+            asked,
+            guarded=True,
+            notes=permission.notes,
+            live=live,
+            progress=progress,
+        )
+    return _result(Path(path), ended)
+
+
+def run_session(
+    plan: str | Path,
+    folder: str | Path,
+    run: Callable[[PlannedTest, Path], bool],
+    *,
+    resume: bool = False,
+    real: bool = False,
+    prepare: Callable[[PlannedTest], object] = lambda test: plan_test(
+        test.experiment, seed=test.seed, settings=test.changes
+    ),
+    told: Callable[[str], object] = lambda _: None,
+) -> bool:
+    """Runs a list of tests, up to the first that does not complete.
+
+    Parameters
+    ----------
+    plan
+        The list, TOML.
+    folder
+        Of the recordings.
+    run
+        Runs one test into a recording, by `run_on_twin` or `run_on_card`; whether it completed.
+    resume
+        Whether to leave out what has completed already.
+    real
+        Whether only a recording of the rig itself counts as that.
+    prepare
+        Called with every test before the first is run; raises for one that cannot be.
+    told
+        Called with a line for people.
+
+    Returns
+    -------
+    bool
+        Whether all completed.
+
+    Raises
+    ------
+    RigtwinError
+        For a mistake in any test of the list, before anything moves.
+    """
+    folder = Path(folder)
+    tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
+    paths = {test.name: folder / f"{test.name}.mcap" for test in tests}
+    todo = [test for test in tests if not (resume and is_complete(paths[test.name], real))]
+    taken = [test.name for test in todo if paths[test.name].exists()]
+    if taken and not resume:
+        raise RigtwinError(
+            f"{folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder"
+        )
+    # Every mistake is found before the first test moves anything.
+    for test in todo:
+        prepare(test)
+    if len(todo) < len(tests):
+        told(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
+    for test in todo:
+        if test.pause:
+            told(f"pause of {test.pause:g} s before {test.name}")
+            time.sleep(test.pause)
+        path = paths[test.name]
+        aside = move_aside(path)
+        completed = run(test, path)
+        if aside is not None:
+            told(f"what was there before is in {aside}")
+        if not completed:
+            told(f"{test.name} did not complete; see {path}, then --resume")
+            return False
+    return True
+
+
+def _result(path: Path, ended: SessionEnd) -> SessionResult:
+    return SessionResult(path, ended.ticks, ended.cause.reason, ended.cause == COMPLETED)
+
+
+def _require_port(live: int) -> None:
+    if not 0 <= live <= PORTS:
+        raise RigtwinError(f"--live {live}: expected a port up to {PORTS}")

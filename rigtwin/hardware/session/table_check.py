@@ -1,0 +1,132 @@
+"""The check that a channel table is true, on the card: what the inputs read at rest, and which of
+them follow each output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from rigtwin.description.configuration import Configuration
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq.calibration import (
+    FORCE,
+    Still,
+    fit_responses,
+    measure_rest,
+    plan_bumps,
+)
+from rigtwin.hardware.daq.card import Card, connect, require_client
+from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
+from rigtwin.hardware.daq.terminals import Terminals
+from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
+from rigtwin.hardware.realtime import Pacer
+from rigtwin.hardware.session.record import Test, record_at_leisure, record_in_real_time
+from rigtwin.hardware.supervisor import COMPLETED
+from rigtwin.recording import load
+
+LEAST_STROKE, MOST_STROKE = 0.001, 0.02
+"""m that a plate is moved to see its sign: well above noise, well within any rig."""
+
+
+def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
+    """The card of a table, or a virtual one that is wired as `wiring` says. Raises RigtwinError."""
+    period = Configuration().timing.period
+    if wiring is None:
+        card = Card(
+            table,
+            period,
+            connect(table.address),
+            pacer=Pacer(period) if table.timing == "software" else None,
+        )
+    else:
+        require_client()
+        from rigtwin.hardware.daq.transport import InProcess
+
+        virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
+        card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    card.inspect()
+    return card
+
+
+def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Still, ...]:
+    """What every input reads while nothing moves.
+
+    Raises
+    ------
+    RigtwinError
+        If one gives the same reading again and again: stuck, or not connected.
+    """
+    rig = open_rig(table, wiring)
+    try:
+        rig.start()
+        still = measure_rest(rig)
+    finally:
+        rig.stop()
+    for signal in still:
+        if signal.repeats >= table.plausible.stuck:
+            raise RigtwinError(
+                f"{signal.name} gave {signal.repeats} times the same reading: "
+                "stuck or not connected"
+            )
+    return still
+
+
+def move_outputs(
+    table: ChannelTable,
+    wiring: ChannelTable | None,
+    stroke: float,
+    stop: Callable[[], str | None],
+) -> dict[str, tuple[str, float, float]]:
+    """Moves every output a little, under supervision, one after the other.
+
+    Parameters
+    ----------
+    table
+        As it is.
+    wiring
+        Of a virtual card in the rig's place; None of the rig itself.
+    stroke
+        m, of the plates.
+    stop
+        Gives a reason to end the motion.
+
+    Returns
+    -------
+    What each input does in answer to each output, as `fit_responses` has it.
+
+    Raises
+    ------
+    RigtwinError
+        If the motion was stopped, or ticks were missed.
+    """
+    rig = open_rig(table, wiring)
+    configuration, demands = plan_bumps(stroke, FORCE, Configuration().timing.period)
+    # Signals whose signs are unknown cannot be held against each other; each alone still can.
+    alone = replace(table, plausible=Plausible(stuck=table.plausible.stuck, wheel=1e9, motor=1e9))
+    test = Test("sign check", configuration, demands, 0, alone)
+    with TemporaryDirectory(prefix="rigtwin-check-") as folder:
+        path = Path(folder) / "check.mcap"
+        if wiring is None:
+            ended = record_in_real_time(rig, test, path, stop, guarded=True)
+        else:
+            ended = record_at_leisure(rig, test, path, stop)
+        if ended.cause != COMPLETED:
+            raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
+        recording = load(path)
+    if recording.ticks != len(demands):
+        raise RigtwinError(
+            f"{len(demands) - recording.ticks} ticks were missed; do it again, "
+            "with less else on this computer"
+        )
+    measured = np.column_stack([recording.column("/sensor", line.name) for line in table.inputs])
+    return fit_responses(measured, demands)
+
+
+def direction_of_wiring(output: str, table: ChannelTable, wiring: ChannelTable) -> int:
+    """Which way an output of a virtual card goes, for what the table says of it."""
+    place = OUTPUTS.index(output)
+    return int(table.outputs[place].scaling.sign * wiring.outputs[place].scaling.sign)
