@@ -16,6 +16,7 @@ from rigtwin.components import (
     Carriage,
     Computer,
     Cylinder,
+    ForceActuator,
     LoadCell,
     Lvdt,
     Motor,
@@ -179,6 +180,9 @@ def test_actuator_conditioning_in_closed_form():
     play = through(Cylinder(deadband=0.2), sine)
     assert np.max(np.abs(play - sine)) == pytest.approx(0.2)
     assert np.ptp(play) == pytest.approx(1.0 - 0.4)
+    swing = sine - 1.0
+    uneven = through(ForceActuator(gain=1.2, gain_asymmetry=0.4), swing)
+    assert np.max(np.abs(uneven - 1.2 * np.where(swing > 0.0, 1.2, 0.8) * swing)) < 1e-12
 
 
 def test_sensor_in_closed_form():

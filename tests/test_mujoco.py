@@ -44,6 +44,7 @@ SIZES = {
     "mass": 3.0,
     "armature": 0.8,
     "gain": 1.3,
+    "gain_asymmetry": 0.5,
     "lag": 0.03,
     "delay": 0.02,
     "saturation": 14.0,

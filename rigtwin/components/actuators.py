@@ -10,11 +10,13 @@ from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 
 class ForceActuator(NamedTuple):
     """Command to force: delay, deadband, gain, saturation, rate limit, lag, then `constant`, in
-    that order."""
+    that order. The gain is larger by the share ½·gain_asymmetry of positive commands, and smaller
+    of negative ones."""
 
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
+    gain_asymmetry: Annotated[float, Quantity("1", -2.0, 2.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
     deadband: Annotated[float, Quantity("unit of the command", 0.0, UNLIMITED, NONE)] = 0.0

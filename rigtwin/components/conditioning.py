@@ -34,7 +34,8 @@ from rigtwin.numerics.delay import delay_sample, ring
 
 class Actuator(NamedTuple):
     """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or
-    about the last position (a valve's overlap). rate: greatest change a timestep. share: of the way
+    about the last position (a valve's overlap). uneven: share of the gain that positive commands have
+    more and negative ones less. rate: greatest change a timestep. share: of the way
     to its input that the lag goes in a timestep."""
 
     neutral: bool
@@ -42,6 +43,7 @@ class Actuator(NamedTuple):
     deadband: float
     zero_centred: bool
     gain: float
+    uneven: float
     saturation: float
     rate: float
     share: float
@@ -60,10 +62,12 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
     command."""
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
-    neutral = (delay, of.deadband, of.gain, of.saturation, rate, of.lag) == (
+    uneven = 0.5 * of.gain_asymmetry if isinstance(of, ForceActuator) else 0.0
+    neutral = (delay, of.deadband, of.gain, uneven, of.saturation, rate, of.lag) == (
         0.0,
         0.0,
         1.0,
+        0.0,
         UNLIMITED,
         UNLIMITED,
         0.0,
@@ -75,6 +79,7 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
         deadband=of.deadband,
         zero_centred=not isinstance(of, Cylinder),
         gain=of.gain,
+        uneven=uneven,
         saturation=of.saturation,
         rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
         share=share,
@@ -100,7 +105,8 @@ def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float
     else:
         passed = min(max(state.memory[1], command - band), command + band)
         state.memory[1] = passed
-    scaled = conditioning.gain * passed
+    uneven = conditioning.uneven
+    scaled = conditioning.gain * passed * (1.0 + (uneven if passed > 0.0 else -uneven))
     return min(max(scaled, -conditioning.saturation), conditioning.saturation)
 
 
@@ -171,6 +177,13 @@ KINDS = (
         ("gain",),
         "output by this factor",
         _each(fixed_starts((0.8, 0.93, 1.07, 1.2), 0.004), *RIG, *DESCRIBED),
+    ),
+    Kind(
+        "gain_asymmetry",
+        "gain that differs by direction",
+        ("gain_asymmetry",),
+        "output greater for positive commands than for negative, by this share",
+        _each(fixed_starts((-0.3, -0.07, 0.07, 0.3), 0.004), ForceActuator),
     ),
     Kind(
         "lag",
