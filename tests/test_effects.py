@@ -150,7 +150,7 @@ NEVER_LATE = Computer()
 
 
 def through(
-    of: Motor | Cylinder, commands: np.ndarray, computer: Computer = NEVER_LATE
+    of: Motor | Cylinder | ForceActuator, commands: np.ndarray, computer: Computer = NEVER_LATE
 ) -> np.ndarray:
     conditioning = actuator(of, computer, STEP)
     state = hold(conditioning, float(commands[0]))

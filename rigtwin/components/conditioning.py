@@ -34,9 +34,9 @@ from rigtwin.numerics.delay import delay_sample, ring
 
 class Actuator(NamedTuple):
     """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or
-    about the last position (a valve's overlap). uneven: share of the gain that positive commands have
-    more and negative ones less. rate: greatest change a timestep. share: of the way
-    to its input that the lag goes in a timestep."""
+    about the last position (a valve's overlap). uneven: share of the gain that positive commands
+    have more and negative ones less. rate: greatest change a timestep. share: of the way to its
+    input that the lag goes in a timestep."""
 
     neutral: bool
     delay: float
