@@ -135,7 +135,7 @@ def test_a_recording_keeps_its_effects_but_not_among_the_operators_settings(tmp_
         ("coulomb@rail=much", "rail.coulomb = much: expected a number from 0 to 1000 N"),
         (
             "stribeck@rail=20,speed=0.1",
-            "stribeck@rail has stribeck, stribeck_velocity, not 'speed'",
+            "stribeck@rail has stribeck, stribeck_velocity, stribeck_exponent, not 'speed'",
         ),
         ("setting@controller=kd:1", "unknown setting controller.kd"),
     ],

@@ -25,7 +25,7 @@ from rigtwin.components.effect import (
     shares_of_nominal,
 )
 from rigtwin.components.motor import Motor
-from rigtwin.components.quantity import MJCF, NONE, Quantity
+from rigtwin.components.quantity import MJCF, NONE, STRIBECK_EXPONENT, Quantity
 from rigtwin.components.tyre import Tyre
 from rigtwin.numerics.arrays import Array
 
@@ -39,6 +39,10 @@ WAVES = 3.0
 """Waves along the stroke that cogging has at least: fewer are a force that depends on the place."""
 
 
+CONSTANT = ("coulomb", "stribeck_velocity", "stribeck_exponent")
+"""Parameters of friction that alone do not make it depend on the motion."""
+
+
 class Rail(NamedTuple):
     """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor
     too."""
@@ -49,6 +53,7 @@ class Rail(NamedTuple):
     stribeck_velocity: Annotated[
         float, Quantity("m/s", 1e-4, 0.1, "of the order seen in rail guides, assumed")
     ] = 0.01
+    stribeck_exponent: Annotated[float, STRIBECK_EXPONENT] = 2.0
     asymmetry: Annotated[float, Quantity("N", -500.0, 500.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
 
@@ -59,10 +64,10 @@ class Guide(NamedTuple):
     force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v|
     +
     stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
-    is coulomb + load_coefficient·|force transmitted| + stribeck·exp(−(v/stribeck_velocity)²), in
-    positive direction ½·asymmetry more and in negative less, and acts through a play of `backlash`
-    and a spring of `compliance` in series with it. All of it acts through a spring of
-    `mount_compliance`.
+    is coulomb + load_coefficient·|force transmitted| +
+    stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent), in positive direction ½·asymmetry more
+    and in negative less, and acts through a play of `backlash` and a spring of `compliance` in
+    series with it. All of it acts through a spring of `mount_compliance`.
     """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
@@ -72,6 +77,7 @@ class Guide(NamedTuple):
     stribeck_velocity: Annotated[
         float, Quantity("m/s", 1e-6, 100.0, "of the order seen in guides, assumed")
     ] = 0.01
+    stribeck_exponent: Annotated[float, STRIBECK_EXPONENT] = 2.0
     asymmetry: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     load_coefficient: Annotated[float, Quantity("1", 0.0, 2.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 10.0, NONE)] = 0.0
@@ -96,6 +102,7 @@ class Friction(NamedTuple):
     coulomb: float
     stribeck: float
     stribeck_velocity: float
+    stribeck_exponent: float
     asymmetry: float
     load_coefficient: float
     backlash: float
@@ -104,7 +111,7 @@ class Friction(NamedTuple):
 def friction(of: Rail | Motor | Guide) -> Friction:
     """The dry friction of whatever slides."""
     values = {name: float(getattr(of, name, 0.0)) for name in Friction._fields[1:]}
-    changing = any(v for name, v in values.items() if name not in ("coulomb", "stribeck_velocity"))
+    changing = any(v for name, v in values.items() if name not in CONSTANT)
     return Friction(changing, **values)
 
 
@@ -138,8 +145,10 @@ def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, floa
     """
     size = dry.coulomb + dry.load_coefficient * abs(load)
     if dry.stribeck != 0.0:
-        ratio = velocity / dry.stribeck_velocity
-        size += dry.stribeck * math.exp(-ratio * ratio)
+        ratio = abs(velocity / dry.stribeck_velocity)
+        exponent = dry.stribeck_exponent
+        power = ratio * ratio if exponent == 2.0 else ratio**exponent
+        size += dry.stribeck * math.exp(-power)
     return max(size + 0.5 * dry.asymmetry, 0.0), max(size - 0.5 * dry.asymmetry, 0.0)
 
 
@@ -226,7 +235,8 @@ def _rig_coulomb(at: Context) -> Starts:
 def _rig_stribeck(at: Context) -> Starts:
     _, base = _rig_friction(at)
     amplitudes = (-0.5 * base, 0.5 * base, 2.0 * base)
-    return Starts(tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.08))), (0.05 * base, 0.001))
+    starts = tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.08), (1.4,)))
+    return Starts(starts, (0.05 * base, 0.001, 0.1))
 
 
 def _rig_asymmetry(at: Context) -> Starts:
@@ -317,9 +327,16 @@ KINDS = (
     Kind(
         "stribeck",
         "Stribeck friction",
+        ("stribeck", "stribeck_velocity", "stribeck_exponent"),
+        "dry friction greater near standstill",
+        {Rail: _rig_stribeck, Motor: _rig_stribeck},
+    ),
+    Kind(
+        "stribeck",
+        "Stribeck friction",
         ("stribeck", "stribeck_velocity"),
         "dry friction greater near standstill",
-        {Rail: _rig_stribeck, Motor: _rig_stribeck, Guide: _stribeck},
+        {Guide: _stribeck},
     ),
     Kind(
         "asymmetry",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from rigtwin.components.quantity import NONE, UNLIMITED, Quantity
+from rigtwin.components.quantity import NONE, STRIBECK_EXPONENT, UNLIMITED, Quantity
 
 
 class Motor(NamedTuple):
@@ -24,6 +24,7 @@ class Motor(NamedTuple):
     stribeck_velocity: Annotated[
         float, Quantity("m/s", 1e-4, 0.1, "of the order seen in rail guides, assumed")
     ] = 0.01
+    stribeck_exponent: Annotated[float, STRIBECK_EXPONENT] = 2.0
     asymmetry: Annotated[float, Quantity("N", -500.0, 500.0, NONE)] = 0.0
     load_coefficient: Annotated[float, Quantity("1", 0.0, 1.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0

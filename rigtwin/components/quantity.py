@@ -12,4 +12,13 @@ NONE = "none in the nominal machine"
 MJCF = "the MJCF, unless the description says otherwise"
 """Source of what a described machine's model says."""
 
-__all__ = ["MJCF", "NONE", "UNLIMITED", "Choice", "Quantity", "fields"]
+
+STRIBECK_EXPONENT = Quantity(
+    "1",
+    0.5,
+    3.0,
+    "2: Gauss' curve; 0.5 to 2 are used, Armstrong-Hélouvry et al., Automatica 30(7), 1994",
+)
+"""Shared by all that slide."""
+
+__all__ = ["MJCF", "NONE", "STRIBECK_EXPONENT", "UNLIMITED", "Choice", "Quantity", "fields"]

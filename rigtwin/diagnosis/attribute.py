@@ -3,9 +3,11 @@ how sure that is."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 
 import numpy as np
 
@@ -29,6 +31,11 @@ MANY, FEW = 10, 3
 """Pairs fitted in full, where one effect leaves much and where it leaves little."""
 LOOKED_AGAIN = 2
 """Times that the best pair's effects are replaced by what resembles them."""
+RESTARTED, COMBINED, FOLLOWED = 6, 150, 2
+"""Pairs that are fitted from other starts where the best leaves too much, combinations of starts
+that are tried of one at most, and how many of these are followed."""
+NEAR = 1.5
+"""Times the best misfit up to which a pair is not fitted again from another start."""
 SETTLED_PAIRS = 4
 """Pairs that are fitted again with the tolerances taken at them."""
 
@@ -187,28 +194,93 @@ def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]
         lambda hope: search.coarse.refine(hope.effects, hope.values, hope.space), hopeful
     )
     pairs.sort(key=search.cost)
-    for _ in range(LOOKED_AGAIN if pairs else 0):
-        known = {frozenset(pair.effects) for pair in pairs}
-        fresh = [
-            pair
-            for pair in propose_replacements(
-                search.coarse, pairs[0], search.effects, search.threads
-            )
-            if frozenset(pair[0]) not in known
-        ]
-        pairs += search.threads.map(lambda pair: search.coarse.refine(*pair), fresh)
-        pairs.sort(key=search.cost)
-    settled = search.threads.map(search.fitter.refit_with_tolerances, pairs[:SETTLED_PAIRS])
+    enough = evidence.expected + thresholds.unexplained * evidence.expected
+    for _ in range(LOOKED_AGAIN):
+        pairs = _add(pairs, _replace, search)
+    if pairs and pairs[0].misfit > enough:
+        for step in (_restart, _move_elsewhere, _replace):
+            pairs = _add(pairs, step, search)
+    foremost = _foremost(pairs)
+    settled = search.threads.map(search.fitter.refit_with_tolerances, foremost)
+    others = [pair for pair in pairs if all(pair is not each for each in foremost)]
     least_more = max(
         thresholds.second * search.least,
         thresholds.known.more * _excess(first.misfit, evidence),
     )
     return [
         pair
-        for pair in (*settled, *pairs[SETTLED_PAIRS:])
+        for pair in (*settled, *others)
         if first.misfit - pair.misfit > least_more
         and not within_tolerance(pair, evidence, thresholds)
     ]
+
+
+def _add(
+    pairs: list[Fit], step: Callable[[_Search, Sequence[Fit]], list[Fit]], search: _Search
+) -> list[Fit]:
+    """The pairs with those that a step finds, the best first."""
+    return sorted([*pairs, *step(search, pairs)], key=search.cost) if pairs else pairs
+
+
+def _foremost(pairs: Sequence[Fit]) -> list[Fit]:
+    """The best pairs, and besides the best of other effects, where one pair has several valleys."""
+    distinct: dict[frozenset[Effect], Fit] = {}
+    for pair in pairs:
+        distinct.setdefault(frozenset(pair.effects), pair)
+    best = [*pairs[:SETTLED_PAIRS], *list(distinct.values())[:SETTLED_PAIRS]]
+    return list({id(pair): pair for pair in best}.values())
+
+
+def _near(pairs: Sequence[Fit]) -> set[frozenset[Effect]]:
+    """Effects of the pairs that are not far behind the best; others may lie in a wrong valley."""
+    return {frozenset(pair.effects) for pair in pairs if pair.misfit <= NEAR * pairs[0].misfit}
+
+
+def _replace(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
+    """The best pair with its effects replaced by what resembles them."""
+    known = _near(pairs)
+    fresh = [
+        pair
+        for pair in propose_replacements(search.coarse, pairs[0], search.effects, search.threads)
+        if frozenset(pair[0]) not in known
+    ]
+    return search.threads.map(lambda pair: search.coarse.refine(*pair), fresh)
+
+
+def _restart(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
+    """The foremost pairs again, each from the best of all combinations of their starts: what sticks
+    and slips has more than one best place, and the values of the first alone may lie in another's
+    valley."""
+    coarse = search.coarse
+
+    def restart(pair: Fit) -> list[Fit]:
+        starts = [coarse.starts(effect).values for effect in pair.effects]
+        if math.prod(len(each) for each in starts) > COMBINED:
+            return []
+        scored = sorted(
+            (
+                coarse.space.misfit(
+                    coarse.evidence.residual(with_values(coarse.plant, pair.effects, values))
+                ),
+                values,
+            )
+            for values in product(*starts)
+        )
+        return [coarse.refine(pair.effects, values) for _, values in scored[:FOLLOWED]]
+
+    return [fit for each in search.threads.spread(restart, pairs[:RESTARTED]) for fit in each]
+
+
+def _move_elsewhere(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
+    """The best pair with each of its effects in turn at every other component that may have it."""
+    best, coarse, known = pairs[0], search.coarse, _near(pairs)
+    moved = []
+    for number, effect in enumerate(best.effects):
+        for other in search.effects:
+            effects = (*best.effects[:number], other, *best.effects[number + 1 :])
+            if other.kind == effect.kind and frozenset(effects) not in known:
+                moved.append(effects)
+    return search.threads.map(lambda effects: coarse.refine(effects, best.values), moved)
 
 
 def _attribute_rough(

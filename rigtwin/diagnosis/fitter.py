@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 
 SHAKES = (0.88, 0.95, 1.05, 1.12)
-"""Shares of a magnitude at which a fit is tried to be better yet."""
+"""Shares of a value at which a fit is tried to be better yet."""
 SETTLING = 2
 """Times that the tolerances are taken anew at a fit."""
 UNMOVED = 0.05
@@ -355,16 +356,13 @@ class Fitter:
         """The fit, or a better one a little further away: where a stick begins or is missed, the
         misfit has a step, and Gauss-Newton does not climb it."""
         for number, effect in enumerate(fit.effects):
-            nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
-            if effect.kind.name in LIMITS:
-                nominal = 0.0
-            for share in SHAKES:
-                magnitude = nominal + share * (fit.values[number][0] - nominal)
-                values = (
-                    *fit.values[:number],
-                    (magnitude, *fit.values[number][1:]),
-                    *fit.values[number + 1 :],
-                )
+            for place, share in product(range(len(effect.kind.parameters)), SHAKES):
+                own = list(fit.values[number])
+                # A magnitude is off nominal by another share; what else there is, is another.
+                about = place > 0 or effect.kind.name in LIMITS
+                nominal = 0.0 if about else effect.nominal(self.plant)[effect.kind.parameters[0]]
+                own[place] = nominal + share * (own[place] - nominal)
+                values = (*fit.values[:number], tuple(own), *fit.values[number + 1 :])
                 if (
                     space.misfit(self.evidence.residual(with_values(base, fit.effects, values)))
                     < fit.misfit

@@ -11,6 +11,7 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.ranking import LATE
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
@@ -131,11 +132,14 @@ def propose_replacements(
             and is_possible((*kept, other), fitter.plant)
         ]
         scored = sorted(threads.spread(resemble, others), key=lambda item: -item[0])
-        kind, rough = fit.effects[number].kind.name, fitter.evidence.machine.rough
+        effect, rough = fit.effects[number], fitter.evidence.machine.rough
         for rank, (gain, other, start) in enumerate(scored):
             resembles = rank < LOOKALIKES and gain > RESEMBLES * float(own @ own)
-            # The same at another component is the first thing to be asked about.
-            if resembles or (rough and other.kind.name == kind):
+            # The same at another component is the first thing to be asked about, and what else
+            # may make this one late.
+            elsewhere = rough and other.kind.name == effect.kind.name
+            late = other.group == effect.group and {other.kind.name, effect.kind.name} <= {*LATE}
+            if resembles or elsewhere or late:
                 changed, values = list(fit.effects), list(fit.values)
                 changed[number], values[number] = other, start[0]
                 found.append((tuple(changed), tuple(values)))

@@ -9,6 +9,8 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
+LATE = ("lag", "delay", "two_lags", "resonance")
+"""Kinds that make a signal late, each in its own way."""
 CONTAINED = {"two_lags": ("lag",), "mount": ("compliance", "relaxation")}
 """Kind → the simpler ones that it becomes at the end of its range, or where little else acts."""
 

@@ -19,6 +19,7 @@ from rigtwin.diagnosis.fit import Fit, Values, is_possible, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.proposals import propose_replacements
+from rigtwin.diagnosis.ranking import LATE
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.numerics.arrays import Array
@@ -34,8 +35,6 @@ JUDGED = 4
 
 RARE = ("backlash", "compliance", "mount", "cogging", "relaxation", "drag", "load_friction")
 """Kinds that few guides have; what is left of other friction may be taken for them."""
-LATE = ("lag", "delay", "two_lags", "resonance")
-"""Kinds that make a signal late, each in its own way."""
 
 
 @dataclass(frozen=True)

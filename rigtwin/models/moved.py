@@ -152,6 +152,7 @@ class MovedModel:
         guide = Guide(*(float(value) for value in component))
         if guide == Guide(
             stribeck_velocity=guide.stribeck_velocity,
+            stribeck_exponent=guide.stribeck_exponent,
             cogging_pitch=guide.cogging_pitch,
             cogging_phase=guide.cogging_phase,
         ):
