@@ -52,6 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config"
     )
     parser.add_argument(
+        "--save-mjcf",
+        type=Path,
+        metavar="F.xml",
+        help="write the machine's own MJCF with the corrected values, nothing else changed",
+    )
+    parser.add_argument(
         "--changed",
         action="store_true",
         help="say instead what is not the same in all recordings, given in the order of time",
@@ -66,13 +72,14 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
     from rigtwin.errors import RigtwinError
 
-    if parsed.changed and (parsed.held_out or parsed.html or parsed.save_twin):
+    outputs = (parsed.json, parsed.html, parsed.save_twin, parsed.save_mjcf)
+    if parsed.changed and (parsed.held_out or any(outputs[1:])):
         raise RigtwinError(
             "--changed compares recordings and writes --json only; "
-            "leave out --held-out, --html and --save-twin"
+            "leave out --held-out, --html, --save-twin and --save-mjcf"
         )
     inputs = [*parsed.recordings, *parsed.held_out]
-    for out in (parsed.json, parsed.html, parsed.save_twin):
+    for out in outputs:
         if out is not None:
             apart(out, *inputs)
             writable(out)
@@ -114,5 +121,11 @@ def execute(parsed: argparse.Namespace) -> int:
         said.append(f"corrected twin in {twin}; use it with --config")
     elif parsed.save_twin is not None:
         said.append(f"{parsed.save_twin} not written: the data cannot be diagnosed")
+    if parsed.save_mjcf is not None and diagnosis.effects:
+        left = diagnosis.save_mjcf(parsed.save_mjcf)
+        said.append(f"corrected MJCF in {parsed.save_mjcf}")
+        said += [f"  not in it, as MJCF has no attribute for it: {each}" for each in left]
+    elif parsed.save_mjcf is not None:
+        said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
     print("\n".join(said))
     return 1 if diagnosis.verdict == "unusable" else 0

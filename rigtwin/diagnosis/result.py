@@ -10,6 +10,7 @@ from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.diagnosis import calibrated, report, text
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
@@ -84,6 +85,31 @@ class Diagnosis:
         """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be
         written, or if the data were not fit for a diagnosis."""
         return calibrated.save(Path(path), self)
+
+    def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
+        """Writes the machine's own MJCF with the corrected values and nothing else changed.
+
+        Parameters
+        ----------
+        path
+            Of the new file. Meshes and included files are looked for beside it.
+
+        Returns
+        -------
+        tuple of str
+            The corrections that MJCF has no attribute for, such as a lag or a play, a line each.
+
+        Raises
+        ------
+        RigtwinError
+            If the model is a URDF, or the file cannot be written.
+        """
+        changes = [
+            Change(effect.name.component, name, each.value)
+            for effect in self.effects
+            for name, each in effect.parameters.items()
+        ]
+        return write_mjcf(Path(path), self.described, changes)
 
     def __str__(self) -> str:
         return text.describe(self.answer)
