@@ -234,3 +234,23 @@ def test_no_command_overwrites_its_input(tmp_path, capsys, command):
 def test_compare_refuses_settings_that_it_would_ignore(capsys, ignored):
     assert main(["compare", str(RIG), "--set", ignored]) == 1
     assert "the recording's" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["run", "drop", "--config", "{file}", "--out", "{file}"], "is the input"),
+        (["run", "drop", "--machine", "{file}", "--out", "{file}"], "is the input"),
+        (["diagnose", "a.mcap", "--config", "{file}", "--html", "{file}"], "is the input"),
+        (["compare", "a.mcap", "--machine", "{file}", "--json", "{file}"], "is the input"),
+        (["tune", "{file}", "--out", "{file}"], "is the input"),
+        (["diagnose", "a.mcap", "--json", "b", "--html", "./b"], "one would be lost"),
+    ],
+)
+def test_no_output_is_an_input_or_another_output(arguments, said, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "settings.toml"
+    file.write_text("[rail]\ncoulomb = 80\n")
+    assert main([text.format(file=file) for text in arguments]) == 1
+    assert said in capsys.readouterr().err
+    assert file.read_text() == "[rail]\ncoulomb = 80\n"

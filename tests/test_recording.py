@@ -377,3 +377,17 @@ def test_a_full_disk_is_one_line(tmp_path):
     full.symlink_to("/dev/full")
     with pytest.raises(RigtwinError, match=r"cannot write .*No space left"):
         Writer(full, "x", 1e-3, {})
+
+
+def test_a_recording_has_one_owner(tmp_path):
+    path = tmp_path / "one.mcap"
+    with Writer(path, "first", 1e-3, {}) as writer:
+        before = path.read_bytes()
+        with pytest.raises(RigtwinError, match="is being written by another program"):
+            Writer(path, "second", 1e-3, {})
+        assert path.read_bytes() == before
+        writer.finish("completed")
+    with Writer(path, "third", 1e-3, {}) as writer:
+        writer.finish("completed")
+    assert b"third" in path.read_bytes()
+    assert b"first" not in path.read_bytes()

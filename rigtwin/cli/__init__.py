@@ -11,6 +11,7 @@ from importlib import import_module
 from keyword import iskeyword
 from types import ModuleType
 
+from rigtwin.cli.files import check_files
 from rigtwin.errors import RigtwinError
 
 OVERVIEW = """\
@@ -88,6 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if parsed.command is None:
         parser.error("a command is missing; rigtwin --help lists them")
     try:
+        check_files(parsed)
         return _module(parsed.command).execute(parsed)
     except RigtwinError as error:
         print(f"rigtwin: {' '.join(str(error).split())}", file=sys.stderr)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.console import apart, writable, write_text
+from rigtwin.console import writable, write_text
 
 SUMMARY = "find the friction compensator's settings from a recording"
 MORE = """\
@@ -28,7 +28,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     recording = rigtwin.load(parsed.recording)
     if parsed.out is not None:
-        writable(apart(parsed.out, parsed.recording))
+        writable(parsed.out)
     for note in recording.notes:
         print(f"note: {note}")
     found = rigtwin.calibrate(recording)

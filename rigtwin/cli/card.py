@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import rigtwin
 from rigtwin.cli.options import add_effect, add_settings, settings_of
-from rigtwin.console import apart, table, writable
+from rigtwin.console import table, writable
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def _release(parsed: argparse.Namespace) -> int:
 
 
 def _check(parsed: argparse.Namespace) -> int:
-    writable(apart(parsed.out, parsed.card))
+    writable(parsed.out)
     found = rigtwin.check_card(
         parsed.card,
         operator=parsed.operator,

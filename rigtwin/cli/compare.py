@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.cli.options import add_effect, add_json, add_machine, add_settings, settings_of
-from rigtwin.console import apart, table, write_json
+from rigtwin.console import table, write_json
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording, parsed.machine)
-    if parsed.json is not None:
-        apart(parsed.json, parsed.recording, *([parsed.other] if parsed.other else []))
     left_out: Mapping[str, str] = {}
     if parsed.other is not None:
         if parsed.config is not None or parsed.set or parsed.effect:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_json, add_machine, add_settings, settings_of
-from rigtwin.console import apart, writable, write_json
+from rigtwin.console import writable, write_json
 
 SUMMARY = "say why recordings of one machine and the twin disagree"
 MORE = """\
@@ -78,10 +78,8 @@ def execute(parsed: argparse.Namespace) -> int:
             "--changed compares recordings and writes --json only; "
             "leave out --held-out, --html, --save-twin and --save-mjcf"
         )
-    inputs = [*parsed.recordings, *parsed.held_out]
     for out in outputs:
         if out is not None:
-            apart(out, *inputs)
             writable(out)
     recordings = [rigtwin.load(path, parsed.machine) for path in parsed.recordings]
     held_out = [rigtwin.load(path, parsed.machine) for path in parsed.held_out]

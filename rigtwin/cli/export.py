@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.console import apart
-
 SUMMARY = "write a recording as CSV or MAT for other programs"
 MORE = ""
 
@@ -20,5 +18,5 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording)
-    print(f"written to {recording.export(apart(parsed.out, parsed.recording))}")
+    print(f"written to {recording.export(parsed.out)}")
     return 0

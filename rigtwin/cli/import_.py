@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.console import apart, writable
+from rigtwin.console import writable
 
 SUMMARY = "make a recording of other programs' data"
 MORE = """\
@@ -26,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
-    apart(parsed.out, *parsed.data, parsed.map)
     writable(parsed.out)
     for line in rigtwin.import_data(parsed.data, parsed.map, parsed.out).report:
         print(line)

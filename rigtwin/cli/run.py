@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
 from rigtwin.cli.supervised import add_supervised, require_card, run
-from rigtwin.console import apart, writable
+from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
@@ -112,6 +112,5 @@ def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) ->
             "--live goes with a session in real time: --real-time, "
             "or --target daq without --dry-run"
         )
-    given = [path for path in (parsed.card, parsed.config) if path is not None]
-    writable(apart(path, *given))
+    writable(path)
     return run(parsed, parsed.name, path)

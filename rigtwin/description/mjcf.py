@@ -165,6 +165,8 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
     """
     if machine.model.suffix.lower() == ".urdf":
         raise RigtwinError(f"{machine.model.name} is a URDF; expected an MJCF")
+    if path.exists() and path.samefile(machine.model):
+        raise RigtwinError(f"{path} is the machine's own model; name another output")
     document, left = Document(machine.model), []
     for change in changes:
         if not _apply(document, machine, change):

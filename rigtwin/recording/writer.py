@@ -44,6 +44,7 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
+from rigtwin.recording.owner import open_alone
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -112,7 +113,7 @@ class Writer:
         """
         self._fields = dict(fields or {})
         try:
-            self._file: BinaryIO = path.open("wb", buffering=0)
+            self._file: BinaryIO = open_alone(path)
         except OSError as error:
             raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
         self._path = path
