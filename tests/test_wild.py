@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from referee.reliability import draw_reliability
 from referee.wild import SURE, WildResult, judge_names, reliability, wild_rows, wild_table
 from referee.wild_cases import ACCEPTED, MACHINES, ROUND, SORTS, WildCase, draw_wild, record_wild
 from referee.wild_truth import (
@@ -25,6 +26,7 @@ from referee.wild_truth import (
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
 from rigtwin.diagnosis.thresholds import SelectionRules
+from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
 PERIOD = 1e-3
@@ -172,6 +174,13 @@ def test_names_are_scored_by_what_a_person_would_accept():
     assert values[f"acceptable of names at {SURE} or more"].startswith("3 of 4")
     assert sum(count for *_, count in reliability(judge_names(result))) == 5
     assert "not backlash@damper" in wild_table(result)
+
+
+def test_reliability_is_drawn(tmp_path):
+    path = draw_reliability([(0.8, 0.9, 10), (0.97, 1.0, 300)], tmp_path / "r.svg")
+    assert "300 names" in path.read_text()
+    with pytest.raises(RigtwinError, match="cannot write"):
+        draw_reliability([], tmp_path / "r.xyz")
 
 
 def test_confidence_grows_with_the_margin_and_is_never_certain():

@@ -52,6 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", type=Path, metavar="F.json", help="also write the scores to a file"
     )
+    parser.add_argument(
+        "--draw",
+        type=Path,
+        metavar="F.png",
+        help="with --wild: also draw how often names were right beside how sure they were",
+    )
     add_workers(parser)
 
 
@@ -59,8 +65,11 @@ def execute(parsed: argparse.Namespace) -> int:
     """Runs the check that was asked for and prints its score."""
     if (parsed.cases is not None and parsed.cases < 1) or parsed.seed < 0:
         raise RigtwinError("--cases must be at least 1, --seed at least 0")
-    if parsed.json is not None:
-        writable(parsed.json)
+    for out in (parsed.json, parsed.draw):
+        if out is not None:
+            writable(out)
+    if parsed.draw is not None and not parsed.wild:
+        raise RigtwinError("--draw: expected with --wild")
     if parsed.wild and (parsed.tune is not None or parsed.baselines):
         raise RigtwinError("--wild: expected without --tune and --baselines")
     if parsed.wild:
@@ -88,7 +97,7 @@ def _diagnoses(parsed: argparse.Namespace) -> int:
 
 
 def _wild(parsed: argparse.Namespace) -> int:
-    from referee.wild import wild_document, wild_table
+    from referee.wild import judge_names, reliability, wild_document, wild_table
 
     with counting_bar("machine", "wild machines") as progress:
         result = rigtwin.blindcheck_wild(
@@ -102,6 +111,10 @@ def _wild(parsed: argparse.Namespace) -> int:
     print(wild_table(result))
     if parsed.json is not None:
         write_json(parsed.json, wild_document(result))
+    if parsed.draw is not None:
+        from referee.reliability import draw_reliability
+
+        draw_reliability(reliability(judge_names(result)), parsed.draw)
     return 0
 
 

@@ -30,7 +30,7 @@ from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.model import Form
 from rigtwin.models.start import Start, fit_start, read_start, start_error
-from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smallest_step, smooth, white_noise
 
@@ -42,22 +42,12 @@ SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
 LIGHTEST = 1e-12
 """kg or kg m², of what still moves under a finite force."""
-RUNAWAY = 1e6
-"""In any unit of a joint: no machine goes there."""
 SHOWS, FORGOTTEN = 10.0, 0.02
 """χ² from which the error of a start shows, and share of its greatest effect below which it does no
 more."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
-
-
-def _contain(signals: Array) -> Array:
-    """Signals within what is possible: a plant that is not stable runs away; it must be a bad
-    explanation, not an impossible number."""
-    if float(np.abs(signals).max()) <= RUNAWAY:
-        return signals
-    return np.clip(np.nan_to_num(signals, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
 
 
 def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
@@ -224,7 +214,7 @@ class JointModel:
         """The position from any start, for as long as a start is remembered."""
         integrate = self._prepare_pushed(plant, getattr(plant, self._mover.name))
         besides = np.zeros(self._remembered)
-        return lambda start: _contain(integrate(start, besides)[0])
+        return lambda start: contain(integrate(start, besides)[0])
 
     def _find_held(self) -> float:
         """To what the position is predicted at best where the start's error shows in it; 0 where it
@@ -305,7 +295,7 @@ class JointModel:
             )
             if force is not None:
                 out[2] -= force
-        out = _contain(out)
+        out = contain(out)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out

@@ -16,10 +16,9 @@ from rigtwin.description.control import Channel
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Structure
 from rigtwin.errors import RigtwinError
-from rigtwin.models.joint import RUNAWAY
 from rigtwin.models.moved_twin import move_together
 from rigtwin.models.mujoco import MujocoModel, Tick
-from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.arrays import RUNAWAY, Array
 from rigtwin.recording import Recording, Writer
 from rigtwin.simulation.runner import RunResult
 

@@ -38,7 +38,7 @@ from rigtwin.components.yielding import share_of_load, solve_yielding, yielding_
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
-from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.arrays import Array, contain
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 from rigtwin.simulation.converters import sensors
@@ -499,7 +499,7 @@ class QuarterCarModel:
             pushed=besides.force,
             out=out,
         )
-        return out
+        return contain(out)
 
     def _displace(self, of: Plate, by: Array) -> Plate:
         if not by.any():

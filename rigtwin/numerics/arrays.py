@@ -1,4 +1,4 @@
-"""The type of every numerical array."""
+"""The type of every numerical array, and a bound on what a model may predict."""
 
 from __future__ import annotations
 
@@ -9,3 +9,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating[Any]]
 """Real numbers, in practice float64; shape and unit are said where one is used."""
+RUNAWAY = 1e6
+"""In any unit of a machine's signals: none goes there."""
+
+
+def contain(signals: Array) -> Array:
+    """Signals within what is possible: a plant that is not stable runs away; it must be a bad
+    explanation, not an impossible number."""
+    if float(np.abs(signals).max()) <= RUNAWAY:
+        return signals
+    return np.clip(np.nan_to_num(signals, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
