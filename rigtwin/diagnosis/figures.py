@@ -41,7 +41,7 @@ LINES = 240_000
 MOST, LEAST = 4000, 600
 """Points of one of them."""
 NAMED = re.compile(r'"(p\d{4,}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12})"')
-"""What Bokeh calls its models and the places where they are drawn; it draws the latter by chance."""
+"""What Bokeh calls its models, and their places on the page, by chance."""
 MARGIN = 0.06
 """Of an axis beyond what is looked at."""
 
