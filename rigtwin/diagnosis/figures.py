@@ -29,8 +29,8 @@ MEASURED, BEFORE, AFTER, SAMPLES = "#1e293b", "#c2410c", "#0f766e", "#94a3b8"
 COLOURS = {"measured": MEASURED, "before": BEFORE, "after": AFTER, "samples": SAMPLES}
 LABELS = {
     "measured": "measured",
-    "before": "without the effect",
-    "after": "with the effect",
+    "before": "without it",
+    "after": "with it",
     "samples": "single samples",
 }
 WIDTHS = {"measured": 6.0, "before": 1.8, "after": 1.6}

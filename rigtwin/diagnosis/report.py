@@ -47,22 +47,6 @@ def bars(answer: Answer) -> list[Bar]:
     return [Bar(name, b, a, width(b), width(a), width(1.0)) for name, b, a in levels]
 
 
-@dataclass(frozen=True)
-class Brought:
-    """What one effect brought. share: of the gap, in percent."""
-
-    effect: str
-    share: float
-
-
-def ladder(answer: Answer) -> list[Brought]:
-    """Each effect's own share of the gap, the largest first."""
-    return sorted(
-        (Brought(str(effect.name), 100.0 * effect.share) for effect in answer.effects),
-        key=lambda each: -each.share,
-    )
-
-
 def html(diagnosis: Diagnosis) -> str:
     """The page."""
     environment = Environment(
@@ -86,7 +70,6 @@ def html(diagnosis: Diagnosis) -> str:
         diagnosis=answer,
         guilty=guilty,
         bars=bars(answer),
-        ladder=ladder(answer),
         drawings=drawings,
         overlays=overlays,
         corrected=corrected,
