@@ -143,7 +143,8 @@ def diagnose(
         found = [diagnose_part(part) for part in parts(machine)]
         if len(found) == 1:
             return found[0]
-        return join(Evidence(machine, recordings, configurations), found, started)
+        apart = Evidence(machine, held_out, others) if held_out else None
+        return join(Evidence(machine, recordings, configurations), apart, found, started)
 
 
 def _diagnose(
@@ -254,6 +255,7 @@ def _diagnose(
         evidence,
         corrected,
         _alternatives(found, validation.kept, thresholds.possible),
+        held_out,
     )
 
 

@@ -22,13 +22,17 @@ FIRST = 2
 """Explanations of each part that the whole's ranking has."""
 
 
-def join(evidence: Evidence, found: Sequence[Diagnosis], started: float) -> Diagnosis:
+def join(
+    evidence: Evidence, held_out: Evidence | None, found: Sequence[Diagnosis], started: float
+) -> Diagnosis:
     """The diagnosis of a machine whose parts were diagnosed each by itself.
 
     Parameters
     ----------
     evidence
         Of the whole machine.
+    held_out
+        The same of the recordings that it was judged on, None without any.
     found
         Of its parts, which share no component that was changed.
     started
@@ -78,7 +82,7 @@ def join(evidence: Evidence, found: Sequence[Diagnosis], started: float) -> Diag
         else None,
     )
     otherwise = tuple(pair for each in found for pair in each.otherwise)
-    return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise)
+    return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
 
 
 def _chain(groups: Iterable[Iterable[Item]]) -> list[Item]:

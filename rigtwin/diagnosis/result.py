@@ -15,6 +15,8 @@ from rigtwin.diagnosis import calibrated, report, text
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.overlay import Overlay, overlay
+from rigtwin.diagnosis.pictures import Picture, picture
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,9 @@ class Diagnosis:
 
     answer: all that is said; described: the machine as described; evidence: None where the data
     cannot be diagnosed; corrected: the twin of the first recording with what was found; otherwise:
-    other explanations that are not out of the question, with their probability. In a notebook it
-    shows its report.
+    other explanations that are not out of the question, with their probability; held_out: the
+    recordings that the correction was judged on, None without any. In a notebook it shows its
+    report.
     """
 
     answer: Answer
@@ -32,6 +35,7 @@ class Diagnosis:
     evidence: Evidence | None = field(repr=False)
     corrected: Configuration = field(repr=False)
     otherwise: tuple[tuple[Fit, float], ...] = field(default=(), repr=False)
+    held_out: Evidence | None = field(default=None, repr=False)
 
     @property
     def verdict(self) -> Verdict:
@@ -76,6 +80,21 @@ class Diagnosis:
     def document(self) -> dict[str, Any]:
         """The answer as JSON has it."""
         return self.answer.document()
+
+    def overlays(self) -> tuple[Overlay, ...]:
+        """Every observed sensor as measured, as nominal and as corrected, held-out recordings
+        first; empty where the data cannot be diagnosed."""
+        if self.evidence is None:
+            return ()
+        return overlay(self.evidence, self.corrected.plant, self.held_out)
+
+    def pictures(self) -> tuple[Picture, ...]:
+        """For each effect that is named, the numbers of the picture that shows it in the data, in
+        held-out recordings if there are any."""
+        shown = self.held_out or self.evidence
+        if shown is None:
+            return ()
+        return tuple(picture(shown, self.corrected.plant, effect) for effect in self.effects)
 
     def report(self, path: str | Path) -> Path:
         """Writes the report, one HTML file. Raises RigtwinError if it cannot be written."""

@@ -7,6 +7,9 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
+
+import axe_core_python
 
 BROWSER = next(
     (
@@ -16,16 +19,31 @@ BROWSER = next(
     ),
     None,
 )
+AXE = Path(axe_core_python.__file__).parent / "axe.min.js"
 VIEWER = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 <iframe id="page" src="report.html" style="width:{width}px;height:900px;border:0"></iframe>
 <script>
 const page = document.getElementById('page');
-page.onload = () => {{
+const wait = milliseconds => new Promise(done => setTimeout(done, milliseconds));
+page.onload = async () => {{
+  const inside = page.contentWindow;
   const root = page.contentDocument.documentElement;
+  const figures = root.querySelectorAll('figure').length;
+  for (let tries = 0; figures && !inside.Bokeh?.documents[0]?.is_idle && tries < 50; tries++)
+    await wait(100);
+  const axe = page.contentDocument.createElement('script');
+  axe.textContent = await (await fetch('axe.min.js')).text();
+  root.appendChild(axe);
+  const found = await inside.axe.run();
+  const serious = found.violations.filter(v => ['serious', 'critical'].includes(v.impact));
   document.body.dataset.result = JSON.stringify({{
     wide: root.scrollWidth,
     first: page.contentDocument.querySelector('h1').getBoundingClientRect().bottom,
     text: page.contentDocument.querySelector('h1').textContent,
+    serious: serious.map(v => v.id + ' ' + v.nodes.slice(0, 3).map(n => n.target).join(' ')),
+    drawn: [...root.querySelectorAll('figure .canvas')]
+      .filter(e => e.querySelector('[data-root-id]')?.childElementCount
+        || e.querySelector('[data-root-id]')?.shadowRoot).length,
     small: [...page.contentDocument.querySelectorAll('td,li,p,h1,h2')]
       .filter(e => parseFloat(getComputedStyle(e).fontSize) < 12).length
   }});
@@ -33,11 +51,12 @@ page.onload = () => {{
 </script>"""
 
 
-def looked_at(page: str, width: int, folder: Path) -> dict[str, float]:
+def looked_at(page: str, width: int, folder: Path) -> dict[str, Any]:
     """How wide a page is in a window of that width, px, where its heading ends, and how many of its
-    texts are too small to read. Fails if the browser's console has an error, or the page asks for
-    anything from elsewhere."""
+    texts are too small to read; how many figures are drawn, and what axe finds serious. Fails if
+    the browser's console has an error, or the page asks for anything from elsewhere."""
     (folder / "report.html").write_text(page)
+    shutil.copy(AXE, folder / "axe.min.js")
     (folder / "viewer.html").write_text(VIEWER.format(width=width))
     log = folder / "net.json"
     done = subprocess.run(
@@ -54,7 +73,7 @@ def looked_at(page: str, width: int, folder: Path) -> dict[str, float]:
             f"--user-data-dir={folder / 'profile'}",
             f"--log-net-log={log}",
             f"--window-size={max(width, 500)},1000",
-            "--virtual-time-budget=3000",
+            "--virtual-time-budget=10000",
             "--dump-dom",
             (folder / "viewer.html").as_uri(),
         ],
