@@ -148,3 +148,11 @@ def test_sizes_are_written_in_engineers_units():
     factor, unit = find_unit("rad", 1.0)
     assert (round(factor, 3), unit) == (57.296, "°")
     assert say(0.00047, "m") == "0.47 mm"
+
+
+def test_what_the_commands_alone_say_is_not_promised_to_move_a_line():
+    told = Estimate(2.0, 2.0, 2.0, 1.0, "1")
+    finding = Finding(Name("controller", "setting"), {"kp": told}, 1.0, (), 1.0)
+    found = picture(evidence_of(recorded("imposed", GAIN, 3.5)), RIG.plant, finding)
+    assert np.array_equal(curve(found, "before")[1], curve(found, "after")[1])
+    assert "changes no line" in found.caption

@@ -327,6 +327,11 @@ def _by_time(view: View) -> Picture:
         f"The {view.sensor_name} in the second in which the prediction without "
         f"{view.effect.name} is furthest off: with the effect it should follow the measured line."
     )
+    if np.array_equal(view.before, view.after):
+        caption = (
+            f"The {view.sensor_name} in its worst second. {view.effect.name} was read off the "
+            "commands, which the prediction follows as they were recorded: it changes no line here."
+        )
     return _picture(view, "time", ("time", "s"), (view.sensor_name, view.unit), curves, caption)
 
 
