@@ -103,7 +103,7 @@ def _hold(r: Rubbing, b: Bending, x: Array, h: float, mass: float) -> Array:
         if b.frame > 0.0:
             # The end moves the damper through a spring: its speed by bisection, as what resists
             # grows with it.
-            low, high = -FASTEST, FASTEST
+            v_in, low, high = v, -FASTEST, FASTEST
             for _ in range(HALVINGS):
                 v_in = 0.5 * (low + high)
                 f, _z = rub(r, z, v_in, 0.0, time, h)
