@@ -158,7 +158,14 @@ def test_names_from_files_cannot_write_the_page(outcomes):
 
 @pytest.mark.skipif(BROWSER is None, reason="no chromium")
 @pytest.mark.parametrize(
-    ("verdict", "width"), [("explained", 1280), *((verdict, 390) for verdict in VERDICTS)]
+    ("verdict", "width"),
+    [
+        ("explained", 1280),
+        *(
+            pytest.param(verdict, 390, marks=() if verdict == "explained" else pytest.mark.slow)
+            for verdict in VERDICTS
+        ),
+    ],
 )
 def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(
     outcomes, verdict, width, tmp_path: Path

@@ -67,14 +67,25 @@ def run(
         raise RigtwinError(f"seed {seed}: expected 0 or more")
     test = _experiment(on, experiment)
     configuration = with_changes(test.configuration, settings)
-    if path is not None:
+
+    def work(kept: Path) -> None:
         _record(
-            Path(path), on, test, configuration, seed, effect_texts(effects), controller, progress
+            path=kept,
+            on=on,
+            test=test,
+            configuration=configuration,
+            seed=seed,
+            effects=effect_texts(effects),
+            controller=controller,
+            progress=progress,
         )
+
+    if path is not None:
+        work(Path(path))
         return faced(reader.load(Path(path)), on)
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         kept = Path(folder) / f"{test.name}-{seed}.mcap"
-        _record(kept, on, test, configuration, seed, effect_texts(effects), controller, progress)
+        work(kept)
         return replace(faced(reader.load(kept), on), path=Path(kept.name))
 
 
@@ -106,8 +117,8 @@ def _record(
             configuration,
             demands,
             seed,
-            progress,
-            effects,
+            progress=progress,
+            effects=effects,
             machine=on.name,
             controller=tick,
         )

@@ -203,4 +203,12 @@ class Mechanism:
         gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)
         where = tuple(positions.tolist()) if len(gravity) == GRID else (low, high)
         armature = self.armature("joint", name)
-        return Joint(name, turns, float(full[at, at]), where, gravity, rest, armature)
+        return Joint(
+            name=name,
+            turns=turns,
+            inertia=float(full[at, at]),
+            positions=where,
+            gravity=gravity,
+            rest=rest,
+            armature=armature,
+        )

@@ -80,13 +80,13 @@ def describe_attributed(
 
     return [
         Finding(
-            Name(effect.component, effect.kind.name),
-            estimates(effect, values, spread, evidence, thresholds.wider),
-            confidence(effect),
-            _equivalence_class(found.ranking, found.best, effect, thresholds.member),
-            min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
-            effect.kind.title,
-            supports.get(effect),
+            name=Name(effect.component, effect.kind.name),
+            parameters=estimates(effect, values, spread, evidence, thresholds.wider),
+            confidence=confidence(effect),
+            alternatives=_equivalence_class(found.ranking, found.best, effect, thresholds.member),
+            share=min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
+            title=effect.kind.title,
+            support=supports.get(effect),
         )
         for effect, values, spread in zip(fit.effects, fit.values, widths, strict=True)
         if effect in outcome.kept

@@ -174,14 +174,14 @@ class HeldOutJudge:
                 own[:, out] = foreign[:, out]
         widths = self._jackknife(jacobian, here) * steps
         return Judged(
-            fit,
-            self._power(left),
-            _split(widths, fit.effects),
-            self._floor,
-            count_independent(evidence, fit),
-            float(sum(self._size(effect) for effect in fit.effects)),
-            self._are_collinear(fit, jacobian, here, widths) or self._cancels(fit),
-            self.fitter.is_bounded(fit),
+            fit=fit,
+            power=self._power(left),
+            widths=_split(widths, fit.effects),
+            floor=self._floor,
+            pieces=count_independent(evidence, fit),
+            size=float(sum(self._size(effect) for effect in fit.effects)),
+            cancels=self._are_collinear(fit, jacobian, here, widths) or self._cancels(fit),
+            bounded=self.fitter.is_bounded(fit),
         )
 
     def _size(self, effect: Effect) -> float:

@@ -116,18 +116,18 @@ def resist(
         speed = 0.0
         for tick in range(motion.shape[1]):
             place, slider, viscous, force = give_way(
-                guide,
-                dry_friction,
-                spring,
-                rest,
-                share,
-                period,
-                inner,
-                speed,
-                slider,
-                viscous,
-                out[tick],
-                motion[0, tick],
+                guide=guide,
+                dry_friction=dry_friction,
+                spring=spring,
+                rest=rest,
+                share=share,
+                period=period,
+                inner=inner,
+                speed=speed,
+                slider=slider,
+                viscous=viscous,
+                load=out[tick],
+                outer=motion[0, tick],
             )
             speed, inner = (place - inner) / period, place
             out[tick] += force
@@ -170,7 +170,15 @@ def inverse_dynamics(
     for tick in range(motion.shape[1]):
         x, a = motion[0, tick], motion[2, tick]
         out[tick] = inertia.mass * a + gravity(inertia, x)
-    resist(guide, dry_friction, spring, inertia.rest, period, motion, out)
+    resist(
+        guide=guide,
+        dry_friction=dry_friction,
+        spring=spring,
+        rest=inertia.rest,
+        period=period,
+        motion=motion,
+        out=out,
+    )
 
 
 @kernel
@@ -251,18 +259,18 @@ def integrate_pushed(
             if yields:
                 pushed = 0.5 * (earlier + force)
                 place, slider, viscous, held_back = give_way(
-                    guide,
-                    dry_friction,
-                    spring,
-                    inertia.rest,
-                    share,
-                    h,
-                    inner,
-                    speed,
-                    slider,
-                    viscous,
-                    pushed,
-                    x,
+                    guide=guide,
+                    dry_friction=dry_friction,
+                    spring=spring,
+                    rest=inertia.rest,
+                    share=share,
+                    period=h,
+                    inner=inner,
+                    speed=speed,
+                    slider=slider,
+                    viscous=viscous,
+                    load=pushed,
+                    outer=x,
                 )
                 speed, inner = (place - inner) / h, place
                 load = pushed + besides[tick] - gravity(inertia, x) - held_back

@@ -153,7 +153,15 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
                 if size is None:
                     return
                 highest = min(BAND[1], 0.2 / timing.period)
-                wave = multisine(time, BAND[0], highest, BAND[0], SLOPE, 1.0, random)
+                wave = multisine(
+                    time,
+                    lowest=BAND[0],
+                    highest=highest,
+                    spacing=BAND[0],
+                    slope=SLOPE,
+                    rms=1.0,
+                    random=random,
+                )
                 middle, half = size
                 demands[f"{topic}.{field}"] = middle + reach * half * wave
             path = Path(folder) / f"{number}.mcap"
