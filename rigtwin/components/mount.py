@@ -1,7 +1,8 @@
 """What a guide is mounted on: a spring in series with everything the guide does.
 
 Behind a yielding mount the guide moves less than what is measured. All that resists is monotonic in
-the guide's own position, so its equilibrium with the spring is one number, found between bounds.
+the guide's own position, so its equilibrium with the spring is one number, found case by case and
+then between bounds.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from rigtwin.components.effect import Kind, around_nominal
 from rigtwin.components.guide import Friction, Guide, damping, dry_limits, position_force, slide
 
 MOST = 60
-"""Steps of the search for an equilibrium; it needs about five."""
-CLOSE = 1e-12
-"""Share of the distance to the equilibrium at which it is found."""
+"""Steps of the search for an equilibrium; where only dry friction is nonlinear it needs none."""
+CLOSE, ROUNDED = 1e-9, 4e-16
+"""Share of the distance to the equilibrium, and of the place, at which it is found."""
 
 
 @compilable
@@ -97,14 +98,16 @@ def give_way(
     """
     limits = dry_limits(dry_friction, speed, load)
     compliance = guide.mount_compliance
-    force, by, relaxed = resist_at(
-        guide, spring, rest, share, period, inner, slider, viscous, limits, inner
+    position, slope = guess_position(
+        guide, spring, rest, share, period, inner, speed, slider, viscous, limits, outer
     )
-    error = inner + compliance * force - outer
+    force, by, relaxed = resist_at(
+        guide, spring, rest, share, period, inner, slider, viscous, limits, position
+    )
+    error = position + compliance * force - outer
     # What resists grows with the position, so the guide is no further off than the error is large.
-    low, high = min(inner, inner - error), max(inner, inner - error)
-    position, slope = inner, 1.0
-    enough = CLOSE * abs(error)
+    low, high = min(position, position - error), max(position, position - error)
+    enough = CLOSE * abs(outer - inner) + ROUNDED * abs(outer)
     for _ in range(MOST):
         if abs(error) <= enough:
             break
@@ -123,6 +126,47 @@ def give_way(
             slope = max((changed - error) / (following - position), 1.0)
         position, error = following, changed
     return position, slider + by, relaxed, force
+
+
+@compilable
+def guess_position(
+    guide: Guide,
+    spring: float,
+    rest: float,
+    share: float,
+    period: float,
+    inner: float,
+    speed: float,
+    slider: float,
+    viscous: float,
+    limits: tuple[float, float],
+    outer: float,
+) -> tuple[float, float]:
+    """Where the guide is in equilibrium with its mount if nothing but its dry friction is
+    nonlinear: case by case. Arguments as of `give_way`.
+
+    Returns
+    -------
+    Position m, and how fast the mismatch with the mount grows with it.
+    """
+    compliance, half = guide.mount_compliance, 0.5 * guide.backlash
+    along = share * damping(guide, speed) / period
+    rate = along + guide.stiffness
+    # All that resists but dry friction is `least` + rate·position.
+    least = position_force(guide, inner, rest) + (1.0 - share) * viscous - rate * inner
+    slope = 1.0 + compliance * rate
+    up = (outer - compliance * (least + limits[0])) / slope
+    if up - slider >= half + limits[0] / spring:
+        return up, slope
+    down = (outer - compliance * (least - limits[1])) / slope
+    if slider - down >= half + limits[1] / spring:
+        return down, slope
+    free = (outer - compliance * least) / slope
+    if abs(free - slider) <= half:
+        return free, slope
+    edge = slider + (half if free > slider else -half)
+    stuck = slope + compliance * spring
+    return (outer - compliance * (least - spring * edge)) / stuck, stuck
 
 
 KINDS = (

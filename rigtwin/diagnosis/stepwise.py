@@ -37,7 +37,7 @@ GATEWAY = "coulomb"
 """Kind without which others do nothing."""
 SECOND_ORDER = ("two_lags", "resonance")
 """Kinds that a lag and a delay may be taken for."""
-BEHIND = ("compliance", "mount", "backlash")
+BEHIND = ("compliance", "backlash")
 """Kinds that hide their gateway."""
 Start = tuple[tuple[Effect, ...], Values]
 """Effects, and values to start from."""
