@@ -3,11 +3,9 @@ how sure that is."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import product
 
 import numpy as np
 
@@ -16,28 +14,13 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
-from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
+from rigtwin.diagnosis.pairs import fit_pairs
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
+from rigtwin.diagnosis.search import Search
 from rigtwin.diagnosis.selection import Selection, select
 from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
-
-REFITTED = 6
-"""Explanations that are fitted again with the tolerances taken at them."""
-BEAM = 3
-"""First effects to which a second is sought."""
-MANY, FEW = 10, 3
-"""Pairs fitted in full, where one effect leaves much and where it leaves little."""
-LOOKED_AGAIN = 2
-"""Times that the best pair's effects are replaced by what resembles them."""
-RESTARTED, COMBINED, FOLLOWED = 6, 150, 2
-"""Pairs that are fitted from other starts where the best leaves too much, combinations of starts
-that are tried of one at most, and how many of these are followed."""
-NEAR = 1.5
-"""Times the best misfit up to which a pair is not fitted again from another start."""
-SETTLED_PAIRS = 4
-"""Pairs that are fitted again with the tolerances taken at them."""
 
 
 @dataclass(frozen=True)
@@ -91,49 +74,6 @@ def library(evidence: Evidence) -> list[Effect]:
     return [effect for effect in evidence.machine.effects() if effect.searched]
 
 
-@dataclass(frozen=True)
-class _Search:
-    """What a search needs. coarse, fitter: on evidence of half as many steps, and on all;
-    threads: that fit side by side."""
-
-    coarse: Fitter
-    fitter: Fitter
-    effects: Sequence[Effect]
-    least: float
-    thresholds: Thresholds
-    threads: Threads
-
-    def cost(self, fit: Fit) -> float:
-        return penalised_cost(fit, self.thresholds.price)
-
-    def fit_singles(self) -> tuple[Fit, list[Fit]]:
-        """The nominal plant and each effect alone, the best again with the tolerances taken at
-        them."""
-        screened = self.threads.map(self.coarse.screen, self.effects)
-        most = max((each.promise for each in screened), default=0.0)
-        worth = self.thresholds.promising * max(most, self.least)
-        singles = self.threads.map(
-            self.coarse.fit_one, [each for each in screened if each.promise >= worth]
-        )
-        singles += [self.coarse.unfitted(each) for each in screened if each.promise < worth]
-        singles.sort(key=self.cost)
-        nothing = self.fitter.refit_with_tolerances(self.fitter.nothing)
-        if self.coarse.nothing.misfit - singles[0].misfit < worth:
-            return nothing, singles
-        # Those far behind stay there, however the tolerances are taken.
-        near = (
-            singles[0].misfit
-            + self.thresholds.near * max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
-            + 2.0 * self.least
-        )
-        close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        rough = self.fitter.evidence.machine.rough
-        settle = self.fitter.settle if rough else self.fitter.refit_with_tolerances
-        tried = self.threads.map(settle, close) + singles[len(close) :]
-        tried.sort(key=self.cost)
-        return nothing, tried
-
-
 def attribute(
     evidence: Evidence,
     progress: Callable[[int], object] = lambda _: None,
@@ -160,7 +100,7 @@ def attribute(
     coarse = Fitter(searched.halve_steps())
     with Threads(progress) as threads:
         least = detection_limit(evidence, thresholds)
-        search = _Search(coarse, Fitter(searched), effects, least, thresholds, threads)
+        search = Search(coarse, Fitter(searched), effects, least, thresholds, threads)
         nothing, tried = search.fit_singles()
         silent = tuple(
             effect for effect in effects if coarse.largest_response(effect) < thresholds.detected
@@ -169,122 +109,14 @@ def attribute(
             final = search.fitter if searched is evidence else Fitter(evidence)
             return _attribute_rough(search, final, nothing, tried, silent)
         if nothing.misfit - search.cost(tried[0]) > least:
-            tried += _fit_pairs(search, nothing, tried)
+            tried += fit_pairs(search, nothing, tried)
     chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
     tried = drop_needless(tried, least, thresholds)
     return _conclude(nothing, tried, evidence, silent, thresholds, chain)
 
 
-def _fit_pairs(search: _Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]:
-    """Pairs of effects that explain enough of what the best one leaves."""
-    evidence, thresholds, first = search.fitter.evidence, search.thresholds, tried[0]
-    much = _excess(first.misfit, evidence) > thresholds.much * evidence.expected
-    hopes: list[Proposal] = []
-    for leader in tried[: BEAM if much else 1]:
-        # What stands far behind as the first of two is no leader.
-        if leader.misfit - first.misfit <= thresholds.far_behind * max(
-            nothing.misfit - first.misfit, 0.0
-        ):
-            hopes += propose_additions(
-                search.coarse, leader, search.effects, search.least, search.threads
-            )
-    hopes.sort(key=lambda hope: hope.promised)
-    hopeful = _distinct(hopes)[: MANY if much else FEW]
-    pairs = search.threads.map(
-        lambda hope: search.coarse.refine(hope.effects, hope.values, hope.space), hopeful
-    )
-    pairs.sort(key=search.cost)
-    enough = evidence.expected + thresholds.unexplained * evidence.expected
-    for _ in range(LOOKED_AGAIN):
-        pairs = _add(pairs, _replace, search)
-    if pairs and pairs[0].misfit > enough:
-        for step in (_restart, _move_elsewhere, _replace):
-            pairs = _add(pairs, step, search)
-    foremost = _foremost(pairs)
-    settled = search.threads.map(search.fitter.refit_with_tolerances, foremost)
-    others = [pair for pair in pairs if all(pair is not each for each in foremost)]
-    least_more = max(
-        thresholds.second * search.least,
-        thresholds.known.more * _excess(first.misfit, evidence),
-    )
-    return [
-        pair
-        for pair in (*settled, *others)
-        if first.misfit - pair.misfit > least_more
-        and not within_tolerance(pair, evidence, thresholds)
-    ]
-
-
-def _add(
-    pairs: list[Fit], step: Callable[[_Search, Sequence[Fit]], list[Fit]], search: _Search
-) -> list[Fit]:
-    """The pairs with those that a step finds, the best first."""
-    return sorted([*pairs, *step(search, pairs)], key=search.cost) if pairs else pairs
-
-
-def _foremost(pairs: Sequence[Fit]) -> list[Fit]:
-    """The best pairs, and besides the best of other effects, where one pair has several valleys."""
-    distinct: dict[frozenset[Effect], Fit] = {}
-    for pair in pairs:
-        distinct.setdefault(frozenset(pair.effects), pair)
-    best = [*pairs[:SETTLED_PAIRS], *list(distinct.values())[:SETTLED_PAIRS]]
-    return list({id(pair): pair for pair in best}.values())
-
-
-def _near(pairs: Sequence[Fit]) -> set[frozenset[Effect]]:
-    """Effects of the pairs that are not far behind the best; others may lie in a wrong valley."""
-    return {frozenset(pair.effects) for pair in pairs if pair.misfit <= NEAR * pairs[0].misfit}
-
-
-def _replace(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
-    """The best pair with its effects replaced by what resembles them."""
-    known = _near(pairs)
-    fresh = [
-        pair
-        for pair in propose_replacements(search.coarse, pairs[0], search.effects, search.threads)
-        if frozenset(pair[0]) not in known
-    ]
-    return search.threads.map(lambda pair: search.coarse.refine(*pair), fresh)
-
-
-def _restart(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
-    """The foremost pairs again, each from the best of all combinations of their starts: what sticks
-    and slips has more than one best place, and the values of the first alone may lie in another's
-    valley."""
-    coarse = search.coarse
-
-    def restart(pair: Fit) -> list[Fit]:
-        starts = [coarse.starts(effect).values for effect in pair.effects]
-        if math.prod(len(each) for each in starts) > COMBINED:
-            return []
-        scored = sorted(
-            (
-                coarse.space.misfit(
-                    coarse.evidence.residual(with_values(coarse.plant, pair.effects, values))
-                ),
-                values,
-            )
-            for values in product(*starts)
-        )
-        return [coarse.refine(pair.effects, values) for _, values in scored[:FOLLOWED]]
-
-    return [fit for each in search.threads.spread(restart, pairs[:RESTARTED]) for fit in each]
-
-
-def _move_elsewhere(search: _Search, pairs: Sequence[Fit]) -> list[Fit]:
-    """The best pair with each of its effects in turn at every other component that may have it."""
-    best, coarse, known = pairs[0], search.coarse, _near(pairs)
-    moved = []
-    for number, effect in enumerate(best.effects):
-        for other in search.effects:
-            effects = (*best.effects[:number], other, *best.effects[number + 1 :])
-            if other.kind == effect.kind and frozenset(effects) not in known:
-                moved.append(effects)
-    return search.threads.map(lambda effects: coarse.refine(effects, best.values), moved)
-
-
 def _attribute_rough(
-    search: _Search,
+    search: Search,
     final: Fitter,
     nothing: Fit,
     singles: Sequence[Fit],
@@ -324,18 +156,6 @@ def _settle(selection: Selection, final: Fitter) -> Selection:
             return selection.replace_chosen(settled)
         selection = selection.without(selection.chosen)
     return selection
-
-
-def _distinct(hopes: Sequence[Proposal]) -> list[Proposal]:
-    """Each pair of effects once, however it was come by."""
-    found: dict[frozenset[str], Proposal] = {}
-    for hope in hopes:
-        found.setdefault(frozenset(effect.name for effect in hope.effects), hope)
-    return list(found.values())
-
-
-def _excess(misfit: float, evidence: Evidence) -> float:
-    return max(misfit - evidence.expected, 0.0)
 
 
 def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:

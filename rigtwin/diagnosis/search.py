@@ -1,0 +1,59 @@
+"""What a search among effects works with, and every effect fitted alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigtwin.components import Effect
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.ranking import penalised_cost
+from rigtwin.diagnosis.threads import Threads
+from rigtwin.diagnosis.thresholds import Thresholds
+
+REFITTED = 6
+"""Explanations that are fitted again with the tolerances taken at them."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search needs. coarse, fitter: on evidence of half as many steps, and on all;
+    threads: that fit side by side."""
+
+    coarse: Fitter
+    fitter: Fitter
+    effects: Sequence[Effect]
+    least: float
+    thresholds: Thresholds
+    threads: Threads
+
+    def cost(self, fit: Fit) -> float:
+        return penalised_cost(fit, self.thresholds.price)
+
+    def fit_singles(self) -> tuple[Fit, list[Fit]]:
+        """The nominal plant and each effect alone, the best again with the tolerances taken at
+        them."""
+        screened = self.threads.map(self.coarse.screen, self.effects)
+        most = max((each.promise for each in screened), default=0.0)
+        worth = self.thresholds.promising * max(most, self.least)
+        singles = self.threads.map(
+            self.coarse.fit_one, [each for each in screened if each.promise >= worth]
+        )
+        singles += [self.coarse.unfitted(each) for each in screened if each.promise < worth]
+        singles.sort(key=self.cost)
+        nothing = self.fitter.refit_with_tolerances(self.fitter.nothing)
+        if self.coarse.nothing.misfit - singles[0].misfit < worth:
+            return nothing, singles
+        # Those far behind stay there, however the tolerances are taken.
+        near = (
+            singles[0].misfit
+            + self.thresholds.near * max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
+            + 2.0 * self.least
+        )
+        close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
+        rough = self.fitter.evidence.machine.rough
+        settle = self.fitter.settle if rough else self.fitter.refit_with_tolerances
+        tried = self.threads.map(settle, close) + singles[len(close) :]
+        tried.sort(key=self.cost)
+        return nothing, tried
