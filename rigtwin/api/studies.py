@@ -9,7 +9,7 @@ from experiments.thesis.result import Reproduction
 from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
 from experiments.vehicles import find_vehicle
-from referee import check, wild
+from referee import arm, check, wild
 from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import load_posterior
 from rigtwin.errors import RigtwinError
@@ -252,6 +252,40 @@ def blindcheck_wild(
     _check_draw(cases, seed)
     with open_workers(workers, cluster) as open_:
         return wild.check_wild(Path(folder), cases, seed, open_, _counting(progress, cases))
+
+
+def blindcheck_arm(
+    cases: int = 200,
+    *,
+    seed: int = 2026,
+    folder: str | Path = "blindcheck",
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Progress = _nothing,
+) -> arm.ArmResult:
+    """Holds the diagnosis to arms, joints that act on each other, whose defects are withheld.
+
+    Parameters
+    ----------
+    cases
+        How many machines.
+    seed
+        Of the draws.
+    folder
+        Of the answers; what is there already is not diagnosed again.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the machines done and with how many there are.
+
+    Raises
+    ------
+    RigtwinError
+        If the folder cannot be written.
+    """
+    _check_draw(cases, seed)
+    with open_workers(workers, cluster) as open_:
+        return arm.check_arms(Path(folder), cases, seed, open_, _counting(progress, cases))
 
 
 def _check_draw(cases: int, seed: int) -> None:

@@ -22,7 +22,11 @@ the files alone; then the key is opened, checked against its digest, and every a
 With --wild the machines are others than the rig, and their physics have forms that the library
 does not have: friction with a memory or a smooth change of sign, a second mass on a hidden spring,
 a frame that yields, drift, eccentric encoders. What a person would accept as an answer is in the
-referee's table."""
+referee's table.
+
+With --machine arm the machines are planar arms of two and three hinges, and a cart with a
+pendulum, all joints moved as measured: single defects, pairs at different joints, none, and some of
+forms that the library does not have."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,6 +40,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--wild",
         action="store_true",
         help="instead: other machines, whose physics have forms that the library does not have",
+    )
+    parser.add_argument(
+        "--machine",
+        choices=("rig", "arm"),
+        default="rig",
+        help="whose defects are withheld (default rig): arm is joints that act on each other",
     )
     parser.add_argument(
         "--seed", type=int, default=2026, help="of the referee's draws (default 2026)"
@@ -72,8 +82,12 @@ def execute(parsed: argparse.Namespace) -> int:
         raise RigtwinError("--draw: expected with --wild")
     if parsed.wild and (parsed.tune is not None or parsed.baselines):
         raise RigtwinError("--wild: expected without --tune and --baselines")
+    if parsed.machine == "arm" and (parsed.wild or parsed.tune is not None or parsed.baselines):
+        raise RigtwinError("--machine arm: expected without --wild, --tune and --baselines")
     if parsed.wild:
         return _wild(parsed)
+    if parsed.machine == "arm":
+        return _arms(parsed)
     return _diagnoses(parsed) if parsed.tune is None else _tuning(parsed)
 
 
@@ -115,6 +129,24 @@ def _wild(parsed: argparse.Namespace) -> int:
         from referee.reliability import draw_reliability
 
         draw_reliability(reliability(judge_names(result)), parsed.draw)
+    return 0
+
+
+def _arms(parsed: argparse.Namespace) -> int:
+    from referee.arm import arm_document, arm_table
+
+    with counting_bar("machine", "arms") as progress:
+        result = rigtwin.blindcheck_arm(
+            CASES if parsed.cases is None else parsed.cases,
+            seed=parsed.seed,
+            folder=parsed.folder,
+            workers=parsed.workers,
+            cluster=parsed.cluster,
+            progress=progress,
+        )
+    print(arm_table(result))
+    if parsed.json is not None:
+        write_json(parsed.json, arm_document(result))
     return 0
 
 

@@ -2,6 +2,7 @@
 as compilable functions, the effects that it can have, and where a search for each starts."""
 
 from rigtwin.components.actuators import ForceActuator, PositionActuator
+from rigtwin.components.body import Base, Body
 from rigtwin.components.computer import Computer, Mains
 from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.effect import Effect, Kind, Motion, Scales, Starts, Swing
@@ -27,6 +28,8 @@ from rigtwin.components.tyre import Tyre
 __all__ = [
     "KINDS",
     "UNLIMITED",
+    "Base",
+    "Body",
     "Carriage",
     "Computer",
     "Cylinder",

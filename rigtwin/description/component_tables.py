@@ -18,6 +18,8 @@ from rigtwin.description.tolerance import Tolerance
 
 TYPES: dict[str, type] = {
     "mass": components.Mass,
+    "body": components.Body,
+    "base": components.Base,
     "guide": components.Guide,
     "rotor": components.Rotor,
     "force actuator": components.ForceActuator,
@@ -39,6 +41,8 @@ ELEMENTS = ("body", "joint", "tendon", "contact", "actuator", "sensor")
 """Elements of an MJCF that can be components."""
 SENSED = {name: MEASURES[of] for name, of in TYPES.items() if of in MEASURES}
 """Type of sensor → what it measures."""
+WHOLE = ("body", "base")
+"""Types that have no coordinate of their own."""
 MOVING = ("force actuator", "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
@@ -109,7 +113,7 @@ class Components:
         self.values[name] = self._fill(
             name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
         )
-        acts_on = mechanism.acts_on(element, mjcf)
+        acts_on = () if kind in WHOLE else mechanism.acts_on(element, mjcf)
         turns = bool(acts_on) and all(mechanism.turns(each) for each, _ in acts_on)
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
@@ -205,6 +209,8 @@ class Components:
         if kind == "mass" and joint:
             moving = self._mechanism.joint(joint)
             component = component._replace(mass=moving.inertia - moving.armature)
+        elif kind == "body" and element == "body":
+            component = component._replace(**self._mechanism.body(mjcf))
         elif kind == "guide" and (element == "tendon" or joint):
             component = component._replace(**self._mechanism.friction(element, mjcf))
         elif kind == "rotor" and (element == "tendon" or joint):

@@ -177,6 +177,19 @@ class Mechanism:
             "stiffness": float(np.ravel(stiffness)[0]),
         }
 
+    def body(self, name: str) -> dict[str, float]:
+        """What the MJCF says of a body alone: mass, kg, its centre in the body's frame, m, and how
+        far it reaches from there, m."""
+        model, number = self.model, self.number("body", name)
+        mass, centre = float(model.body_mass[number]), model.body_ipos[number]
+        # Half the trace is the second moment of mass about the centre.
+        second = 0.5 * float(np.sum(model.body_inertia[number])) / mass if mass > 0.0 else 0.0
+        return {
+            "mass": mass,
+            **{f"centre_{axis}": float(at) for axis, at in zip("xyz", centre, strict=True)},
+            "reach": max(float(np.sqrt(centre @ centre + second)), 1e-6),
+        }
+
     def joint(self, name: str) -> Joint:
         """What moves with a joint, all others at rest. Raises RigtwinError if it neither slides nor
         turns about one axis."""

@@ -48,6 +48,8 @@ def _changes(machine: Machine, component: Component) -> set[str]:
     if component.name in {mover for replay in machine.replays for mover in replay.moved_by}:
         # A joint that moves otherwise than measured takes other forces of all.
         return {row.name for row in machine.rows if any(effect.searched for effect in effects)}
+    if component.element == "body":
+        return {row.name for row in machine.rows}
     if component.element == "sensor":
         return {component.name}
     joints = {joint for joint, _ in component.acts_on}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rigtwin.description.component_tables import MOVING, SENSED, Components
+from rigtwin.description.component_tables import MOVING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.machine import Joint, ReplayOf, Row, Structure
 from rigtwin.description.mechanism import Mechanism
@@ -223,6 +223,13 @@ class Replays:
                 "[components]",
                 "a tendon couples joints; expected one replay, moved by all their sensors",
             )
+        for name, kind in self._components.types.items():
+            if kind in (("mass",) if together else WHOLE):
+                self._mistakes.note(
+                    f"[components.{name}] type",
+                    f"{kind!r}: where joints {'act' if together else 'do not act'} on each other, "
+                    f"expected {'body' if together else 'mass'!r} for what moves",
+                )
         return Structure.MOVED if together else Structure.JOINTS
 
     def _closes(self, mover: str) -> bool:

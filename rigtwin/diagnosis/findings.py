@@ -183,7 +183,7 @@ def estimates(
     Returns
     -------
     dict
-        Parameter → estimate.
+        Parameter → estimate, of those that the recordings show anything of.
     """
     nominal = effect.nominal(evidence.plant)
     # A delay cannot be known better than when in a tick the samples were taken.
@@ -200,6 +200,8 @@ def estimates(
         for (name, quantity), value, width in zip(
             effect.quantities().items(), values, widths, strict=True
         )
+        # A place along an axis that no motion here shows was never fitted, and is not known.
+        if width > 0.0 or name == effect.kind.parameters[0]
     }
 
 

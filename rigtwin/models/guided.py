@@ -143,6 +143,36 @@ def resist(
 
 
 @kernel
+def resist_at_once(
+    guide: Guide, dry_friction: Friction, rest: float, period: float, motion: Array, out: Array
+) -> None:
+    """The same of a guide without play and springs before its friction, whose speed is known: dry
+    friction reverses in the very tick in which the speed does.
+
+    Parameters
+    ----------
+    guide, dry_friction
+        What resists the motion.
+    rest
+        Where the guide's own spring is slack, m.
+    period
+        s, of a tick.
+    motion
+        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+    out
+        The load, N, shape (ticks,); the whole force is written here.
+    """
+    viscous, share = 0.0, period / (guide.relaxation + period)
+    for tick in range(motion.shape[1]):
+        x, v = motion[0, tick], motion[1, tick]
+        transmitted = out[tick] + position_force(guide, x, rest)
+        forward, backward = dry_limits(dry_friction, v, transmitted)
+        dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
+        viscous += share * (damping(guide, v) * v - viscous)
+        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+
+
+@kernel
 def inverse_dynamics(
     guide: Guide,
     dry_friction: Friction,

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
-from rigtwin.components import Guide, PositionSensor, Rotor, measures
+from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, measures
+from rigtwin.components.body import about_frame, list_parameters
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.guided import resist
+from rigtwin.models.guided import resist, resist_at_once
 from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
 from rigtwin.models.model import Form
 from rigtwin.models.rigid import RigidBodies
@@ -62,10 +63,12 @@ class MovedModel:
         self._row_of = {
             components[row.name].joint: number for number, row in enumerate(replay.rows)
         }
-        at: dict[type, list[Component]] = {Guide: [], Rotor: []}
+        at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
         for component in components.values():
             at.get(type(getattr(machine.plant, component.name)), []).append(component)
         self._bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
+        self._heavy = {component.name: component.mjcf for component in at[Body]}
+        self._base = at[Base][0].name if at[Base] else None
         self._along: dict[str, Array] = {}
         """Component → how far it goes for each joint's unit, shape (joints,)."""
         self._onto: dict[str, Array] = {}
@@ -85,6 +88,7 @@ class MovedModel:
             else {name: self._smooth(self._measured(name)) for name in self._movers}
         )
         self._motions: dict[tuple[object, ...], tuple[Kinematics, Array]] = {}
+        self._columns: dict[tuple[object, ...], Array] = {}
         self._shares: dict[tuple[object, ...], Array] = {}
 
     @property
@@ -133,16 +137,48 @@ class MovedModel:
         return np.stack([position, velocity, acceleration])[:, :, :: self.every]
 
     def _moved(self, plant: Plant) -> tuple[Kinematics, Array]:
-        """How the joints move, and the forces that this takes of the bodies, shape (joints,
-        ticks)."""
-        key = tuple(getattr(plant, name) for name in self._movers)
+        """How the joints move, and the forces that this takes of the bodies as the MJCF has them,
+        shape (joints, ticks); the base may be off level."""
+        key = self._key(plant)
         if key not in self._motions:
             motion = self._move(plant)
-            self._motions = {
-                **dict(list(self._motions.items())[-KEPT:]),
-                key: (motion, self._bodies.forces(motion)),
-            }
+            forces = self._bodies.forces(motion, self._gravity(plant))
+            self._motions = {**dict(list(self._motions.items())[-KEPT:]), key: (motion, forces)}
         return self._motions[key]
+
+    def _key(self, plant: Plant) -> tuple[object, ...]:
+        """What motion and gravity depend on."""
+        names = (*self._movers, self._base) if self._base is not None else self._movers
+        return tuple(getattr(plant, name) for name in names)
+
+    def _gravity(self, plant: Plant) -> Array | None:
+        return None if self._base is None else self._bodies.turn(getattr(plant, self._base))
+
+    def _loaded(self, plant: Plant) -> tuple[Kinematics, Array]:
+        """The same with what is other about the bodies."""
+        motion, forces = self._moved(plant)
+        return motion, forces + self._surplus(plant, motion, self._key(plant))
+
+    def _surplus(
+        self, plant: Plant, motion: Kinematics, key: tuple[object, ...] | None = None
+    ) -> Array | float:
+        """What the forces are more than with the MJCF's bodies: linear in what is other about them.
+        key: of the motion, where what each parameter does may be remembered."""
+        found: Array | float = 0.0
+        for name, mjcf in self._heavy.items():
+            mass, centre, inertia = self._bodies.list_nominal(mjcf)
+            more = list_parameters(getattr(plant, name), mass, inertia)
+            more -= about_frame(mass, centre, inertia)
+            if not more.any():
+                continue
+            columns = self._columns.get((name, key)) if key is not None else None
+            if columns is None:
+                columns = self._bodies.regressor(motion, mjcf, self._gravity(plant))
+            if key is not None:
+                kept = dict(list(self._columns.items())[-KEPT:])
+                self._columns = {**kept, (name, key): columns}
+            found = found + np.tensordot(more, columns, 1)
+        return found
 
     def _share_of(self, name: str, plant: Plant, motion: Kinematics, bodies: Array) -> Array:
         """The force along a component's own coordinate, shape (ticks,)."""
@@ -160,6 +196,9 @@ class MovedModel:
         own = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
         load = along @ bodies / float(along @ along)
         out = load.copy()
+        if guide.compliance == guide.mount_compliance == guide.backlash == 0.0:
+            resist_at_once(guide, friction(guide), 0.0, self._apart, own, out)
+            return out - load
         resist(
             guide=guide,
             dry_friction=friction(guide),
@@ -182,10 +221,11 @@ class MovedModel:
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """The same, remembered."""
-        key = (name, getattr(plant, name), *(getattr(plant, mover) for mover in self._movers))
+        heavy = (getattr(plant, each) for each in self._heavy)
+        key = (name, getattr(plant, name), *self._key(plant), *heavy)
         found = self._shares.get(key)
         if found is None:
-            found = self._share_of(name, plant, *self._moved(plant))
+            found = self._share_of(name, plant, *self._loaded(plant))
             most = KEPT * max(len(self._along), 1)
             self._shares = {**dict(list(self._shares.items())[-most:]), key: found}
         return found
@@ -195,7 +235,7 @@ class MovedModel:
         return bodies[places]
 
     def predict_true(self, plant: Plant) -> Array:
-        found = self._rows_of(self._moved(plant)[1]).copy()
+        found = self._rows_of(self._loaded(plant)[1]).copy()
         for name, onto in self._onto.items():
             force = self._force_of(name, plant)
             for row in np.nonzero(onto)[0]:
@@ -227,7 +267,7 @@ class MovedModel:
 
     def _passage(self, component: str, plant: Plant) -> tuple[Kinematics, Array, Array]:
         """How a component's coordinate moves, shape (3, ticks), its load, and the force there."""
-        motion, bodies = self._moved(plant)
+        motion, bodies = self._loaded(plant)
         along = self._along.get(component)
         if along is None:
             row = [row.name for row in self.rows].index(component)
@@ -284,7 +324,7 @@ class MovedModel:
         if not shifts:
             return None
         motion = self._move(plant, shifts)
-        bodies = self._bodies.forces(motion)
+        bodies = self._bodies.forces(motion, self._gravity(plant)) + self._surplus(plant, motion)
         found = self._rows_of(bodies).copy()
         for name, onto in self._onto.items():
             found += onto[:, None] * self._share_of(name, plant, motion, bodies)

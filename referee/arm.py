@@ -1,0 +1,172 @@
+"""How the diagnosis does on arms whose defects are withheld from it, scored by what a person would
+accept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from referee.arm_cases import MACHINES, ArmCase, ArmTest, draw_arm, record_arm
+from referee.score import Row, names, share_of
+from referee.wild import answer_wild
+from referee.wild_cases import WildData
+from rigtwin.studies.sweep import Store, Workers, run_jobs
+
+FLAGGED = ("unknown", "partly explained")
+"""Verdicts that say that something has no name."""
+
+
+@dataclass(frozen=True)
+class ArmResult:
+    """A check. answers: what the diagnosis said, a JSON document a case."""
+
+    seed: int
+    cases: tuple[ArmCase, ...]
+    answers: tuple[dict[str, Any], ...]
+
+
+def check_arms(
+    folder: Path,
+    count: int,
+    seed: int,
+    workers: Workers,
+    progress: Callable[[int], object] = lambda _: None,
+) -> ArmResult:
+    """The whole check.
+
+    Parameters
+    ----------
+    folder
+        Where answers are kept, so that an interrupted check goes on.
+    count, seed
+        Of cases, and of their draw.
+    workers
+        Who diagnoses: they see recordings and a description, and draw nothing.
+    progress
+        Called with 1 for each answer.
+
+    Returns
+    -------
+    ArmResult
+        Cases and answers.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    cases = tuple(draw_arm(number, seed) for number in range(count))
+
+    def load(test: ArmTest) -> WildData:
+        return WildData(test.columns, test.period, {})
+
+    def jobs() -> Iterator[tuple[str, tuple[str, list[WildData]]]]:
+        for number, case in enumerate(cases):
+            tests = [load(record_arm(case, again)) for again in (0, 1)]
+            yield keys[number], (MACHINES[case.machine], tests)
+
+    keys = [f"{seed}-{number}" for number in range(count)]
+    with Store(folder / f"arm-{seed}.sqlite") as store:
+        run_jobs(store, workers, answer_wild, jobs(), progress)
+        return ArmResult(seed, cases, tuple(store[key] for key in keys))
+
+
+def _accept_all(case: ArmCase) -> frozenset[str]:
+    return frozenset(name for defect in case.defects for name in case.accept(defect))
+
+
+def is_right(case: ArmCase, answer: dict[str, Any]) -> bool:
+    """Whether every defect is named, and nothing else."""
+    said = set(names(answer))
+    return all(case.accept(each) & said for each in case.defects) and not said - _accept_all(case)
+
+
+def is_wrong(case: ArmCase, answer: dict[str, Any]) -> bool:
+    """Whether something is named that a person would not accept."""
+    return bool(set(names(answer)) - _accept_all(case))
+
+
+def _weigh_payloads(result: ArmResult) -> Iterator[float]:
+    """Relative errors of the masses of all payloads that were named."""
+    for case, answer in zip(result.cases, result.answers, strict=True):
+        if case.sort == "single" and case.defects[0][0] == "payload":
+            (mass,) = record_arm(case).magnitudes
+            for effect in answer["effects"]:
+                if effect["kind"] == "payload":
+                    yield abs(effect["parameters"]["payload"]["value"] - mass) / mass
+
+
+def arm_rows(result: ArmResult) -> list[Row]:
+    """Every measure."""
+    pairs = list(zip(result.cases, result.answers, strict=True))
+
+    def of(sort: str) -> list[tuple[ArmCase, dict[str, Any]]]:
+        return [(case, answer) for case, answer in pairs if case.sort == sort]
+
+    errors = list(_weigh_payloads(result))
+    said = f"{100 * np.median(errors):.1f} % / {100 * max(errors):.1f} %" if errors else "no case"
+    seconds = [answer["seconds"] for _, answer in pairs]
+    return [
+        share_of("single effects: joint and kind", [is_right(*p) for p in of("single")], ">= 92 %"),
+        share_of("pairs on different joints: both", [is_right(*p) for p in of("pair")], ">= 80 %"),
+        share_of("false alarms", [a["verdict"] != "no gap" for _, a in of("none")], "<= 2 in 30"),
+        share_of(
+            "of no known form: flagged",
+            [a["verdict"] in FLAGGED for _, a in of("outside")],
+            "none set",
+        ),
+        share_of("a wrong name", [is_wrong(*p) for p in pairs], "<= 5 %"),
+        Row("mass of a payload, error, median / largest", said, "<= 3 %"),
+        Row(
+            "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
+        ),
+    ]
+
+
+def _list_misses(result: ArmResult) -> Iterator[str]:
+    for case, answer in zip(result.cases, result.answers, strict=True):
+        if case.sort == "outside":
+            right = answer["verdict"] in FLAGGED and not is_wrong(case, answer)
+        elif case.sort == "none":
+            right = answer["verdict"] == "no gap"
+        else:
+            right = is_right(case, answer)
+        if not right:
+            there = " + ".join(f"{word} {joint + 1}" for word, joint in case.defects) or "nothing"
+            sizes = ", ".join(f"{each:.3g}" for each in record_arm(case).magnitudes)
+            named = " + ".join(names(answer)) or "nothing named"
+            yield (
+                f"{case.number:03d} {case.machine}, {case.sort}: {there} ({sizes or '-'}) -> "
+                f"{named} [{answer['verdict']}]"
+            )
+
+
+def arm_document(result: ArmResult) -> dict[str, Any]:
+    """The score for other programs, with what was there and what was said of each machine."""
+    return {
+        "seed": result.seed,
+        "cases": len(result.cases),
+        "rows": [asdict(row) for row in arm_rows(result)],
+        "machines": [
+            {
+                "machine": case.machine,
+                "sort": case.sort,
+                "defects": [list(defect) for defect in case.defects],
+                "named": names(answer),
+                "verdict": answer["verdict"],
+                "effects": answer["effects"],
+            }
+            for case, answer in zip(result.cases, result.answers, strict=True)
+        ],
+    }
+
+
+def arm_table(result: ArmResult) -> str:
+    """The score as text."""
+    lines = [f"seed {result.seed}, {len(result.cases)} machines", ""]
+    for row in arm_rows(result):
+        interval = ""
+        if row.low is not None and row.high is not None:
+            interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]"
+        lines.append(f"{row.measure:44s} {row.value:20s} {interval:16s} {row.goal}".rstrip())
+    return "\n".join([*lines, "", "not answered right:", *_list_misses(result)])
