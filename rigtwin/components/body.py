@@ -99,6 +99,25 @@ def list_parameters(body: Body, mass: float, inertia: Array) -> Array:
     return own + about_frame(body.payload, place, np.zeros((3, 3)))
 
 
+def list_surplus(body: Body, mass: float, centre: Array, inertia: Array) -> Array:
+    """What the ten parameters are more than the MJCF's.
+
+    Parameters
+    ----------
+    body
+        With whatever is other about it.
+    mass, centre, inertia
+        What the MJCF says of the body alone: kg, m, shape (3,), and kg m² about its centre of mass
+        along the frame's axes, shape (3, 3).
+
+    Returns
+    -------
+    array
+        In the order of `INERTIAL`, shape (10,).
+    """
+    return list_parameters(body, mass, inertia) - about_frame(mass, centre, inertia)
+
+
 def arrange_pseudo_inertia(parameters: Array) -> Array:
     """The pseudo-inertia matrix of ten parameters, shape (4, 4): positive definite for every body
     that can be made, and for no other (Wensing, Kim and Slotine 2018)."""

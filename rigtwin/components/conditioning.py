@@ -29,6 +29,7 @@ from rigtwin.components.sensors import (
     VelocitySensor,
 )
 from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring
 
 
@@ -123,6 +124,17 @@ def condition(conditioning: Actuator, state: ActuatorState, command: float) -> f
     state.memory[2] = before + min(max(wanted - before, -conditioning.rate), conditioning.rate)
     state.memory[3] += conditioning.share * (state.memory[2] - state.memory[3])
     return state.memory[3]
+
+
+@kernel
+def condition_all(
+    conditioning: Actuator, state: ActuatorState, commands: Array, steps: int, out: Array
+) -> None:
+    """What acts at each step, written to `out`, shape (steps · ticks,). commands: shape
+    (ticks,)."""
+    for tick in range(len(commands)):
+        for step in range(steps):
+            out[tick * steps + step] = condition(conditioning, state, commands[tick])
 
 
 BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)

@@ -125,7 +125,7 @@ class _Reader:
             next_tests=self._next_tests(),
             overlooked=()
             if structure is Structure.QUARTER_CAR
-            else overlooked(mechanism.model, components.found, replays),
+            else overlooked(mechanism, components.found, replays),
         )
 
     def _next_tests(self) -> tuple[str, ...]:

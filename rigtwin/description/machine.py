@@ -44,6 +44,7 @@ class Structure(Enum):
     QUARTER_CAR = "a quarter car between two hydraulic cylinders"
     JOINTS = "joints that do not act on each other"
     MOVED = "joints that act on each other, each moved as measured"
+    COUPLED = "joints that act on each other, some of them free to move"
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,8 @@ class ReplayOf:
     them. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
     position actuator its motion through that actuator, a force actuator pushes it. closed: whether
     the controller commands that actuator, or the recording does; band: Hz up to which its signals
-    are judged, None for all that is measured; rotor: the component that the joint's motor turns."""
+    are judged, None for all that is measured; rotor: the component that the joint's motor turns; free:
+    joints that nothing prescribes, which go as the forces on them have it."""
 
     name: str
     joint: Joint
@@ -107,6 +109,7 @@ class ReplayOf:
     closed: bool
     band: float | None = None
     rotor: str | None = None
+    free: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

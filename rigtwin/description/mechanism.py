@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -27,6 +29,7 @@ SENSORS = {
     mujoco.mjtSensor.mjSENS_JOINTPOS: "position",
     mujoco.mjtSensor.mjSENS_ACTUATORPOS: "position",
     mujoco.mjtSensor.mjSENS_TENDONPOS: "position",
+    mujoco.mjtSensor.mjSENS_TENDONVEL: "velocity",
     mujoco.mjtSensor.mjSENS_JOINTVEL: "velocity",
     mujoco.mjtSensor.mjSENS_ACTUATORVEL: "velocity",
     mujoco.mjtSensor.mjSENS_JOINTACTFRC: "force",
@@ -36,16 +39,33 @@ SENSORS = {
 """Sensor of an MJCF → what it measures."""
 
 
+class Tie(NamedTuple):
+    """An equality between joints: joint = apart + ratio · to; number: of the equality."""
+
+    joint: str
+    to: str
+    ratio: float
+    apart: float
+    number: int
+
+
 MASSLESS = 1e-6
 """kg, and kg m² times as much again, of a link that a URDF gives no mass: MuJoCo wants some."""
 
 
-def compile_model(path: Path) -> mujoco.MjModel:
-    """The model of an MJCF or a URDF. Raises ValueError if it is none."""
-    if path.suffix.lower() != ".urdf":
+def compile_model(
+    path: Path, alter: Callable[[mujoco.MjSpec], None] | None = None
+) -> mujoco.MjModel:
+    """The model of an MJCF or a URDF, altered before it is compiled. Raises ValueError if it is
+    none."""
+    urdf = path.suffix.lower() == ".urdf"
+    if not urdf and alter is None:
         return mujoco.MjModel.from_xml_path(str(path))
     spec = mujoco.MjSpec.from_file(str(path))
-    spec.compiler.boundmass, spec.compiler.boundinertia = MASSLESS, MASSLESS**2
+    if urdf:
+        spec.compiler.boundmass, spec.compiler.boundinertia = MASSLESS, MASSLESS**2
+    if alter is not None:
+        alter(spec)
     return spec.compile()
 
 
@@ -136,10 +156,10 @@ class Mechanism:
     def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:
         """Joints that a force along an element's own coordinate acts on, and how far that goes for
         each unit of theirs: a fixed tendon has several; none where there is no such coordinate."""
-        if element != "tendon":
+        model, number = self.model, self.tendon_of(element, name)
+        if number is None:
             joint = self.joint_of(element, name)
             return ((joint, 1.0),) if joint else ()
-        model, number = self.model, self.number(element, name)
         first = int(model.tendon_adr[number])
         wraps = range(first, first + int(model.tendon_num[number]))
         if any(model.wrap_type[at] != mujoco.mjtWrap.mjWRAP_JOINT for at in wraps):
@@ -147,6 +167,42 @@ class Mechanism:
         return tuple(
             (self.joint_name(int(model.wrap_objid[at])), float(model.wrap_prm[at])) for at in wraps
         )
+
+    def tendon_of(self, element: str, name: str) -> int | None:
+        """The number of the tendon that an element is, pulls or measures; None if it is none."""
+        model, number = self.model, self.number(element, name)
+        if element == "tendon":
+            return number
+        if element == "actuator":
+            pulls = int(model.actuator_trntype[number]) == mujoco.mjtTrn.mjTRN_TENDON
+            return int(model.actuator_trnid[number, 0]) if pulls else None
+        if element == "sensor":
+            kind, what = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
+            if kind == mujoco.mjtObj.mjOBJ_TENDON:
+                return what
+            if kind == mujoco.mjtObj.mjOBJ_ACTUATOR:
+                by = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or ""
+                return self.tendon_of("actuator", by) if by else None
+        return None
+
+    def ties(self) -> tuple[Tie, ...]:
+        """The joints that equalities tie to another, one in proportion to the other."""
+        model, found = self.model, []
+        for number in range(model.neq):
+            polynomial = model.eq_data[number, :5]
+            if (
+                model.eq_type[number] != mujoco.mjtEq.mjEQ_JOINT
+                or not model.eq_active0[number]
+                or model.eq_obj2id[number] < 0
+                or np.any(polynomial[2:])
+            ):
+                continue
+            tied, to = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+            here, there = (float(model.qpos0[model.jnt_qposadr[joint]]) for joint in (tied, to))
+            ratio = float(polynomial[1])
+            apart = here + float(polynomial[0]) - ratio * there
+            found.append(Tie(self.joint_name(tied), self.joint_name(to), ratio, apart, number))
+        return tuple(found)
 
     def turns(self, joint: str) -> bool:
         """Whether a joint is a hinge."""

@@ -8,20 +8,21 @@ import mujoco
 import numpy as np
 
 from rigtwin.description.machine import Component, ReplayOf
+from rigtwin.description.mechanism import Mechanism
 
 ELEMENTS = (("free", mujoco.mjtJoint.mjJNT_FREE), ("ball", mujoco.mjtJoint.mjJNT_BALL))
 """Joints that no replay moves."""
 
 
 def overlooked(
-    model: mujoco.MjModel, components: Mapping[str, Component], replays: Sequence[ReplayOf]
+    mechanism: Mechanism, components: Mapping[str, Component], replays: Sequence[ReplayOf]
 ) -> tuple[str, ...]:
     """What of a model is not taken into account.
 
     Parameters
     ----------
-    model
-        Of the MJCF.
+    mechanism
+        The MJCF.
     components
         Of the description.
     replays
@@ -32,10 +33,13 @@ def overlooked(
     tuple
         A line each.
     """
+    model = mechanism.model
+    free = any(replay.free for replay in replays)
+    ties = mechanism.ties() if free else ()
     return (
-        *_joints(model, components, replays),
+        *_joints(model, components, replays, {tie.joint for tie in ties}),
         *_dissipation(model, components),
-        *_constraints(model),
+        *_constraints(model, {tie.number for tie in ties}),
         *_actuators(model),
     )
 
@@ -45,9 +49,13 @@ def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
 
 
 def _joints(
-    model: mujoco.MjModel, components: Mapping[str, Component], replays: Sequence[ReplayOf]
+    model: mujoco.MjModel,
+    components: Mapping[str, Component],
+    replays: Sequence[ReplayOf],
+    tied: set[str],
 ) -> Iterator[str]:
     moved = {components[name].joint for replay in replays for name in replay.moved_by}
+    moved |= {joint for replay in replays for joint in replay.free}
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         for said, kind in ELEMENTS:
@@ -55,7 +63,7 @@ def _joints(
                 yield f"joint {name}: it is a {said} joint, and stays where it is"
                 break
         else:
-            if name not in moved:
+            if name not in moved | tied:
                 yield f"joint {name}: no replay moves it, so it stays where it is"
             if model.jnt_limited[number]:
                 yield f"joint {name}: the stops at the ends of its range"
@@ -76,11 +84,12 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
             yield f"tendon {name}: it is no component"
 
 
-def _constraints(model: mujoco.MjModel) -> Iterator[str]:
+def _constraints(model: mujoco.MjModel, kept: set[int]) -> Iterator[str]:
+    """kept: equalities that are taken into account."""
     touching = np.count_nonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     if touching > 1 or model.npair:
         yield "contacts between its geoms"
-    for number in range(model.neq):
+    for number in sorted(set(range(model.neq)) - kept):
         yield f"equality {_name(model, mujoco.mjtObj.mjOBJ_EQUALITY, number)}"
     if model.nflex:
         yield "flexible bodies"

@@ -7,6 +7,7 @@ from typing import Any
 
 from rigtwin.description.component_tables import MOVING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
+from rigtwin.description.joined_replays import JoinedReplays
 from rigtwin.description.machine import Joint, ReplayOf, Row, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
@@ -58,7 +59,7 @@ class Replays:
 
     def _replay(self, where: str, table: Mapping[str, Any], number: int) -> ReplayOf | None:
         before = len(self._mistakes)
-        self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band"))
+        self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band", "free"))
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
         known = [
@@ -90,8 +91,11 @@ class Replays:
             return None
         quarter_car = self._components.structure is Structure.QUARTER_CAR
         joint_name = "" if quarter_car else self._components.found[movers[0]].joint
-        if len(movers) > 1 and not quarter_car:
-            return self._moved_together(where, table, number, movers, rows)
+        name = str(table.get("name", f"replay {number}"))
+        if not quarter_car and ("free" in table or len(movers) > 1):
+            joined = JoinedReplays(self._mechanism, self._components, self._mistakes)
+            read = joined.read_coupled if "free" in table else joined.read_moved
+            return read(where, name, table, movers, rows)
         if "band" in table:
             self._mistakes.note(
                 where, "band is for joints that move together; this replay moves one"
@@ -147,7 +151,7 @@ class Replays:
                 "is no component; add one of type guide",
             )
         return ReplayOf(
-            name=str(table.get("name", f"replay {number}")),
+            name=name,
             joint=joint,
             moved_by=tuple(movers),
             rows=tuple(rows),
@@ -157,60 +161,11 @@ class Replays:
             rotor=at["rotor"][0] if at["rotor"] else None,
         )
 
-    def _moved_together(
-        self,
-        where: str,
-        table: Mapping[str, Any],
-        number: int,
-        movers: list[str],
-        rows: list[Row],
-    ) -> ReplayOf | None:
-        """A replay of joints that act on each other: each moved as its position sensor measured."""
-        found, types = self._components.found, self._components.types
-        before = len(self._mistakes)
-        joints = [found[mover].joint for mover in movers]
-        for mover, joint in zip(movers, joints, strict=True):
-            if SENSED.get(types[mover]) != "position" or not joint:
-                self._mistakes.note(
-                    where,
-                    f"moved by {len(movers)} components, {mover} among them, which is a "
-                    f"{types[mover]}{'' if joint else ' of no joint'}; where joints act on each "
-                    "other, expected a position sensor of each",
-                )
-            elif joints.count(joint) > 1:
-                self._mistakes.note(where, f"joint {joint} is moved by two sensors; expected one")
-        for row in rows:
-            if row.kind != "force" or found[row.name].joint not in joints:
-                self._mistakes.note(
-                    where,
-                    f"{row.name} cannot be observed where all joints move as measured; expected "
-                    f"sensors of the force on {', '.join(filter(None, joints))}",
-                )
-        if len(self._mistakes) > before:
-            return None
-        try:
-            first = self._mechanism.joint(joints[0])
-        except RigtwinError as error:
-            self._mistakes.note(where, str(error))
-            return None
-        return ReplayOf(
-            name=str(table.get("name", f"replay {number}")),
-            joint=first,
-            moved_by=tuple(movers),
-            rows=tuple(rows),
-            guide=None,
-            mass=None,
-            closed=False,
-            band=self._mistakes.number(f"{where} band", table["band"], 0.1, 1e4)
-            if "band" in table
-            else None,
-        )
-
     def structure(self, replays: tuple[ReplayOf, ...]) -> Structure:
         """What the components and their replays make up."""
         if self._components.structure is Structure.QUARTER_CAR:
             return Structure.QUARTER_CAR
-        together = [replay for replay in replays if len(replay.moved_by) > 1]
+        together = [replay for replay in replays if replay.free or len(replay.moved_by) > 1]
         if together and len(replays) > 1:
             self._mistakes.note(
                 f"[[replays]] {together[0].name}",
@@ -230,6 +185,8 @@ class Replays:
                     f"{kind!r}: where joints {'act' if together else 'do not act'} on each other, "
                     f"expected {'body' if together else 'mass'!r} for what moves",
                 )
+        if together and together[0].free:
+            return Structure.COUPLED
         return Structure.MOVED if together else Structure.JOINTS
 
     def _closes(self, mover: str) -> bool:
@@ -283,7 +240,11 @@ class Replays:
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
             # Of joints that move together only what is observed is timed: against all of them.
-            alone = () if self.structure(replays) is Structure.MOVED else replay.moved_by[:1]
+            structure = self.structure(replays)
+            alone = () if structure is Structure.MOVED else replay.moved_by[:1]
+            if structure is Structure.COUPLED:
+                types = self._components.types
+                alone = tuple(n for n in replay.moved_by if types[n] in MOVING)
             names = [
                 *alone,
                 *(row.name for row in replay.rows if row.kind != "command"),

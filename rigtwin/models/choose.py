@@ -13,6 +13,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Structure
+from rigtwin.models.coupled import CoupledModel
 from rigtwin.models.joint import JointModel
 from rigtwin.models.model import Form, Model
 from rigtwin.models.moved import MovedModel
@@ -51,6 +52,8 @@ def model_of(
         return QuarterCarModel.of(recording, configuration, steps)
     if machine.structure is Structure.MOVED:
         return MovedModel(machine, machine.replays[0], recording)
+    if machine.structure is Structure.COUPLED:
+        return CoupledModel(machine, machine.replays[0], recording, configuration, steps)
     joints = [
         JointModel(machine, replay, recording, configuration, steps) for replay in machine.replays
     ]

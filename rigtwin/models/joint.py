@@ -203,18 +203,19 @@ class JointModel:
             found = fit_start(
                 self._predict_from_starts(plant),
                 measured,
-                start,
-                self._start_error,
+                np.array(start),
+                np.array(self._start_error),
                 self._held,
             )
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
+            fitted = float(found[0]), float(found[1])
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
         return self._starts[key]
 
-    def _predict_from_starts(self, plant: Plant) -> Callable[[Start], Array]:
+    def _predict_from_starts(self, plant: Plant) -> Callable[[Array], Array]:
         """The position from any start, for as long as a start is remembered."""
         integrate = self._prepare_pushed(plant, getattr(plant, self._mover.name))
         besides = np.zeros(self._remembered)
-        return lambda start: contain(integrate(start, besides)[0])
+        return lambda start: contain(integrate((float(start[0]), float(start[1])), besides)[0])
 
     def _find_held(self) -> float:
         """To what the position is predicted at best where the start's error shows in it; 0 where it
@@ -228,9 +229,9 @@ class JointModel:
         self._start_error = start_error(noise, self._period, len(measured))
         held = max(self._machine.form_of(row) * float(np.std(measured)), noise)
         position, velocity = self._start
-        faster = (position, velocity + self._start_error[1])
+        faster = np.array([position, velocity + self._start_error[1]])
         predict = self._predict_from_starts(self._configuration.plant)
-        change = predict(faster) - predict(self._start)
+        change = predict(faster) - predict(np.array(self._start))
         size = np.abs(change)
         self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
         return held if float(change @ change) > SHOWS * held**2 else 0.0

@@ -16,6 +16,7 @@ from rigtwin.description.control import Channel
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Structure
 from rigtwin.errors import RigtwinError
+from rigtwin.models.coupled_twin import move_freely
 from rigtwin.models.moved_twin import move_together
 from rigtwin.models.mujoco import MujocoModel, Tick
 from rigtwin.numerics.arrays import RUNAWAY, Array
@@ -41,7 +42,7 @@ def demanded_channels(machine: Machine) -> list[Channel]:
     """
     found: list[Channel] = []
     for replay in machine.replays:
-        if machine.structure is Structure.MOVED:
+        if machine.structure in TOGETHER:
             channels = [machine.components[name].channel for name in replay.moved_by]
             found += [channel for channel in channels if channel is not None]
             continue
@@ -108,9 +109,9 @@ def run_machine(
     columns = _check_demands(machine, wanted, demands)
     ticks = len(next(iter(next(iter(columns.values())).values())))
     random = np.random.default_rng([seed, 3])
-    if machine.structure is Structure.MOVED:
+    if machine.structure in TOGETHER:
         _move(machine, actual, columns, ticks, random)
-    for replay in () if machine.structure is Structure.MOVED else machine.replays:
+    for replay in () if machine.structure in TOGETHER else machine.replays:
         _simulate(
             machine=machine,
             replay=replay,
@@ -138,6 +139,8 @@ def run_machine(
     return RunResult(path, ticks, FINISHED, False)
 
 
+TOGETHER = {Structure.MOVED: move_together, Structure.COUPLED: move_freely}
+"""Structure of joints that act on each other → what their sensors read in a test."""
 BLOCK = 250
 """Ticks that are written at a time."""
 FINISHED = "completed"
@@ -249,19 +252,20 @@ def _move(
     ticks: int,
     random: np.random.Generator,
 ) -> None:
-    """Puts what the sensors of joints that move together read into the columns."""
+    """Puts what the sensors of joints that act on each other read into the columns."""
     plant, period = configuration.plant, configuration.timing.period
     channels = {
         name: component.channel
         for name, component in machine.components.items()
         if component.channel is not None
     }
-    motions = {
+    demands = {
         name: columns[channel[0]][channel[1]]
         for name, channel in channels.items()
         if name in machine.replays[0].moved_by
     }
-    for name, reading in move_together(machine, configuration, motions).items():
+    move = TOGETHER[machine.structure]
+    for name, reading in move(machine, configuration, demands).items():
         topic, field = channels[name]
         noisy = reading + _noise(plant, name, ticks, period, random)
         columns.setdefault(topic, {})[field] = _round(plant, name, noisy)

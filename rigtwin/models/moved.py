@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, measures
-from rigtwin.components.body import about_frame, list_parameters
+from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
@@ -35,6 +35,8 @@ STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands, and s for which it does to be at rest."""
 ENDS = 0.3
 """s at both ends of a recording, where smoothing does not know how a motion goes on."""
+DRAWS = 4
+"""Times that the motions' noise is drawn."""
 Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
 
@@ -90,6 +92,7 @@ class MovedModel:
         self._motions: dict[tuple[object, ...], tuple[Kinematics, Array]] = {}
         self._columns: dict[tuple[object, ...], Array] = {}
         self._shares: dict[tuple[object, ...], Array] = {}
+        self._drawn: dict[tuple[object, ...], list[tuple[Kinematics, Array]]] = {}
 
     @property
     def band(self) -> float:
@@ -166,9 +169,7 @@ class MovedModel:
         key: of the motion, where what each parameter does may be remembered."""
         found: Array | float = 0.0
         for name, mjcf in self._heavy.items():
-            mass, centre, inertia = self._bodies.list_nominal(mjcf)
-            more = list_parameters(getattr(plant, name), mass, inertia)
-            more -= about_frame(mass, centre, inertia)
+            more = list_surplus(getattr(plant, name), *self._bodies.list_nominal(mjcf))
             if not more.any():
                 continue
             columns = self._columns.get((name, key)) if key is not None else None
@@ -312,20 +313,38 @@ class MovedModel:
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of the measured motions makes of the forces, by its way through smoothing,
-        differentiation and the dynamics of all joints."""
-        random = np.random.default_rng(SEED)
-        shifts = {}
-        for name in self._movers:
-            signal, error = self._read[name]
-            if error > 0.0:
-                level = white_noise(self._measured(name))
-                again, _ = self._smooth(signal + level * random.standard_normal(len(signal)))
-                shifts[name] = again - signal
-        if not shifts:
-            return None
-        motion = self._move(plant, shifts)
-        bodies = self._bodies.forces(motion, self._gravity(plant)) + self._surplus(plant, motion)
-        found = self._rows_of(bodies).copy()
-        for name, onto in self._onto.items():
-            found += onto[:, None] * self._share_of(name, plant, motion, bodies)
-        return limit_band(found - self.predict_true(plant), self.band, self._apart)
+        differentiation and the dynamics of all joints.
+
+        The mean of several draws, as strong as one: whether dry friction reverses in the right tick
+        is a matter of few reversals.
+        """
+        own, total = self.predict_true(plant), np.zeros(())
+        motions = self._draw_motions(plant)
+        for motion, forces in motions:
+            bodies = forces + self._surplus(plant, motion)
+            found = self._rows_of(bodies).copy()
+            for name, onto in self._onto.items():
+                found += onto[:, None] * self._share_of(name, plant, motion, bodies)
+            total = total + (found - own) / math.sqrt(len(motions))
+        return limit_band(total, self.band, self._apart) if total.shape else None
+
+    def _draw_motions(self, plant: Plant) -> list[tuple[Kinematics, Array]]:
+        """Motions as they may be with other noise, and the forces that they take of the MJCF's
+        bodies; none if there is no noise. The last ones are remembered."""
+        key = self._key(plant)
+        if key not in self._drawn:
+            random, drawn = np.random.default_rng(SEED), []
+            # A rough model's own error is more than a reversal in a tick beside makes.
+            for _ in range(1 if self._machine.rough else DRAWS):
+                shifts = {}
+                for name in self._movers:
+                    signal, error = self._read[name]
+                    if error > 0.0:
+                        level = white_noise(self._measured(name))
+                        noise = level * random.standard_normal(len(signal))
+                        shifts[name] = self._smooth(signal + noise)[0] - signal
+                if shifts:
+                    motion = self._move(plant, shifts)
+                    drawn.append((motion, self._bodies.forces(motion, self._gravity(plant))))
+            self._drawn = {key: drawn}
+        return self._drawn[key]

@@ -72,6 +72,34 @@ def _arrange_unit(unit: Array) -> tuple[float, Array, Array, Array]:
     return 0.0, nothing, np.array([1.0, -1.0, 0.0]), quaternion
 
 
+def strip(model: mujoco.MjModel, guides: Sequence[Component], rotors: Sequence[Component]) -> None:
+    """Takes out of a model what components stand for that are worked out elsewhere: damping and
+    springs of guides, inertia of rotors."""
+    for component in guides:
+        if component.element == "tendon":
+            number = model.tendon(component.mjcf).id
+            model.tendon_damping[number] = model.tendon_stiffness[number] = 0.0
+        else:
+            number = model.joint(component.mjcf).id
+            model.dof_damping[model.jnt_dofadr[number]] = 0.0
+            model.jnt_stiffness[number] = 0.0
+    for component in rotors:
+        if component.element == "tendon":
+            model.tendon_armature[model.tendon(component.mjcf).id] = 0.0
+        else:
+            model.dof_armature[model.joint(component.mjcf).dofadr[0]] = 0.0
+
+
+def list_nominal(model: mujoco.MjModel, name: str) -> tuple[float, Array, Array]:
+    """What a model says of a body alone: its mass, kg, centre, m, shape (3,), and its inertia about
+    that along the frame's axes, kg m², shape (3, 3)."""
+    body = model.body(name)
+    turned = np.empty(9)
+    mujoco.mju_quat2Mat(turned, body.iquat)
+    axes = turned.reshape(3, 3)
+    return float(body.mass[0]), np.array(body.ipos), axes @ np.diag(body.inertia) @ axes.T
+
+
 class RigidBodies:
     """The bodies of an MJCF without what the description's components stand for: friction, springs
     and rotors of joints and tendons. No contacts, stops or equalities."""
@@ -87,32 +115,15 @@ class RigidBodies:
         that are worked out elsewhere."""
         self._model = model = compile_model(path)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        for component in guides:
-            if component.element == "tendon":
-                number = model.tendon(component.mjcf).id
-                model.tendon_damping[number] = model.tendon_stiffness[number] = 0.0
-            else:
-                number = model.joint(component.mjcf).id
-                model.dof_damping[model.jnt_dofadr[number]] = 0.0
-                model.jnt_stiffness[number] = 0.0
-        for component in rotors:
-            if component.element == "tendon":
-                model.tendon_armature[model.tendon(component.mjcf).id] = 0.0
-            else:
-                model.dof_armature[model.joint(component.mjcf).dofadr[0]] = 0.0
+        strip(model, guides, rotors)
         numbers = [model.joint(name).id for name in joints]
         self._gravity = np.array(model.opt.gravity)
         self._places = np.array([model.jnt_qposadr[number] for number in numbers], np.int64)
         self._dofs = np.array([model.jnt_dofadr[number] for number in numbers], np.int64)
 
     def list_nominal(self, name: str) -> tuple[float, Array, Array]:
-        """What the MJCF says of a body alone: its mass, kg, centre, m, shape (3,), and its inertia
-        about that along the frame's axes, kg m², shape (3, 3)."""
-        body = self._model.body(name)
-        turned = np.empty(9)
-        mujoco.mju_quat2Mat(turned, body.iquat)
-        axes = turned.reshape(3, 3)
-        return float(body.mass[0]), np.array(body.ipos), axes @ np.diag(body.inertia) @ axes.T
+        """What the MJCF says of a body alone."""
+        return list_nominal(self._model, name)
 
     def turn(self, base: Base) -> Array:
         """Gravity, m/s², shape (3,), where the base is turned."""

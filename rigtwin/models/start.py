@@ -67,43 +67,40 @@ def _ticks(period: float, count: int) -> int:
 
 
 def fit_start(
-    predict: Callable[[Start], Array], measured: Array, first: Start, error: Start, held: float
-) -> Start:
-    """The start with which a joint goes as measured.
+    predict: Callable[[Array], Array], measured: Array, first: Array, error: Array, held: float
+) -> Array:
+    """The start with which a machine goes as measured.
 
     Parameters
     ----------
     predict
-        The position, shape (ticks,), from a start.
+        What is measured, shape (n,), from a start.
     measured
-        The same as it was, shape (ticks,).
+        The same as it was, shape (n,).
     first
-        The start as it was read.
+        The start as it was read: positions, then velocities, shape (unknowns,).
     error
-        Of that, for position and velocity.
+        Of that, shape (unknowns,).
     held
-        To what the position is predicted at best.
+        To what it is predicted at best.
 
     Returns
     -------
-    tuple
-        Position and velocity; `first` if the prediction runs away.
+    array
+        Positions and velocities, shape (unknowns,); `first` if the prediction runs away.
     """
-    width, beginning = np.array(error), np.array(first)
     here = predict(first)
-    columns = np.stack(
-        [predict((first[0] + a, first[1] + b)) - here for a, b in np.diag(width)], axis=1
-    )
+    columns = np.stack([predict(first + step) - here for step in np.diag(error)], axis=1)
     columns /= held
     # A start is known well enough to begin with that the derivatives there do for all steps.
-    normal = columns.T @ columns + np.eye(2) / LIKELY**2
-    start = beginning
+    normal = columns.T @ columns + np.eye(len(first)) / LIKELY**2
+    start = first
     for step in range(STEPS):
         if step:
-            here = predict((float(start[0]), float(start[1])))
+            here = predict(start)
         gradient = columns.T @ ((measured - here) / held)
-        gradient -= (start - beginning) / width / LIKELY**2
-        start = start + width * np.linalg.solve(normal, gradient)
+        gradient -= (start - first) / error / LIKELY**2
+        start = start + error * np.linalg.solve(normal, gradient)
         if not np.isfinite(start).all():
             return first
-    return float(start[0]), float(start[1])
+    return start

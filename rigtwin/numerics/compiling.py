@@ -63,6 +63,10 @@ forward = types.ExternalFunction(
 """mj_forwardSkip(model, data, stage to skip up to, whether to skip sensors)."""
 inverse = types.ExternalFunction("mj_inverse", types.void(*_STRUCTURES))
 """mj_inverse(model, data): the forces that a motion takes."""
+fwd_position = types.ExternalFunction("mj_fwdPosition", types.void(*_STRUCTURES))
+"""mj_fwdPosition(model, data): all that depends on positions."""
+fwd_velocity = types.ExternalFunction("mj_fwdVelocity", types.void(*_STRUCTURES))
+"""mj_fwdVelocity(model, data): all that depends on velocities, after the former."""
 step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
 """mj_step(model, data): a whole step."""
 integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))

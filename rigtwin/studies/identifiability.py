@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from rigtwin.components import Effect
+from rigtwin.components import Effect, ForceActuator
 from rigtwin.components.effect import Scales, Starts, Swing
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Joint, Machine, Structure
@@ -174,10 +174,16 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
 
 def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
     """(middle, half) of what a channel may demand; None if nothing says it."""
-    if machine.structure is Structure.MOVED:
+    if machine.structure in (Structure.MOVED, Structure.COUPLED):
         mechanism = Mechanism(machine.model)
-        moved = next(c.joint for c in machine.components.values() if c.channel == channel)
-        return _range(mechanism.joint(moved))
+        moved = next(c for c in machine.components.values() if c.channel == channel)
+        joint = mechanism.joint(moved.joint or moved.acts_on[0][0])
+        middle, half = _range(joint)
+        if not isinstance(getattr(machine.plant, moved.name), ForceActuator):
+            return middle, half
+        constant = getattr(machine.plant, moved.name).constant
+        lifts = 0.5 * max(np.abs(joint.gravity))
+        return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
     for replay in machine.replays:
         joint, mover = replay.joint, machine.components[replay.moved_by[0]]
         middle, half = _range(joint)

@@ -1,0 +1,597 @@
+"""Joints that act on each other, some of them predicted: pushed by force actuators, by each other
+and by others that move as measured or as commanded.
+
+What is prescribed moves the machine as a road moves a car; all else goes as its equations of motion
+have it, from where the sensors see it start.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import mujoco
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rigtwin.components import (
+    UNLIMITED,
+    Base,
+    Body,
+    ForceActuator,
+    Guide,
+    PositionActuator,
+    Rotor,
+    measures,
+)
+from rigtwin.components.body import list_surplus, turn_gravity, list_parameters
+from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.effect import Motion
+from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import apply_sensor
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Component, Machine, ReplayOf, Row
+from rigtwin.models.basis import Passage, forms
+from rigtwin.models.coupled_motion import Contacts, Inputs, State, advance
+from rigtwin.models.following import follow_command
+from rigtwin.models.guided import RIGID
+from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
+from rigtwin.models.model import Form
+from rigtwin.models.multibody import Multibody, inertia_at
+from rigtwin.models.start import fit_start, read_start, start_error
+from rigtwin.numerics.arrays import Array, contain
+from rigtwin.recording import Recording
+from rigtwin.signals.noise import smallest_step, smooth, white_noise
+
+FIRMNESS = 1e-3
+"""Weight of where the MJCF has a joint against a sensor that sees where it is."""
+SHOWS = 10.0
+"""χ² from which the error of a start shows."""
+FORGOTTEN = 0.02
+"""Share of its greatest effect below which a start's error does no more."""
+
+
+class CoupledModel:
+    """All joints of one recording."""
+
+    every = 1
+
+    def __init__(
+        self,
+        machine: Machine,
+        replay: ReplayOf,
+        recording: Recording,
+        configuration: Configuration,
+        steps: int,
+    ) -> None:
+        """Raises RigtwinError if a channel is missing."""
+        self._machine, self._replay, self._recording = machine, replay, recording
+        self._configuration, self._steps = configuration, steps
+        self._period, self._ticks = recording.period, recording.ticks
+        self.rows: tuple[Row, ...] = replay.rows
+        components = machine.components
+        plant = configuration.plant
+        self._pushers = [n for n in replay.moved_by if isinstance(getattr(plant, n), ForceActuator)]
+        self._leaders = [n for n in replay.moved_by if n not in self._pushers]
+        joints = [*replay.free, *(components[name].joint for name in self._leaders)]
+        at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
+        for component in components.values():
+            at.get(type(getattr(plant, component.name)), []).append(component)
+        self._bodies = Multibody(machine.model, joints, at[Guide], at[Rotor])
+        self._heavy = {component.name: component.mjcf for component in at[Body]}
+        self._base = at[Base][0].name if at[Base] else None
+        self._along = {
+            name: self._bodies.express(component.acts_on) for name, component in components.items()
+        }
+        self._zero = {
+            name: self._bodies.measure(component.acts_on) for name, component in components.items()
+        }
+        self._guides = [c.name for c in at[Guide] if self._along[c.name].any()]
+        self._rotors = [c.name for c in at[Rotor] if self._along[c.name].any()]
+        self._free = np.arange(len(replay.free))
+        self._held = np.arange(len(replay.free), len(joints))
+        self._read = {
+            name: smooth(self._column(name), self._period)
+            for name in self._leaders
+            if measures(getattr(plant, name)) == "position"
+        }
+        self._seen = [
+            name
+            for name, component in components.items()
+            if measures(getattr(plant, name)) == "position"
+            and component.channel in replay_channels(recording)
+            and self._along[name].any()
+        ]
+        self._loosest = self._find_loosest()
+        self._changed: dict[tuple[object, ...], Multibody] = {}
+        self._last: dict[tuple[object, ...], Array] = {}
+        self._starts: dict[tuple[object, ...], Array] = {}
+        self._remembered = self._ticks
+        self._judged: tuple[list[int], Array, Array] | None = None
+        self._judged = self._find_judged()
+
+    @property
+    def band(self) -> float:
+        """Infinite."""
+        return math.inf
+
+    def halve_steps(self) -> CoupledModel:
+        return self._with_steps(max(1, self._steps // 2))
+
+    def double_steps(self) -> CoupledModel:
+        return self._with_steps(2 * self._steps)
+
+    def _with_steps(self, steps: int) -> CoupledModel:
+        return CoupledModel(
+            self._machine, self._replay, self._recording, self._configuration, steps
+        )
+
+    def thin(self, longest: float) -> CoupledModel:  # noqa: ARG002
+        """The same: it is integrated from tick to tick."""
+        return self
+
+    def _column(self, name: str) -> Array:
+        channel = self._machine.components[name].channel
+        assert channel is not None
+        return self._recording.column(*channel)
+
+    def _find_loosest(self) -> Array:
+        """The inertia that each guide feels where nothing else holds its joints, at the start."""
+        plant = self._configuration.plant
+        free = len(self._free)
+        data = self._bodies.data()
+        bodies = self._bodies.bodies(data, self._turning(plant))
+        inertia = inertia_at(bodies, self._read_start(plant)[0])[:free, :free]
+        found = np.full(len(self._guides), 1.0)
+        for number, name in enumerate(self._guides):
+            along = self._along[name][:free]
+            if along.any():
+                found[number] = 1.0 / max(along @ np.linalg.solve(inertia, along), 1e-300)
+        return np.maximum(found, LIGHTEST)
+
+    def _turning(self, plant: Plant) -> Array:
+        """The rotors' inertia, shape (coordinates, coordinates)."""
+        size = self._bodies.coordinates
+        found = np.zeros((size, size))
+        for name in self._rotors:
+            found += getattr(plant, name).inertia * np.outer(self._along[name], self._along[name])
+        return found
+
+    def _bodies_of(self, plant: Plant) -> Multibody:
+        """With what is other about bodies and base."""
+        key = tuple(getattr(plant, name) for name in (*self._heavy, *self._bases()))
+        if key not in self._changed:
+            changed = {}
+            for name, mjcf in self._heavy.items():
+                body, nominal = getattr(plant, name), self._bodies.list_nominal(mjcf)
+                if list_surplus(body, *nominal).any():
+                    changed[mjcf] = list_parameters(body, nominal[0], nominal[2])
+            base = None if self._base is None else getattr(plant, self._base)
+            found = self._bodies
+            if changed or (base is not None and any(base)):
+                turn = None if base is None else (lambda gravity: turn_gravity(base, gravity))
+                found = self._bodies.change(changed, turn)
+            self._changed = {**dict(list(self._changed.items())[-KEPT:]), key: found}
+        return self._changed[key]
+
+    def _bases(self) -> tuple[str, ...]:
+        return () if self._base is None else (self._base,)
+
+    # What moves it
+
+    def _prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
+        """Positions of what is prescribed at the steps, shape (coordinates, steps + 1). shifts: of
+        measured motions, shape (ticks,)."""
+        count = self._ticks * self._steps + 1
+        found = np.zeros((self._bodies.coordinates, count))
+        time = np.arange(self._ticks + 1) * self._period
+        fine = np.arange(count) * (self._period / self._steps)
+        for place, name in zip(self._held, self._leaders, strict=True):
+            mover = getattr(plant, name)
+            if isinstance(mover, PositionActuator):
+                late, command = plant.computer.delay, self._column(name)
+                position = follow_command(mover, command, late, self._period, self._steps)
+            else:
+                signal = self._read[name][0] + shifts.get(name, 0.0)
+                position = recover_motion(mover, signal, self._period)
+            position = (position - self._zero[name]) / self._along[name][place]
+            position = np.append(position, 2.0 * position[-1] - position[-2])
+            found[place] = (
+                position if self._steps == 1 else CubicSpline(time, position)(fine)
+            )
+        return found
+
+    def _push(self, plant: Plant) -> Array:
+        """Forces of the actuators at the steps, shape (actuators, steps)."""
+        found = np.zeros((len(self._pushers), self._ticks * self._steps))
+        for number, name in enumerate(self._pushers):
+            mover: ForceActuator = getattr(plant, name)
+            command = np.ascontiguousarray(self._column(name))
+            conditioning = actuator(mover, plant.computer, self._period / self._steps)
+            condition_all(
+                conditioning,
+                hold(conditioning, float(command[0])),
+                command,
+                self._steps,
+                found[number],
+            )
+            limit = min(mover.force_limit, UNLIMITED)
+            found[number] = np.clip(mover.constant * found[number], -limit, limit)
+        return found
+
+    def _contacts(self, plant: Plant, forces: Array) -> Contacts:
+        """forces: of the actuators, by which a spring that nobody describes is stiff enough."""
+        guides = [getattr(plant, name) for name in self._guides]
+        h = self._period / self._steps
+        dry = [friction(guide) for guide in guides]
+        springs = np.empty(len(guides))
+        for number, (name, guide) in enumerate(zip(self._guides, guides, strict=True)):
+            rigid = RIGID * self._loosest[number] / h**2
+            if not self._along[name][self._free].any():
+                load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
+                size = max(friction_size(dry[number], load), 1e-300)
+                errors = np.array([self._read[n][1] if n in self._read else 0.0 for n in self._leaders])
+                error = float(np.linalg.norm(self._along[name][self._held] * errors))
+                rigid = 1.0 / max(ELASTIC * error / size, 1e-12 / size)
+            springs[number] = (
+                rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
+            )
+        size = self._bodies.coordinates
+        return Contacts(
+            guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
+            dry=np.array(dry, float).reshape(len(guides), -1),
+            along=np.array([self._along[name] for name in self._guides]).reshape(-1, size),
+            zero=np.array([self._zero[name] for name in self._guides]),
+            springs=springs,
+            rests=np.array(
+                [self._bodies.rest_of(self._machine.components[name]) for name in self._guides]
+            ),
+            inertia=self._loosest,
+            rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
+        )
+
+    # Where it starts
+
+    def _read_start(self, plant: Plant) -> Array:
+        """Positions and velocities as the first samples have them, shape (2, coordinates). A joint
+        that no sensor sees is where the MJCF has it, at rest."""
+        size = self._bodies.coordinates
+        rows = [FIRMNESS * np.eye(size)]
+        values = [np.stack([FIRMNESS * self._bodies.place(), np.zeros(size)], axis=1)]
+        for name in self._seen:
+            sensor = getattr(plant, name)
+            measured = self._read[name][0] if name in self._read else self._column(name)
+            place, speed = read_start(measured, self._period)
+            rows.append(self._along[name][None])
+            position = (place - sensor.offset) / sensor.gain - self._zero[name]
+            values.append(np.array([[position, speed / sensor.gain]]))
+        found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0].T
+        return np.ascontiguousarray(found)
+
+    def _start_of(self, plant: Plant) -> Array:
+        """Positions and velocities, shape (2, coordinates)."""
+        start = self._read_start(plant)
+        if self._judged is None:
+            return start
+        key = self._key(plant)
+        if key not in self._starts:
+            rows, weights, errors = self._judged
+            loose = len(self._free)
+            measured = np.stack(
+                [self._recording.column(*self.rows[n].channel)[: self._remembered] for n in rows]
+            )
+            move = self._prepare(plant, {})
+            besides = self._no_force()
+
+            def sense(begin: Array) -> Array:
+                return self._sense(plant, contain(move(begin, *besides, self._remembered)))[rows]
+
+            # A model that is far off elsewhere too is no reason to start otherwise.
+            left = np.sqrt(np.mean((sense(start) - measured) ** 2, axis=1))
+            weights = 1.0 / np.maximum(1.0 / weights, left)[:, None]
+
+            def predict(first: Array) -> Array:
+                begin = start.copy()
+                begin[:, :loose] = first.reshape(2, loose)
+                return (sense(begin) * weights).ravel()
+
+            found = fit_start(
+                predict, (measured * weights).ravel(), start[:, :loose].ravel(), errors, 1.0
+            )
+            fitted = start.copy()
+            fitted[:, :loose] = found.reshape(2, loose)
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
+        return self._starts[key]
+
+    def _find_judged(self) -> tuple[list[int], Array, Array] | None:
+        """Rows by which a start is fitted, their weights, and the errors of the start as read,
+        shape (2 · free joints,); None where that error does not show, or nobody asks for it."""
+        rows = [n for n, row in enumerate(self.rows) if row.kind == "position"]
+        if not rows or not self._machine.rough:
+            return None
+        weights, noises = [], []
+        for number in rows:
+            row = self.rows[number]
+            measured = self._recording.column(*row.channel)
+            noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
+            noises.append(noise)
+            weights.append(
+                1.0 / max(self._machine.form_of(row) * float(np.std(measured)), noise, 1e-300)
+            )
+        loose = len(self._free)
+        error = start_error(float(np.max(noises)), self._period, self._ticks)
+        errors = np.repeat(error, loose)
+        plant = self._configuration.plant
+        start, move = self._read_start(plant), self._prepare(plant, {})
+        faster = start.copy()
+        faster[1, :loose] += error[1]
+        besides = self._no_force()
+        change = move(faster, *besides, self._ticks) - move(start, *besides, self._ticks)
+        shown = np.stack([self._along[self.rows[n].name] @ change[0] for n in rows])
+        size = np.max(np.abs(contain(shown)) * np.array(weights)[:, None], axis=0)
+        if float(np.sum(size**2)) <= SHOWS:
+            return None
+        self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
+        return rows, np.array(weights), errors
+
+    # How it moves
+
+    def _key(self, plant: Plant) -> tuple[object, ...]:
+        """What the motion depends on."""
+        names = {
+            *self._guides,
+            *self._rotors,
+            *self._heavy,
+            *self._bases(),
+            *self._replay.moved_by,
+            *self._seen,
+            "computer",
+        }
+        return tuple(getattr(plant, name) for name in sorted(names))
+
+    def _no_force(self) -> tuple[Array, Array]:
+        return (
+            np.zeros((self._bodies.coordinates, self._ticks)),
+            np.zeros((len(self._guides), self._ticks)),
+        )
+
+    def _prepare(
+        self, plant: Plant, shifts: Mapping[str, Array]
+    ) -> Callable[[Array, Array, Array, int], Array]:
+        """The motion as a function of the start, of other forces on coordinates and on guides, and
+        of ticks."""
+        multibody, turning = self._bodies_of(plant), self._turning(plant)
+        pushes = self._push(plant)
+        contacts, prescribed = self._contacts(plant, pushes), self._prescribe(plant, shifts)
+        size = multibody.coordinates
+        levers = np.array([self._along[name] for name in self._pushers]).reshape(-1, size)
+
+        def move(start: Array, besides: Array, on: Array, ticks: int) -> Array:
+            data: mujoco.MjData = multibody.data()
+            bodies = multibody.bodies(data, turning)
+            state = begin(contacts, start, prescribed, self._held, self._period / self._steps)
+            out = np.zeros((3, size, ticks))
+            inputs = Inputs(prescribed, pushes, levers, besides, on)
+            advance(
+                bodies=bodies,
+                contacts=contacts,
+                free=self._free,
+                held=self._held,
+                state=state,
+                inputs=inputs,
+                h=self._period / self._steps,
+                steps=self._steps,
+                first=0,
+                last=ticks,
+                out=out,
+            )
+            return out
+
+        return move
+
+    def move(
+        self,
+        plant: Plant,
+        besides: Array | None = None,
+        on: Array | None = None,
+        shifts: Mapping[str, Array] | None = None,
+    ) -> Array:
+        """Positions, velocities and forces of the coordinates, shape (3, coordinates, ticks).
+
+        Parameters
+        ----------
+        plant
+            Its components.
+        besides, on
+            Other forces on coordinates and on guides, N, shape (coordinates, ticks) and (guides,
+            ticks).
+        shifts
+            Of measured motions, m, shape (ticks,) each.
+
+        Returns
+        -------
+        array
+            The force is what moves a joint that is prescribed, and what pushes another.
+        """
+        plain = besides is None and on is None and not shifts
+        key = self._key(plant)
+        if plain and key in self._last:
+            return self._last[key]
+        nothing = self._no_force()
+        out = contain(
+            self._prepare(plant, shifts or {})(
+                self._start_of(plant),
+                nothing[0] if besides is None else besides,
+                nothing[1] if on is None else on,
+                self._ticks,
+            )
+        )
+        if plain:
+            self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
+        return out
+
+    # What is read
+
+    def observe(self, row: Row, moved: Array) -> Array:
+        """What an ideal sensor reads of a motion, as `move` has it, shape (ticks,)."""
+        along = self._along[row.name]
+        if row.kind == "position":
+            return along @ moved[0] + self._zero[row.name]
+        if row.kind == "velocity":
+            return along @ moved[1]
+        return along @ moved[2] / float(along @ along)
+
+    def _true(self, moved: Array) -> Array:
+        return np.stack([self.observe(row, moved) for row in self.rows])
+
+    def _apply_sensors(self, plant: Plant, true: Array) -> Array:
+        return np.stack(
+            [
+                apply_sensor(getattr(plant, row.name), signal, self._period)
+                for row, signal in zip(self.rows, true, strict=True)
+            ]
+        )
+
+    def _sense(self, plant: Plant, moved: Array) -> Array:
+        return self._apply_sensors(plant, self._true(moved))
+
+    def predict_true(self, plant: Plant) -> Array:
+        return self._true(self.move(plant))
+
+    def predict(self, plant: Plant) -> Array:
+        return self._sense(plant, self.move(plant))
+
+    def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
+        besides, on = self._no_force()
+        if entry in self._guides:
+            on[self._guides.index(entry)] = amount
+            return self._sense(plant, self.move(plant, on=on))
+        if entry in self._leaders:
+            return self._sense(plant, self.move(plant, shifts={entry: amount}))
+        if entry in self._along and entry not in {row.name for row in self.rows}:
+            besides += self._along[entry][:, None] * amount
+            return self._sense(plant, self.move(plant, besides=besides))
+        found = self.predict(plant)
+        found[[row.name for row in self.rows].index(entry)] += amount
+        return found
+
+    # What may be wrong
+
+    def components(self) -> tuple[str, ...]:
+        return (
+            *self._guides,
+            *self._rotors,
+            *self._replay.moved_by,
+            *(row.name for row in self.rows),
+        )
+
+    def _passage(self, component: str, plant: Plant) -> tuple[Array, Array, Array]:
+        """Position, speed and force of a component's coordinate, shape (ticks,) each."""
+        moved, along = self.move(plant), self._along[component]
+        if not along.any():
+            along = self._along[self.rows[0].name]
+        position, speed = along @ moved[0], along @ moved[1]
+        if component in self._pushers:
+            # Forces of all actuators together are what pushes its joints, too.
+            pushed = self._push(plant)[self._pushers.index(component), :: self._steps]
+            return position, speed, pushed
+        force = along @ moved[2] / float(along @ along)
+        if not force.any():
+            # It swings freely: what acts on it is what its inertia shows.
+            force = self._felt(along) * np.gradient(speed, self._period)
+        return position, speed, force
+
+    def _felt(self, along: Array) -> float:
+        """The inertia along a coordinate, kg or kg m²."""
+        for number, name in enumerate(self._guides):
+            if np.array_equal(self._along[name], along):
+                return float(self._loosest[number])
+        return float(np.max(self._loosest)) if len(self._loosest) else 1.0
+
+    def forms(self, component: str, plant: Plant) -> list[Form]:
+        position, speed, force = self._passage(component, plant)
+        part, names = getattr(plant, component), [row.name for row in self.rows]
+        signal, role = force, "guide"
+        if component in names:
+            signal, role = self.predict(plant)[names.index(component)], "sensor"
+        elif component in self._pushers:
+            role = "force"
+        elif component in self._leaders:
+            signal, role = position, "position"
+        elif isinstance(part, Rotor):
+            role = "mass"
+        return forms(role, component, Passage(signal, position, speed, force, self._period))
+
+    def disturbance_size(self, entry: str) -> float:
+        plant, names = self._machine.plant, [row.name for row in self.rows]
+        if entry in names:
+            size = float(np.std(self.predict(plant)[names.index(entry)]))
+        else:
+            position, _, force = self._passage(entry, plant)
+            size = float(np.std(position if entry in self._leaders else force))
+        return SMALL * max(size, 1e-9)
+
+    def motion(self, component: str, plant: Plant) -> Motion:
+        known = component if component in self._along else self.rows[0].name
+        return Motion(*self._passage(known, plant))
+
+    def undetermined(self) -> None:
+        """None: joints that go by themselves are judged at rest too."""
+
+    def propagated_noise(self, plant: Plant) -> Array | None:
+        """What the noise of the measured motions makes of what is observed."""
+        random = np.random.default_rng(SEED)
+        shifts = {}
+        for name in self._leaders:
+            if name in self._read and self._read[name][1] > 0.0:
+                level = white_noise(self._column(name))
+                signal = self._read[name][0]
+                noise = level * random.standard_normal(self._ticks)
+                shifts[name] = smooth(signal + noise, self._period)[0] - signal
+        if not shifts:
+            return None
+        return self._true(self.move(plant, shifts=shifts)) - self.predict_true(plant)
+
+
+def replay_channels(recording: Recording) -> set[tuple[str, str]]:
+    """(topic, field) of every column."""
+    return {(topic, name) for topic, names in recording.columns.items() for name in names}
+
+
+def begin(contacts: Contacts, start: Array, prescribed: Array, held: Array, h: float) -> State:
+    """The state in which a machine starts.
+
+    Parameters
+    ----------
+    contacts
+        What resists.
+    start
+        Positions and velocities, shape (2, coordinates).
+    prescribed, held
+        Positions of coordinates at the steps, and which of them are prescribed.
+    h
+        s, of a step.
+
+    Returns
+    -------
+    State
+        With all springs slack.
+    """
+    place, speed = start.copy()
+    place[held] = prescribed[held, 0]
+    speed[held] = (prescribed[held, 1] - prescribed[held, 0]) / h
+    along, guides = contacts.along, contacts.guides
+    rate = along @ speed
+    own = along @ place + contacts.zero
+    viscous, more = (Guide._fields.index(name) for name in ("viscous", "viscous_asymmetry"))
+    damping = guides[:, viscous] + 0.5 * guides[:, more] * np.where(rate > 0.0, 1.0, -1.0)
+    return State(
+        place=place,
+        speed=speed,
+        before=speed.copy(),
+        slider=own.copy(),
+        viscous=damping * rate,
+        inner=own.copy(),
+        within=np.zeros(len(own)),
+    )

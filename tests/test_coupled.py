@@ -1,0 +1,198 @@
+"""Joints that act on each other, some of them free: against equations written by hand, MuJoCo's
+own integrators and closed forms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from rigtwin.components import Guide
+from rigtwin.description.document import load
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.errors import RigtwinError
+from rigtwin.models.choose import model_of
+from rigtwin.models.coupled import CoupledModel
+from tests.helpers.coupled import ARM, ARM_TOML, PERIOD, arm, described, integrate, recording
+
+TIME = np.arange(1000) * PERIOD
+TORQUES = np.stack([3.0 * np.sin(4.0 * TIME), 1.2 * np.sin(7.0 * TIME + 1.0)])
+SLIDES = """<mujoco><option gravity="0 0 0"/><worldbody>
+<body name="one"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<joint name="one" type="slide" axis="1 0 0"/></body>
+<body name="two"><inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/>
+<joint name="two" type="slide" axis="1 0 0" armature="0.5"/></body></worldbody>
+<tendon><fixed name="spring" stiffness="80" damping="1.5">
+<joint joint="two" coef="1"/><joint joint="one" coef="-1"/></fixed></tendon>
+<actuator><motor name="push" joint="two" gear="2"/><motor name="pull" tendon="spring"/></actuator>
+<sensor><jointpos name="x_one" joint="one"/><jointpos name="x_two" joint="two"/>
+<tendonpos name="apart" tendon="spring"/><jointactuatorfrc name="force" joint="one"/></sensor>
+{extra}</mujoco>"""
+SLIDES_TOML = """
+[machine]
+name = "slides"
+model = "slides.xml"
+[components]
+spring = { tendon = "spring" }
+one = { joint = "one" }
+two = { joint = "two" }
+push = { actuator = "push", effects = [] }
+x_one = { sensor = "x_one", effects = [] }
+x_two = { sensor = "x_two", effects = [] }
+apart = { sensor = "apart", effects = [] }
+[[replays]]
+"""
+FREE = 'free = ["one", "two"]\nmoved_by = ["push"]\nobserve = ["x_one", "x_two", "apart"]\n'
+LED = 'free = ["two"]\nmoved_by = ["x_one", "push"]\nobserve = ["x_two"]\n'
+
+
+def slides(folder: Path, replay: str, extra: str = "") -> Machine:
+    return described(folder, "slides", SLIDES.format(extra=extra), SLIDES_TOML + replay)
+
+
+def coupled(machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1) -> CoupledModel:
+    record = recording(machine, columns)
+    model = model_of(machine, record, machine.configuration_of(record), steps)
+    assert isinstance(model, CoupledModel)
+    return model
+
+
+def test_a_double_pendulum_pushed_at_both_joints_goes_as_lagrange_has_it(tmp_path: Path) -> None:
+    machine = arm(tmp_path)
+    assert machine.structure is Structure.COUPLED
+    expected = integrate(TORQUES, (0.3, -0.2), (0.0, 0.0))[0]
+    commands = dict(zip(("drive_1", "drive_2"), TORQUES, strict=True))
+    angles = dict(zip(("angle_1", "angle_2"), expected, strict=True))
+    record = {"/command": commands, "/sensor": angles}
+    errors = []
+    for steps in (1, 2, 4):
+        found = coupled(machine, record, steps).predict(machine.plant)
+        errors.append(float(np.max(np.abs(found - expected))))
+    # Of first order: the speed half a step before the start is taken for that at the start.
+    assert errors[0] < 5e-3 and errors[1] < 0.6 * errors[0] and errors[2] < 0.4 * errors[0]
+
+
+def test_two_masses_and_a_spring_go_as_their_modes_do(tmp_path: Path) -> None:
+    machine = slides(tmp_path, FREE)
+    push = np.zeros(1000)
+    push[100:] = 1.5
+    still = np.zeros(1000)
+    record = {"/command": {"push": push}, "/sensor": {"x_one": still, "x_two": still, "apart": still}}
+
+    def slope(t: float, y: np.ndarray) -> list[float]:
+        pull = 80.0 * (y[1] - y[0]) + 1.5 * (y[3] - y[2])
+        force = 3.0 if t >= 100 * PERIOD else 0.0
+        return [y[2], y[3], pull / 2.0, (force - pull) / 3.5]
+
+    exact = solve_ivp(slope, (0.0, TIME[-1]), np.zeros(4), t_eval=TIME, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    found = coupled(machine, record).move(machine.plant)[0]
+    assert np.max(np.abs(found - exact.y[:2])) < 2e-3 * np.max(np.abs(exact.y[:2]))
+
+
+def test_dry_friction_holds_below_its_limit_and_slows_evenly_above(tmp_path: Path) -> None:
+    machine = slides(tmp_path, FREE)
+    plant = machine.plant._replace(two=Guide(coulomb=4.0), one=Guide(coulomb=6.0))
+    still = np.zeros(1000)
+    sensors = {"x_one": still, "x_two": still, "apart": still}
+    held = coupled(machine, {"/command": {"push": still + 1.9}, "/sensor": sensors}).move(plant)
+    assert np.max(np.abs(held[0])) < 1e-4
+    alone = plant._replace(spring=Guide(), one=Guide())
+    sliding = coupled(machine, {"/command": {"push": still + 3.0}, "/sensor": sensors}).move(alone)
+    assert sliding[0, 1, -1] == pytest.approx(0.5 * (6.0 - 4.0) / 3.5 * TIME[-1] ** 2, rel=5e-3)
+
+
+def test_what_several_rub_on_one_body_adds_up(tmp_path: Path) -> None:
+    """Friction at two coordinates of one body holds what neither alone could."""
+    machine = slides(tmp_path, LED)
+    still = np.zeros(1000)
+    record = {"/command": {"push": still + 2.5}, "/sensor": {"x_one": still, "x_two": still}}
+    both = machine.plant._replace(spring=Guide(coulomb=3.0), two=Guide(coulomb=2.5))
+    one = machine.plant._replace(spring=Guide(coulomb=3.0), two=Guide())
+    model = coupled(machine, record)
+    assert np.max(np.abs(model.move(both)[0, 0])) < 1e-4
+    assert np.max(np.abs(model.move(one)[0, 0])) > 1.0
+
+
+def test_a_joint_that_is_led_takes_the_force_that_mujoco_says(tmp_path: Path) -> None:
+    led = (
+        'free = ["elbow"]\nmoved_by = ["angle_1", "drive_2"]\nobserve = ["angle_2", "torque_1"]\n'
+    )
+    head = ARM_TOML.split("free =")[0].replace(
+        "[[replays]]", 'torque_1 = { sensor = "torque_1", effects = [] }\n[[replays]]'
+    )
+    machine = arm(tmp_path, head + led)
+    lead = 0.6 * np.sin(3.0 * TIME) ** 2
+    still = np.zeros(1000)
+    record = {
+        "/command": {"drive_2": 0.5 * np.sin(5.0 * TIME)},
+        "/sensor": {"angle_1": lead, "angle_2": still, "torque_1": still},
+    }
+    moved = coupled(machine, record).move(machine.plant)
+    free, prescribed = moved[0]
+    model = mujoco.MjModel.from_xml_string(ARM)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    data = mujoco.MjData(model)
+    rates = np.gradient(np.stack([prescribed, free]), PERIOD, axis=1)
+    gains = np.gradient(rates, PERIOD, axis=1)
+    expected = np.empty((2, 1000))
+    for tick in range(1000):
+        data.qpos[:] = prescribed[tick], free[tick]
+        data.qvel[:], data.qacc[:] = rates[:, tick], gains[:, tick]
+        mujoco.mj_inverse(model, data)
+        expected[:, tick] = data.qfrc_inverse
+    inside = slice(20, -20)
+    size = np.max(np.abs(expected[0]))
+    assert np.max(np.abs(expected[0] - moved[2, 1])[inside]) < 0.01 * size
+    # And the free one takes what pushes it.
+    assert np.max(np.abs(expected[1] - record["/command"]["drive_2"])[inside]) < 0.01 * size
+
+
+def test_a_joint_tied_to_another_goes_with_it(tmp_path: Path) -> None:
+    tied = '<equality><joint joint1="two" joint2="one" polycoef="0 2 0 0 0"/></equality>'
+    replay = 'free = ["one"]\nmoved_by = ["push"]\nobserve = ["x_one", "x_two"]\n'
+    machine = slides(tmp_path, replay, tied)
+    still = np.zeros(1000)
+    record = {"/command": {"push": still + 1.0}, "/sensor": {"x_one": still, "x_two": still}}
+    loose = machine.plant._replace(spring=Guide())
+    found = coupled(machine, record).predict(loose)
+    # 2 N at twice the way, against 2 kg and 4 · 3.5 kg.
+    assert found[0, -1] == pytest.approx(0.5 * 4.0 / 16.0 * TIME[-1] ** 2, rel=3e-3)
+    assert np.allclose(found[1], 2.0 * found[0])
+
+
+def test_a_motor_on_a_tendon_pulls_both_ends(tmp_path: Path) -> None:
+    replay = 'free = ["one", "two"]\nmoved_by = ["pull"]\nobserve = ["x_one", "x_two"]\n'
+    toml = SLIDES_TOML.replace(
+        "[[replays]]", 'pull = { actuator = "pull", effects = [] }\n[[replays]]'
+    )
+    machine = described(tmp_path, "slides", SLIDES.format(extra=""), toml + replay)
+    still = np.zeros(1000)
+    record = {"/command": {"pull": still + 1.0}, "/sensor": {"x_one": still, "x_two": still}}
+    found = coupled(machine, record).predict(machine.plant._replace(spring=Guide()))
+    assert found[0, -1] == pytest.approx(-0.25 * TIME[-1] ** 2, rel=3e-3)
+    assert found[1, -1] == pytest.approx(0.5 / 3.5 * TIME[-1] ** 2, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("replay", "said"),
+    [
+        ('free = "one"\nmoved_by = ["push"]\nobserve = ["x_two"]', "expected a list of joints"),
+        ('free = ["ones"]\nmoved_by = ["push"]\nobserve = ["x_two"]', "'ones' is no joint"),
+        ('free = ["one", "one"]\nmoved_by = ["push"]\nobserve = ["x_one"]', "stands there twice"),
+        ('free = ["one"]\nmoved_by = ["x_one"]\nobserve = ["x_two"]', "which is free"),
+        ('free = ["one"]\nmoved_by = ["push"]\nobserve = ["x_two"]', "cannot be observed"),
+        ('free = ["one"]\nmoved_by = ["apart"]\nobserve = ["x_one"]', "is of no single joint"),
+        (
+            'free = ["two"]\nmoved_by = ["push"]\nobserve = ["x_two"]\nband = 3.0',
+            "band is for joints that all move as measured",
+        ),
+    ],
+)
+def test_a_replay_that_cannot_be_is_refused(tmp_path: Path, replay: str, said: str) -> None:
+    (tmp_path / "slides.xml").write_text(SLIDES.format(extra=""))
+    (tmp_path / "slides.toml").write_text(SLIDES_TOML + replay)
+    with pytest.raises(RigtwinError, match=said):
+        load(tmp_path / "slides.toml")
