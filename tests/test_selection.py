@@ -13,7 +13,7 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.held_out_judge import Judged
 from rigtwin.diagnosis.selection import choose, conclude
 from rigtwin.diagnosis.thresholds import SelectionRules
-from rigtwin.models.start import fit_start, read_start
+from rigtwin.models.start import find_slopes, fit_start, read_start
 
 TIME = np.arange(400) * 5e-3
 
@@ -113,7 +113,7 @@ def test_what_runs_to_a_bound_on_all_ticks_is_not_chosen():
     assert kinds(found.without(found.chosen).chosen) == {"viscous"}
 
 
-def swing(start: tuple[float, float]) -> np.ndarray:
+def swing(start: np.ndarray) -> np.ndarray:
     position, velocity = start
     return np.exp(-TIME) * (
         position * np.cos(7.0 * TIME) + (velocity + position) / 7.0 * np.sin(7.0 * TIME)
@@ -123,7 +123,8 @@ def swing(start: tuple[float, float]) -> np.ndarray:
 def test_a_free_swings_start_is_found_beneath_coarse_bits():
     truth = (0.6, 0.3)
     measured = np.round(swing(truth) / 1.5e-3) * 1.5e-3
-    first = read_start(measured, 5e-3)
-    found = fit_start(swing, measured, first, (1.5e-3, 0.1), 1e-3)
-    assert found == pytest.approx(truth, abs=2e-3)
+    first, error = np.array(read_start(measured, 5e-3)), np.array((1.5e-3, 0.1))
+    slopes = find_slopes(swing, first, error)
+    found = fit_start(swing, measured, first, error, 1e-3, slopes)
+    assert found == pytest.approx(np.array(truth), abs=2e-3)
     assert abs(found[1] - truth[1]) < abs(first[1] - truth[1])

@@ -8,7 +8,8 @@ have it, from where the sensors see it start.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -39,17 +40,31 @@ from rigtwin.models.guided import RIGID
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
 from rigtwin.models.model import Form
 from rigtwin.models.multibody import Multibody, inertia_at
-from rigtwin.models.start import fit_start, read_start, start_error
+from rigtwin.models.start import find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smallest_step, smooth, white_noise
 
+SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
+"""Parameters of a guide that alone do nothing."""
 FIRMNESS = 1e-3
 """Weight of where the MJCF has a joint against a sensor that sees where it is."""
 SHOWS = 10.0
 """χ² from which the error of a start shows."""
 FORGOTTEN = 0.02
 """Share of its greatest effect below which a start's error does no more."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """How a start is fitted. rows: to which; held: to what each is predicted at best; errors: of
+    the start as it is read, shape (2 · free joints,); slopes: of the rows by each error, of the
+    nominal machine: near enough for others."""
+
+    rows: tuple[int, ...]
+    held: Array
+    errors: Array
+    slopes: Array
 
 
 class CoupledModel:
@@ -89,7 +104,8 @@ class CoupledModel:
         }
         self._guides = [c.name for c in at[Guide] if self._along[c.name].any()]
         self._rotors = [c.name for c in at[Rotor] if self._along[c.name].any()]
-        self._free = np.arange(len(replay.free))
+        self._loose = len(replay.free)
+        self._free = np.arange(self._loose)
         self._held = np.arange(len(replay.free), len(joints))
         self._read = {
             name: smooth(self._column(name), self._period)
@@ -108,7 +124,7 @@ class CoupledModel:
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Array] = {}
         self._remembered = self._ticks
-        self._judged: tuple[list[int], Array, Array] | None = None
+        self._judged: Judged | None = None
         self._judged = self._find_judged()
 
     @property
@@ -248,6 +264,7 @@ class CoupledModel:
                 [self._bodies.rest_of(self._machine.components[name]) for name in self._guides]
             ),
             inertia=self._loosest,
+            acts=np.array([_acts(guide) for guide in guides], bool),
             rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
         )
 
@@ -276,64 +293,64 @@ class CoupledModel:
             return start
         key = self._key(plant)
         if key not in self._starts:
-            rows, weights, errors = self._judged
-            loose = len(self._free)
-            measured = np.stack(
-                [self._recording.column(*self.rows[n].channel)[: self._remembered] for n in rows]
-            )
-            move = self._prepare(plant, {})
-            besides = self._no_force()
-
-            def sense(begin: Array) -> Array:
-                return self._sense(plant, contain(move(begin, *besides, self._remembered)))[rows]
-
+            judged = self._judged
+            measured = self._measured(judged.rows)
+            sense, first = self._sense_from(plant, start, judged.rows), start[:, : self._loose].ravel()
             # A model that is far off elsewhere too is no reason to start otherwise.
-            left = np.sqrt(np.mean((sense(start) - measured) ** 2, axis=1))
-            weights = 1.0 / np.maximum(1.0 / weights, left)[:, None]
-
-            def predict(first: Array) -> Array:
-                begin = start.copy()
-                begin[:, :loose] = first.reshape(2, loose)
-                return (sense(begin) * weights).ravel()
-
-            found = fit_start(
-                predict, (measured * weights).ravel(), start[:, :loose].ravel(), errors, 1.0
-            )
+            left = np.sqrt(np.mean((sense(first) - measured).reshape(len(judged.rows), -1) ** 2, 1))
+            held = np.repeat(np.maximum(judged.held, left), self._remembered)
+            found = fit_start(sense, measured, first, judged.errors, held, judged.slopes)
             fitted = start.copy()
-            fitted[:, :loose] = found.reshape(2, loose)
+            fitted[:, : self._loose] = found.reshape(2, -1)
             self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
         return self._starts[key]
 
-    def _find_judged(self) -> tuple[list[int], Array, Array] | None:
-        """Rows by which a start is fitted, their weights, and the errors of the start as read,
-        shape (2 · free joints,); None where that error does not show, or nobody asks for it."""
+    def _measured(self, rows: Sequence[int]) -> Array:
+        """What starts are fitted to: rows, one after another."""
+        columns = [self._recording.column(*self.rows[number].channel) for number in rows]
+        return np.concatenate([column[: self._remembered] for column in columns])
+
+    def _sense_from(
+        self, plant: Plant, start: Array, rows: Sequence[int]
+    ) -> Callable[[Array], Array]:
+        """The same rows from any start of what is free, shape (2 · free joints,)."""
+        move, besides = self._prepare(plant, {}), self._no_force()
+
+        def sense(first: Array) -> Array:
+            begin = start.copy()
+            begin[:, : self._loose] = first.reshape(2, -1)
+            moved = contain(move(begin, *besides, self._remembered))
+            return self._sense(plant, moved)[list(rows)].ravel()
+
+        return sense
+
+    def _find_judged(self) -> Judged | None:
+        """How a start is fitted; None where the error of one as it is read does not show, or nobody
+        asks for it."""
         rows = [n for n, row in enumerate(self.rows) if row.kind == "position"]
         if not rows or not self._machine.rough:
             return None
-        weights, noises = [], []
+        held, noises = [], []
         for number in rows:
             row = self.rows[number]
             measured = self._recording.column(*row.channel)
             noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
             noises.append(noise)
-            weights.append(
-                1.0 / max(self._machine.form_of(row) * float(np.std(measured)), noise, 1e-300)
-            )
-        loose = len(self._free)
+            held.append(max(self._machine.form_of(row) * float(np.std(measured)), noise, 1e-300))
         error = start_error(float(np.max(noises)), self._period, self._ticks)
-        errors = np.repeat(error, loose)
+        errors = np.repeat(error, self._loose)
         plant = self._configuration.plant
-        start, move = self._read_start(plant), self._prepare(plant, {})
-        faster = start.copy()
-        faster[1, :loose] += error[1]
-        besides = self._no_force()
-        change = move(faster, *besides, self._ticks) - move(start, *besides, self._ticks)
-        shown = np.stack([self._along[self.rows[n].name] @ change[0] for n in rows])
-        size = np.max(np.abs(contain(shown)) * np.array(weights)[:, None], axis=0)
+        start = self._read_start(plant)
+        sense = self._sense_from(plant, start, rows)
+        slopes = find_slopes(sense, start[:, : self._loose].ravel(), errors)
+        by_row = slopes.reshape(len(rows), self._ticks, -1)
+        size = np.max(np.abs(by_row) / np.array(held)[:, None, None], axis=(0, 2))
         if float(np.sum(size**2)) <= SHOWS:
             return None
-        self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
-        return rows, np.array(weights), errors
+        remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
+        self._remembered = remembered
+        slopes = by_row[:, :remembered].reshape(-1, slopes.shape[1])
+        return Judged(tuple(rows), np.array(held), errors, slopes)
 
     # How it moves
 
@@ -557,6 +574,11 @@ class CoupledModel:
 def replay_channels(recording: Recording) -> set[tuple[str, str]]:
     """(topic, field) of every column."""
     return {(topic, name) for topic, names in recording.columns.items() for name in names}
+
+
+def _acts(guide: Guide) -> bool:
+    """Whether a guide does anything."""
+    return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
 def begin(contacts: Contacts, start: Array, prescribed: Array, held: Array, h: float) -> State:

@@ -35,7 +35,8 @@ class Contacts(NamedTuple):
     """Whatever resists along coordinates of its own, a row each: guides, dry: their values, shape
     (guides, ...); along: how far each goes for a unit of the machine's coordinates, shape (guides,
     coordinates), from `zero`; springs: in series with dry friction, N/m; rests: where the guide's
-    own spring is slack; inertia: that it feels, kg; rubs: whether there is dry friction."""
+    own spring is slack; inertia: that it feels, kg; acts: whether there is anything of it; rubs:
+    whether there is dry friction."""
 
     guides: Array
     dry: Array
@@ -44,6 +45,7 @@ class Contacts(NamedTuple):
     springs: Array
     rests: Array
     inertia: Array
+    acts: np.ndarray
     rubs: np.ndarray
 
 
@@ -209,6 +211,10 @@ def advance(
                 ) / h
             # What every guide does whatever the coming velocity is.
             for g in range(guides):
+                own[g] = inputs.on[g, tick]
+                damped[g] = implicit[g] = 0.0
+                if not contacts.acts[g]:
+                    continue
                 guide = Guide(*to_fixed_tuple(contacts.guides[g], GUIDE))
                 changing = contacts.dry[g, 0] > 0.0
                 friction = Friction(changing, *to_fixed_tuple(contacts.dry[g, 1:], NUMBERS))
@@ -222,7 +228,6 @@ def advance(
                 load /= among
                 share = h / (guide.relaxation + h)
                 mounted[g] = guide.mount_compliance * contacts.inertia[g] > SHORTEST * h * h
-                own[g] = inputs.on[g, tick]
                 if mounted[g]:
                     inner, slider, viscous, force = give_way(
                         guide=guide,
@@ -241,7 +246,6 @@ def advance(
                     state.within[g] = (inner - state.inner[g]) / h
                     state.inner[g], state.slider[g], state.viscous[g] = inner, slider, viscous
                     own[g] -= force
-                    damped[g] = implicit[g] = 0.0
                     continue
                 damped[g] = share * damping(guide, rate[g]) + guide.drag * abs(rate[g])
                 mass = contacts.inertia[g] / h
@@ -322,7 +326,7 @@ def advance(
             for a in range(loose):
                 ahead_speed[free[a]] = right[a]
             for g in range(guides):
-                if mounted[g]:
+                if mounted[g] or not contacts.acts[g]:
                     continue
                 guide = Guide(*to_fixed_tuple(contacts.guides[g], GUIDE))
                 ahead = 0.0

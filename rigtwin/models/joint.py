@@ -29,7 +29,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.model import Form
-from rigtwin.models.start import Start, fit_start, read_start, start_error
+from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smallest_step, smooth, white_noise
@@ -200,13 +200,10 @@ class JointModel:
         if key not in self._starts:
             measured = self._recording.column(*self._start_channel)[: self._remembered]
             measured = (measured - sensor.offset) / sensor.gain
-            found = fit_start(
-                self._predict_from_starts(plant),
-                measured,
-                np.array(start),
-                np.array(self._start_error),
-                self._held,
-            )
+            predict, first = self._predict_from_starts(plant), np.array(start)
+            error = np.array(self._start_error)
+            slopes = find_slopes(predict, first, error)
+            found = fit_start(predict, measured, first, error, self._held, slopes)
             fitted = float(found[0]), float(found[1])
             self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
         return self._starts[key]

@@ -66,8 +66,32 @@ def _ticks(period: float, count: int) -> int:
     return min(max(FEWEST, round(BEGINNING / period)), count)
 
 
+def find_slopes(predict: Callable[[Array], Array], first: Array, error: Array) -> Array:
+    """How a prediction changes with each unknown of a start by its error.
+
+    Parameters
+    ----------
+    predict
+        What is measured, shape (n,), from a start.
+    first, error
+        The start as it was read, and its error, shape (unknowns,).
+
+    Returns
+    -------
+    array
+        Shape (n, unknowns).
+    """
+    here = predict(first)
+    return np.stack([predict(first + step) - here for step in np.diag(error)], axis=1)
+
+
 def fit_start(
-    predict: Callable[[Array], Array], measured: Array, first: Array, error: Array, held: float
+    predict: Callable[[Array], Array],
+    measured: Array,
+    first: Array,
+    error: Array,
+    held: float | Array,
+    slopes: Array,
 ) -> Array:
     """The start with which a machine goes as measured.
 
@@ -82,23 +106,21 @@ def fit_start(
     error
         Of that, shape (unknowns,).
     held
-        To what it is predicted at best.
+        To what it is predicted at best; a number, or shape (n,).
+    slopes
+        As `find_slopes` has them.
 
     Returns
     -------
     array
         Positions and velocities, shape (unknowns,); `first` if the prediction runs away.
     """
-    here = predict(first)
-    columns = np.stack([predict(first + step) - here for step in np.diag(error)], axis=1)
-    columns /= held
+    columns = (slopes.T / held).T
     # A start is known well enough to begin with that the derivatives there do for all steps.
     normal = columns.T @ columns + np.eye(len(first)) / LIKELY**2
     start = first
-    for step in range(STEPS):
-        if step:
-            here = predict(start)
-        gradient = columns.T @ ((measured - here) / held)
+    for _ in range(STEPS):
+        gradient = columns.T @ ((measured - predict(start)) / held)
         gradient -= (start - first) / error / LIKELY**2
         start = start + error * np.linalg.solve(normal, gradient)
         if not np.isfinite(start).all():
