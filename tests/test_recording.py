@@ -372,6 +372,16 @@ def test_times_that_make_no_sense_are_refused(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_time_that_runs_backwards_is_refused(tmp_path):
+    path, rows = tmp_path / "b.mcap", ['{"load_cell": 1.0}'] * 300
+    other_recording(path, rows, times=[tick * 1_000_000 for tick in range(300, 0, -1)])
+    with pytest.raises(RigtwinError, match=r"time on /sensor runs backwards, from 0.300 s"):
+        load(path)
+    ticks = [1, 0, *range(2, 300)]
+    other_recording(path, rows, times=[tick * 1_000_000 for tick in ticks])
+    assert "1 messages on /sensor come after later ones" in load(path).notes[0]
+
+
 def test_a_full_disk_is_one_line(tmp_path):
     full = tmp_path / "full.mcap"
     full.symlink_to("/dev/full")

@@ -216,7 +216,9 @@ def load(path: Path) -> Recording:
                 "expected ns since the start"
             )
         values = _decode(path, channel, schemas.get(channel.schema_id), data)
-        tables[channel.topic] = (np.array(times, np.int64), values)
+        stamps = np.array(times, np.int64)
+        _look_at_order(path, channel.topic, stamps, notes)
+        tables[channel.topic] = (stamps, values)
     if not tables:
         said = (
             f"; it ended: {metadata[END_RECORD].get('reason', '')}"
@@ -415,6 +417,18 @@ def _protobuf(
         return {name: getattr(message, name) for name in names}
 
     return names, [item.number for item in found.fields] if doubles else [], decode
+
+
+def _look_at_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
+    """Stamps as the messages stand in the file. Raises RigtwinError if they run backwards."""
+    falls = int(np.sum(np.diff(stamps) < 0))
+    if 2 * falls > len(stamps) - 1:
+        raise RigtwinError(
+            f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
+            f"{stamps[-1] * 1e-9:.3f} s; expected rising times"
+        )
+    if falls:
+        notes.append(f"{falls} messages on {topic} come after later ones; sorted by time")
 
 
 def _align(
