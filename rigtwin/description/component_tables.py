@@ -217,7 +217,7 @@ class Components:
             component = component._replace(inertia=self._mechanism.armature(element, mjcf))
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
-            if constant <= 0.0:
+            if not constant > 0.0:
                 self.mistakes.note(
                     where,
                     f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
@@ -236,6 +236,14 @@ class Components:
                 self.mistakes.note(where, f"unknown key {key!r}; {near(key, known)}")
                 continue
             component = self._value(name, where, component, key, given, meanings[key])
+        for key, meaning in meanings.items():
+            value = getattr(component, key)
+            if key not in table and not meaning.low <= value <= meaning.high:
+                self.mistakes.note(
+                    where,
+                    f"{key} of {element} {mjcf!r} in the MJCF is {value:g}: expected a number "
+                    f"from {meaning.low:g} to {meaning.high:g}",
+                )
         return component
 
     def _value(
