@@ -73,7 +73,8 @@ def execute(parsed: argparse.Namespace) -> int:
     Returns
     -------
     int
-        4 unless every session was stopped as it must be, else 0.
+        130 if it was interrupted, which says nothing of the rig and writes no file; 4 unless every
+        session was stopped as it must be; else 0.
     """
     from rigtwin.hardware.faults.kinds import KINDS
 
@@ -103,6 +104,8 @@ def execute(parsed: argparse.Namespace) -> int:
     for one in found.undone:
         print(f"not run: {one}")
     print(said)
+    if found.interrupted:
+        return 130
     if parsed.out is not None:
         _write(parsed.out, said, rows, list(found.failed))
     if parsed.json is not None:
