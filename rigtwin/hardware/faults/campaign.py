@@ -253,7 +253,11 @@ def try_fault(
 
         fails = fault.kind.place in ("controller", "loop")
         updating = _make_failing_update(fault, virtual) if fails else healthy
-        record_at_leisure(card, test, path, stop, show_full_disk, updating)
+        try:
+            record_at_leisure(card, test, path, stop, show_full_disk, updating)
+        except RigtwinError:
+            if not interrupted:
+                raise
     stop_file.unlink(missing_ok=True)
     if interrupted:
         raise KeyboardInterrupt(interrupted[0])
