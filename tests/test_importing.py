@@ -463,3 +463,19 @@ def test_a_column_may_be_named_as_the_first_line_does_with_its_unit(tmp_path):
     convert([tmp_path / "log.csv"], tmp_path / "map.toml", out)
     found = load(out)
     assert found.column("/sensor", "force")[-1] == pytest.approx(0.049 * 4448.2216, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("déplacement", "force"), "letters without accents"),
+        (("displacement", "ﬀorce"), "letters without accents"),
+        (("a_b", "aB"), "cannot have both a_b and aB"),
+    ],
+)
+def test_a_channel_that_no_recording_can_hold_is_refused(tmp_path, names, said):
+    first, second = names
+    wrong = MAP.replace("displacement", first).replace("sensor.force", f"sensor.{second}")
+    with pytest.raises(RigtwinError, match=said):
+        imported(tmp_path, text(), wrong)
+    assert not (tmp_path / "out.mcap").exists()

@@ -401,3 +401,10 @@ def test_a_recording_has_one_owner(tmp_path):
         writer.finish("completed")
     assert b"third" in path.read_bytes()
     assert b"first" not in path.read_bytes()
+
+
+def test_names_that_cannot_be_read_are_not_written(tmp_path):
+    for names in (("é",), ("1a",), ("a_b", "aB"), ("a", "a")):
+        with pytest.raises(RigtwinError, match="/sensor"):
+            Writer(tmp_path / "n.mcap", "x", 1e-3, {}, fields={"/sensor": names})
+    assert not (tmp_path / "n.mcap").exists()

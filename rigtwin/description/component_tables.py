@@ -15,6 +15,7 @@ from rigtwin.description.machine import Component, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.tolerance import Tolerance
+from rigtwin.recording.schema import NAME as FIELD_NAME
 
 TYPES: dict[str, type] = {
     "mass": components.Mass,
@@ -119,6 +120,11 @@ class Components:
         for key in ("channel", "command", "unit"):
             if key in table and not isinstance(table[key], str):
                 self.mistakes.note(where, f"{key} = {table[key]}: expected a text, in quotes")
+            elif key != "unit" and not FIELD_NAME.fullmatch(str(table.get(key, name))):
+                self.mistakes.note(
+                    where,
+                    f"{key} = {table[key]!r}: expected letters without accents, digits and _",
+                )
         channel: tuple[str, str] | None = None
         if kind in SENSED:
             unit = UNITS[SENSED[kind]][turns]

@@ -51,6 +51,7 @@ from rigtwin.recording.schema import (
     RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
+    check_names,
     descriptor,
     tags,
     type_name,
@@ -112,6 +113,8 @@ class Writer:
         topic, by default those of the channel table. Raises RigtwinError.
         """
         self._fields = dict(fields or {})
+        for topic, names in self._fields.items():
+            check_names(topic, names)
         try:
             self._file: BinaryIO = open_alone(path)
         except OSError as error:
