@@ -408,3 +408,47 @@ def test_names_that_cannot_be_read_are_not_written(tmp_path):
         with pytest.raises(RigtwinError, match="/sensor"):
             Writer(tmp_path / "n.mcap", "x", 1e-3, {}, fields={"/sensor": names})
     assert not (tmp_path / "n.mcap").exists()
+
+
+def chunks_of(data: bytes) -> list[int]:
+    """Where the chunks begin."""
+    found, at = [], data.find(b"\x04\x00\x00\x00zstd")
+    while at >= 0:
+        found += [at - 37] if data[at - 37] == 6 else []
+        at = data.find(b"\x04\x00\x00\x00zstd", at + 1)
+    return found
+
+
+@pytest.mark.parametrize("place", [1, 5, 29, 40, 60], ids=str)
+def test_a_flipped_bit_costs_one_chunk(tmp_path, place):
+    """In its length, its sizes, its compression's name, its data; in a finished file or not."""
+    data = written(tmp_path / "r.mcap", ticks=5000)
+    whole = (tmp_path / "r.mcap").read_bytes()
+    third = chunks_of(whole)[2]
+    for end in (len(whole), chunks_of(whole)[-1]):
+        damaged = bytearray(whole[:end])
+        damaged[third + place] ^= 0x10
+        (tmp_path / "d.mcap").write_bytes(damaged)
+        recording = load(tmp_path / "d.mcap")
+        ticks = np.round(recording.time * 1e3).astype(int)
+        expected = 5000 if end == len(whole) else 4750
+        assert sorted(set(range(expected)) - set(ticks)) in ([*range(500, 750)], [])
+        if len(ticks) < expected:
+            assert recording.notes[0].startswith("damaged")
+            assert "1 gaps in time, the first of 0.251 s at 0.499 s" in recording.notes
+        assert np.array_equal(recording.column("/sensor", "load_cell"), data["sensor"][ticks, 3])
+
+
+def test_settings_that_are_other_than_written_are_not_believed(tmp_path):
+    written(tmp_path / "r.mcap")
+    before = load(tmp_path / "r.mcap")
+    whole = (tmp_path / "r.mcap").read_bytes()
+    name, value = "kp", CONTROLLER["kp"]
+    told = json.dumps({name: value}).strip("{}").encode()
+    assert whole.count(told) == 1
+    (tmp_path / "d.mcap").write_bytes(whole.replace(told, told[:-1] + b"7"))
+    recording = load(tmp_path / "d.mcap")
+    assert before.controller == CONTROLLER
+    assert recording.controller == {}
+    assert "wrong checksum" in recording.notes[0]
+    assert recording.ticks == before.ticks

@@ -45,6 +45,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.owner import open_alone
+from rigtwin.recording.records import seal
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -161,7 +162,7 @@ class Writer:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record now."""
-        record = _encode(Metadata(name=name, metadata=dict(values)))
+        record = _encode(Metadata(name=name, metadata=seal(values)))
         if self._full:
             self._put_into_room(record)
             return
