@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
+from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.records import Lost, read_records, unseal
@@ -228,17 +229,17 @@ def load(path: Path) -> Recording:
     _look_at_times(path, time, period, notes)
     return Recording(
         path=path,
-        machine=about.get("machine", DEFAULT_MACHINE),
-        experiment=about.get("experiment", ""),
+        machine=printable(about.get("machine", DEFAULT_MACHINE)),
+        experiment=printable(about.get("experiment", "")),
         period=period,
         time=time,
         columns=columns,
         controller=controller,
-        twin=metadata.get(TWIN_RECORD, {}),
-        end=metadata.get(END_RECORD, {}).get("reason", ""),
+        twin=_printable(metadata.get(TWIN_RECORD, {})),
+        end=printable(metadata.get(END_RECORD, {}).get("reason", "")),
         notes=tuple(notes),
         transitions=_sort(states),
-        lateness=metadata.get(LATENESS_RECORD, {}),
+        lateness=_printable(metadata.get(LATENESS_RECORD, {})),
     )
 
 
@@ -294,7 +295,11 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """By time: on a full disk the last ones stand in the room kept near the file's beginning."""
-    return tuple(sorted(transitions, key=_moment))
+    return tuple(sorted(map(_printable, transitions), key=_moment))
+
+
+def _printable(values: Mapping[str, str]) -> dict[str, str]:
+    return {printable(name): printable(value) for name, value in values.items()}
 
 
 def _moment(transition: Mapping[str, str]) -> float:
@@ -330,7 +335,10 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         raise RigtwinError(
             f"{path}: metadata config is not a JSON object with an object 'controller'"
         ) from None
-    return controller
+    return {
+        printable(name): printable(value) if isinstance(value, str) else value
+        for name, value in controller.items()
+    }
 
 
 def _decode(
@@ -386,7 +394,11 @@ def _decode(
 def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
     """Fields that hold numbers throughout."""
     return (
-        [name for name in rows[0] if all(isinstance(row.get(name), int | float) for row in rows)]
+        [
+            name
+            for name in rows[0]
+            if name.isprintable() and all(isinstance(row.get(name), int | float) for row in rows)
+        ]
         if rows
         else []
     )
