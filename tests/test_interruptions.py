@@ -24,7 +24,7 @@ def test_a_process_started_meanwhile_gets_no_interruption():
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
 def test_the_one_that_starts_it_gets_it_behind():
     reached = []
-    with pytest.raises(KeyboardInterrupt), held_back():
+    with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
         os.kill(os.getpid(), signal.SIGINT)
         reached.append(True)
     assert reached
