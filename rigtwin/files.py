@@ -1,16 +1,20 @@
-"""Files that are written whole or not at all."""
+"""Files: written whole or not at all; TOML as its standard has it."""
 
 from __future__ import annotations
 
 import shutil
+import tomllib
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 from rigtwin.errors import RigtwinError
 
 LONGEST = 100
 """Characters of a name that its half-written copy keeps."""
+INTEGER = 64
+"""Bits of an integer in TOML."""
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
@@ -47,6 +51,22 @@ def write_whole(path: Path, content: str | bytes) -> None:
             raise
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML. Raises ValueError if it is none; integers have 64 bits there, and
+    Python cannot even print those of thousands of digits."""
+    document = tomllib.loads(text)
+    waiting: list[object] = [document]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, dict):
+            waiting += each.values()
+        elif isinstance(each, list):
+            waiting += each
+        elif isinstance(each, int) and each.bit_length() > INTEGER:
+            raise ValueError(f"an integer of {each.bit_length()} bits; expected {INTEGER} at most")
+    return document
 
 
 def printable(text: str) -> str:

@@ -204,7 +204,8 @@ MISTAKES = [
         f'[controller]\noutput = "force"\nformula = "{"-" * 1500}position"\n[[replays]]',
         "is nested too deeply",
     ),
-    ('joint = "axis"', f'joint = "axis"\nviscous = 1{"0" * 400}', "expected a number"),
+    ('joint = "axis"', f'joint = "axis"\nviscous = 1{"0" * 400}', "expected 64 at most"),
+    ('joint = "axis"', f'joint = "axis"\nviscous = 0x1{"0" * 9000}', "an integer of 36001 bits"),
     ("[machine]", "[machine", "not valid TOML"),
 ]
 

@@ -17,7 +17,7 @@ from rigtwin.files import printable, write_whole
 from rigtwin.recording import Writer, load
 from rigtwin.recording.export import export
 from rigtwin.recording.schema import END_RECORD
-from rigtwin.render.plot import draw
+from rigtwin.render.plot import _part, draw
 from rigtwin.studies.sweep.cluster import Cluster
 
 
@@ -94,6 +94,9 @@ def test_pictures_of_odd_recordings(tmp_path):
         draw(recording_of(tmp_path / "h.mcap", values, ["a"]), tmp_path / "h.png")
     tex = recording_of(tmp_path / "$\\frac{$.mcap", np.ones((300, 1)), ["a"], "$\\frac{$")
     draw(tex, tmp_path / "t.svg")
+    line, gap = np.arange(5.0), np.array([0.0, 1.0, 2.0, 7.0, 8.0])
+    assert np.isnan(_part(gap, line, 1.0)[1]).tolist() == [False] * 3 + [True] + [False] * 2
+    assert _part(line, line, 1.0)[0].tolist() == line.tolist()
     many = recording_of(tmp_path / "m.mcap", np.ones((300, 45)), [f"c{n}" for n in range(45)])
     draw(many, tmp_path / "m.svg")
     assert (tmp_path / "m.svg").stat().st_size > 0

@@ -60,6 +60,10 @@ COMMANDS = (
 """In the order of the help; each has a module of its name here."""
 
 
+LONGEST = 4000
+"""Characters of a message."""
+
+
 def _module(command: str) -> ModuleType:
     return import_module(f"rigtwin.cli.{command}{'_' if iskeyword(command) else ''}")
 
@@ -131,8 +135,9 @@ def _execute(parsed: argparse.Namespace) -> int:
 
 
 def _say(error: object) -> None:
-    """A fault in one line."""
-    print(f"rigtwin: {printable(' '.join(str(error).split()))}", file=sys.stderr)
+    """A fault in one line, which names no more of what is wrong than anybody reads."""
+    said = printable(" ".join(str(error).split()))
+    print(f"rigtwin: {said[:LONGEST]}{'…' if len(said) > LONGEST else ''}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ line."""
 from __future__ import annotations
 
 import re
-import tomllib
 from collections import namedtuple
 from collections.abc import Mapping
 from importlib.resources import files
@@ -21,6 +20,7 @@ from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.overlooked import overlooked
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
+from rigtwin.files import parse_toml
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments")
 NOMINAL = ("known", "rough")
@@ -45,7 +45,7 @@ def examine(path: Path) -> tuple[Machine | None, list[str]]:
     any."""
     mistakes = Mistakes()
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = parse_toml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
     except (ValueError, RecursionError) as error:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from typing import Any
 
 from controllers.formula import Formula, formula
 from rigtwin.errors import RigtwinError
+from rigtwin.files import parse_toml
 from rigtwin.importing.units import unit_of
 from rigtwin.recording.schema import NAME, check_names
 
@@ -67,7 +67,7 @@ class Map:
 def load(path: Path) -> Map:
     """Reads a map. Raises RigtwinError naming the file, the key and what was expected."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = parse_toml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

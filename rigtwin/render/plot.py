@@ -199,7 +199,12 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
                 raise RigtwinError(
                     f"{recording.path}: {title} goes beyond {LARGEST:g}, which cannot be drawn"
                 )
-            axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
+            axis.plot(
+                *_part(time, signal, recording.period),
+                color=trace.colour,
+                linewidth=0.9,
+                label=trace.label,
+            )
         axis.set_ylabel(title, fontsize=9, parse_math=False)
         axis.grid(alpha=0.3)
         axis.legend(
@@ -217,6 +222,12 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
     about = printable(about.encode("utf-8", "replace").decode())
     figure.suptitle(about, fontsize=11, parse_math=False)
     save(figure, out)
+
+
+def _part(time: Array, signal: Array, period: float) -> tuple[Array, Array]:
+    """A signal without a line across what was not recorded."""
+    gaps = np.nonzero(np.diff(time) > 1.5 * period)[0] + 1
+    return np.insert(time, gaps, np.nan), np.insert(signal, gaps, np.nan)
 
 
 def check_ending(out: Path) -> None:
