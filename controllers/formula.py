@@ -74,7 +74,8 @@ class Formula:
     def replayed(
         self, settings: Mapping[str, float], inputs: Sequence[NDArray[Any]], period: float
     ) -> NDArray[np.float64]:
-        """Its value at every tick. inputs: in their order, shape (ticks,) each."""
+        """Its value at every tick. inputs: in their order, shape (ticks,) each; of a formula
+        without any, one signal of which only the length counts."""
         program, ticks = self.with_settings(settings), len(inputs[0])
         out = np.empty(ticks)
         table = np.ascontiguousarray(np.stack(inputs, axis=1), np.float64)
@@ -95,7 +96,10 @@ def formula(text: str, settings: Mapping[str, float]) -> Formula:
         raise ValueError(f"{text!r} is no formula") from None
     inputs = tuple(dict.fromkeys(_names(tree, settings)))
     builder = _Builder(inputs, settings)
-    builder.result(tree)
+    try:
+        builder.result(tree)
+    except RecursionError:
+        raise ValueError(f"{text[:40]!r}... is nested too deeply") from None
     if not builder.operations:
         # The formula is one name or number: pass it on.
         builder.operation(ADD, builder.result(tree), builder.number(0.0))
@@ -121,6 +125,17 @@ def _names(tree: ast.expr, settings: Mapping[str, float]) -> list[str]:
     ]
     found.sort(key=lambda node: (node.lineno, node.col_offset))
     return [node.id for node in found if node.id not in settings]
+
+
+def _finite(value: float) -> float:
+    """A number of a formula. Raises ValueError if it is too large to be one."""
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError("a number in the formula is too large; expected at most 1.8e308")
+    return number
 
 
 class _Builder:
@@ -149,7 +164,7 @@ class _Builder:
             and isinstance(node.value, int | float)
             and not isinstance(node.value, bool)
         ):
-            return self.number(float(node.value))
+            return self.number(_finite(node.value))
         if isinstance(node, ast.Name):
             return self._place[node.id]
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
@@ -272,6 +287,6 @@ def _replayed(
     out: np.ndarray,
 ) -> None:
     for tick in range(len(out)):
-        for number in range(inputs.shape[1]):
+        for number in range(program.inputs):
             registers[number] = inputs[tick, number]
         out[tick] = run(program, registers, memory, period)

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from rigtwin.errors import RigtwinError
+from rigtwin.interruptions import held_back
 from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
@@ -53,9 +54,11 @@ def check(
     recordings = folder / f"seed-{seed}"
     recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as referee:
+    with held_back():
+        started = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+    with started as referee:
         assert referee.stdin is not None
         assert referee.stdout is not None
         commitment = ""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -202,4 +203,9 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
+    # Who interrupts the check interrupts this too, and hears of it once. Until now, while packages
+    # were imported, the check kept it back.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     sys.exit(main(sys.argv[1:]))

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 
 if TYPE_CHECKING:
     from rigtwin.description.configuration import Configuration
@@ -86,15 +87,5 @@ def finite(document: object) -> object:
 
 
 def write_json(path: Path, document: object) -> None:
-    try:
-        path.write_text(json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a file. Raises RigtwinError if it cannot."""
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    """Raises RigtwinError if it cannot be written."""
+    write_whole(path, json.dumps(finite(document), indent=1, allow_nan=False) + "\n")

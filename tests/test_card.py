@@ -3,6 +3,7 @@ and what it refuses."""
 
 from __future__ import annotations
 
+import socket
 import sys
 import time
 from dataclasses import replace
@@ -437,3 +438,43 @@ def test_a_table_that_is_no_table(tmp_path):
 
 def test_measurements_are_the_inputs_in_their_order():
     assert tuple(line.name for line in TABLE.inputs) == Measurements._fields
+
+
+def test_whoever_signs_the_table_can_be_read_again(tmp_path):
+    for odd in ("Zoë \U000e0001 \x1b[31m", 'a "quoted" \\ name\nline', "\udcff"):
+        path = tmp_path / "card.toml"
+        path.write_text(to_toml(replace(load_table(CARD), operator=odd)), encoding="utf-8")
+        assert load_table(path).operator == odd.encode("utf-8", "replace").decode()
+
+
+def test_a_calibration_of_another_century_is_none():
+    table = load_table(CARD)
+    checked = replace(
+        table,
+        inputs=tuple(line._replace(sign_checked=True) for line in table.inputs),
+        outputs=tuple(line._replace(sign_checked=True) for line in table.outputs),
+        operator="A. Tester",
+    )
+    today = date(2026, 5, 1)
+    require_trust(replace(checked, calibrated="2026-01-31"), today)
+    for calibrated, said in (("1900-01-01", "years ago"), ("2030-01-01", "after today")):
+        with pytest.raises(RigtwinError, match=said):
+            require_trust(replace(checked, calibrated=calibrated), today)
+
+
+def test_more_samples_than_the_buffer_holds_are_refused():
+    """Nobody waits for them, and so blocks all others."""
+    types = pytest.importorskip("nidaqmx._grpc_interpreter").grpc_types
+    card = VirtualCard(Terminals(Configuration(), TABLE, 5), TABLE, RealTime(PERIOD))
+    request = types.ReadAnalogF64Request(num_samps_per_chan=2**31 - 1)
+    with pytest.raises(DriverError, match="2147483647; the buffer holds"):
+        card.answer("ReadAnalogF64", request, types.ReadAnalogF64Response)
+
+
+def test_a_port_that_is_taken_at_one_address_is_taken():
+    device = VirtualCard(Terminals(Configuration(), TABLE, 5), TABLE, OnDemand())
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        with pytest.raises(RigtwinError, match="is taken"):
+            serve(device, other.getsockname()[1])

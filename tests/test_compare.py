@@ -199,6 +199,8 @@ def test_two_recordings_of_one_test(example, tmp_path):
     assert different["load_cell"].ratio > 5
     with pytest.raises(RigtwinError, match="periods differ"):
         compare_recordings(RIG, example, dataclasses.replace(example, period=2e-3))
+    with pytest.raises(RigtwinError, match="it is of machine 'emps'; expected 'suspension-rig'"):
+        compare_recordings(RIG, example, dataclasses.replace(example, machine="emps"))
 
 
 LEFT_OVER = {

@@ -13,6 +13,7 @@ from rigtwin.description.catalogue import find
 from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording, load
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import once_a_sort, text
@@ -153,3 +154,46 @@ def test_a_recording_of_another_machine_is_called_that_whatever_settings_it_hold
     found = diagnose(machine, [recording])
     assert found.verdict == "unusable"
     assert "it is of machine 'suspension-rig'; this twin is 'emps'" in found.sentence
+
+
+def turn(recording: Recording) -> Recording:
+    """The recording as if its time had run backwards."""
+    columns = {
+        topic: {name: values[::-1].copy() for name, values in fields.items()}
+        for topic, fields in recording.columns.items()
+    }
+    return dataclasses.replace(recording, columns=columns)
+
+
+def replace_commands(recording: Recording, **commands: Array) -> Recording:
+    columns = {**recording.columns["/command"], **commands}
+    return dataclasses.replace(recording, columns={**recording.columns, "/command": columns})
+
+
+@pytest.mark.parametrize("channel", ["ground", "structure", "voltage"])
+def test_a_dead_command_is_named_and_not_taken_for_a_fault_of_the_machine(example, channel):
+    dead = replace_commands(example, **{channel: np.zeros(example.ticks)})
+    assert faults(dead) == {f"/command.{channel}": "dead"}
+    assert diagnose(RIG, [dead]).verdict == "unusable"
+
+
+def test_a_recording_in_which_nothing_changes_is_said_to_hold_nothing(example):
+    for value in (0.0, 0.1):
+        still = np.full(example.ticks, value)
+        columns = {topic: dict.fromkeys(names, still) for topic, names in example.columns.items()}
+        assert faults(dataclasses.replace(example, columns=columns)) == {"recording": "dead"}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_time_that_runs_backwards_is_no_fault_of_the_machine(name):
+    assert faults(turn(shipped(name))) == {"recording": "backwards"}
+
+
+@pytest.mark.parametrize("name", ["hum@ground_lvdt", "compliance@ground_cylinder"])
+def test_a_plate_that_is_moved_by_its_load_or_by_noise_has_no_dead_command(tmp_path, name):
+    experiment = EXPERIMENTS["single-mass"]
+    configuration = experiment.configuration._replace(timing=Timing(duration=4.0))
+    demands = experiment.demands(configuration, 2)
+    path = tmp_path / "e.mcap"
+    record(path, "single-mass", configuration, demands, 2, effects=[text(name)])
+    assert set(faults(load(path)).values()) <= {"clipped"}

@@ -18,7 +18,9 @@ from rigtwin.description.document import examine, load
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.fit import is_possible
+from rigtwin.errors import RigtwinError
 from rigtwin.models.joint import JointModel
+from rigtwin.simulation.experiment import find_experiment
 from tests.helpers.described import MJCF, TOML, described, recording_of
 
 
@@ -177,6 +179,33 @@ MISTAKES = [
         '[controller]\noutput = "force"\nformula = "1"\nsettings = { kp = 2 }\n[[replays]]',
         "kp not in the formula",
     ),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "kp"\nsettings = { kp = nan }\n[[replays]]',
+        "settings.kp: nan: expected a number",
+    ),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "position"\ninputs = 5\n[[replays]]',
+        "[controller] inputs: expected a table",
+    ),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "1e999 * position"\n[[replays]]',
+        "a number in the formula is too large",
+    ),
+    (
+        "[[replays]]",
+        '[controller]\noutput = "force"\nformula = "0.5 * 2"\n[[replays]]',
+        "reads nothing",
+    ),
+    (
+        "[[replays]]",
+        f'[controller]\noutput = "force"\nformula = "{"-" * 1500}position"\n[[replays]]',
+        "is nested too deeply",
+    ),
+    ('joint = "axis"', f'joint = "axis"\nviscous = 1{"0" * 400}', "expected 64 at most"),
+    ('joint = "axis"', f'joint = "axis"\nviscous = 0x1{"0" * 9000}', "an integer of 36001 bits"),
     ("[machine]", "[machine", "not valid TOML"),
 ]
 
@@ -195,6 +224,57 @@ def test_a_mistake_is_one_line(tmp_path: Path, capsys, old: str, new: str, said:
     assert all("\n" not in mistake for mistake in mistakes)
     assert main(["machine", "check", str(path)]) == 1
     assert said in capsys.readouterr().out
+
+
+SLIDE = '<joint name="axis" type="slide"/>'
+MODEL_MISTAKES = [
+    (SLIDE, '<joint name="axis" type="slide" damping="-6"/>', "damping of joint 'axis' is -6"),
+    (SLIDE, '<joint name="axis" type="slide" damping="1e300"/>', "viscous of joint 'axis' in the"),
+    (SLIDE, '<joint name="axis" type="slide" stiffness="nan"/>', "line 2: stiffness of <joint>"),
+    (SLIDE, '<joint name="axis" type="slide" frictionloss="nan"/>', "frictionloss of <joint>"),
+    (SLIDE, '<joint name="axis" type="slide" armature="inf"/>', "expected a finite number"),
+    (SLIDE, '<joint name="axis" type="slide" axis="nan 0 0"/>', "axis of <joint> is 'nan 0 0'"),
+    ('mass="2"', 'mass="NaN"', "mass of <geom> is 'NaN'"),
+    ('integrator="RK4"', 'gravity="0 0 nan"', "gravity of <option>"),
+    ('integrator="RK4"', 'gravity="0 0 inf"', "option gravity is inf"),
+    ('joint="axis"/>', 'joint="axis" gear="0"/>', "gear times gain 0"),
+    ("<worldbody>", '<size memory="900P"/><worldbody>', "<size memory='900P'>: expected at most"),
+    ("<worldbody>", '<size nkey="100000000"/><worldbody>', "nkey='100000000'"),
+    (
+        "<worldbody>",
+        '<worldbody><replicate count="1000"><replicate count="1000"><geom size="1"/>'
+        "</replicate></replicate>",
+        "<replicate> makes 1e+06 elements; expected at most 10000",
+    ),
+    (
+        "<worldbody>",
+        '<worldbody><flexcomp name="f" type="grid" count="1000 1000 9" radius=".1" mass="1"/>',
+        "<flexcomp> makes 9e+06 elements",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MODEL_MISTAKES)
+def test_a_value_of_the_mjcf_is_checked_like_one_of_the_description(
+    tmp_path: Path, capfd, old: str, new: str, said: str
+):
+    model = MJCF.format(body=f'{SLIDE}<geom size="0.05" mass="2"/>')
+    assert old in model
+    (tmp_path / "bench.xml").write_text(model.replace(old, new, 1))
+    (tmp_path / "bench.toml").write_text(TOML)
+    assert main(["machine", "check", str(tmp_path / "bench.toml")]) == 1
+    out, err = capfd.readouterr()
+    assert said in out
+    assert len(out.splitlines()) == 2, "the mistake and how many there are"
+    assert err == ""
+
+
+def test_a_demand_that_is_not_finite_is_said(tmp_path: Path):
+    demand = '[experiments.x]\nduration = 1.0\n[experiments.x.demands]\nforce = "1e200 * 1e200"\n'
+    machine = described(tmp_path, toml=TOML + demand)
+    found = find_experiment(machine, "x")
+    with pytest.raises(RigtwinError, match=r"demand force: .* is not finite at 0.000 s"):
+        found.demands(found.configuration, 0)
 
 
 def test_a_missing_description_is_said(tmp_path: Path, capsys):

@@ -107,6 +107,11 @@ def test_a_mistake_is_said(text, said):
         formula(text, {})
 
 
+def test_a_formula_without_inputs_is_constant():
+    """The signal that says how many ticks there are is none of its numbers."""
+    assert formula("0.5 * 2 - 3", {}).replayed({}, [TIME], PERIOD).tolist() == [-2.0] * TICKS
+
+
 def test_memory_begins_at_rest():
     assert np.isnan(formula("mean(x, 5)", {}).memory()).all()
     assert not math.isnan(value("derivative(x)", x=SIGNAL)[0])

@@ -352,7 +352,7 @@ BAD_DATA = [
     ("", "no lines of numbers"),
     ("hello\nworld\n", "no lines of numbers"),
     (text(names="t,y,f"), "no column 'x'; there are t, y, f"),
-    (text(names="t,x,x"), "two columns are named 'x'"),
+    (text(names="t,x,x"), "2 columns are named 'x'"),
     (text() + "1,2,3,4\n", "line 302 has 4 cells; expected 3"),
     (text() + "0.6,two,3\n", "is not a number in 1 rows, the first at 0.6 s ('two' in line 302)"),
     (text() + "late,2,3\n", "time column 't' is not a number in 'late' in line 302"),
@@ -463,3 +463,55 @@ def test_a_column_may_be_named_as_the_first_line_does_with_its_unit(tmp_path):
     convert([tmp_path / "log.csv"], tmp_path / "map.toml", out)
     found = load(out)
     assert found.column("/sensor", "force")[-1] == pytest.approx(0.049 * 4448.2216, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("déplacement", "force"), "letters without accents"),
+        (("displacement", "ﬀorce"), "letters without accents"),
+        (("a_b", "aB"), "cannot have both a_b and aB"),
+    ],
+)
+def test_a_channel_that_no_recording_can_hold_is_refused(tmp_path, names, said):
+    first, second = names
+    wrong = MAP.replace("displacement", first).replace("sensor.force", f"sensor.{second}")
+    with pytest.raises(RigtwinError, match=said):
+        imported(tmp_path, text(), wrong)
+    assert not (tmp_path / "out.mcap").exists()
+
+
+def test_lines_and_cells_of_any_length_are_read(tmp_path):
+    long = "1" + "0" * 140_000
+    lines = text().splitlines()
+    lines[150] = lines[150].rsplit(",", 1)[0] + f",{long}"
+    with pytest.raises(RigtwinError, match="/sensor.force is not a number"):
+        imported(tmp_path, "\n".join(lines))
+    wide = "\n".join([",".join(["1.50000000000000000"] * 8000)] * 6)
+    (tmp_path / "wide.csv").write_text(wide)
+    assert len(read(tmp_path / "wide.csv").values) == 8000
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.3, 0.6, 0.9, 0.99])
+def test_a_matlab_file_that_is_cut_off_is_one_line(tmp_path, share):
+    savemat(tmp_path / "m.mat", {"t": TIME, "x": POSITION})
+    whole = (tmp_path / "m.mat").read_bytes()
+    (tmp_path / "d.mat").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(RigtwinError, match=r"d\.mat") as error:
+        read(tmp_path / "d.mat")
+    assert "\n" not in str(error.value)
+
+
+def test_a_link_to_nowhere_is_no_column(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "link.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["t"] = TIME
+        file["x"] = h5py.SoftLink("/nowhere")
+    data = bytearray(path.read_bytes())
+    data[:128] = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(data)
+    assert list(read(path).values) == ["t"]
+    path.write_bytes(data[:1500])
+    with pytest.raises(RigtwinError, match=r"link\.mat"):
+        read(path)

@@ -372,6 +372,16 @@ def test_times_that_make_no_sense_are_refused(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_time_that_runs_backwards_is_refused(tmp_path):
+    path, rows = tmp_path / "b.mcap", ['{"load_cell": 1.0}'] * 300
+    other_recording(path, rows, times=[tick * 1_000_000 for tick in range(300, 0, -1)])
+    with pytest.raises(RigtwinError, match=r"time on /sensor runs backwards, from 0.300 s"):
+        load(path)
+    ticks = [1, 0, *range(2, 300)]
+    other_recording(path, rows, times=[tick * 1_000_000 for tick in ticks])
+    assert "1 messages on /sensor come after later ones" in load(path).notes[0]
+
+
 def test_a_full_disk_is_one_line(tmp_path):
     full = tmp_path / "full.mcap"
     full.symlink_to("/dev/full")
@@ -391,3 +401,54 @@ def test_a_recording_has_one_owner(tmp_path):
         writer.finish("completed")
     assert b"third" in path.read_bytes()
     assert b"first" not in path.read_bytes()
+
+
+def test_names_that_cannot_be_read_are_not_written(tmp_path):
+    for names in (("é",), ("1a",), ("a_b", "aB"), ("a", "a")):
+        with pytest.raises(RigtwinError, match="/sensor"):
+            Writer(tmp_path / "n.mcap", "x", 1e-3, {}, fields={"/sensor": names})
+    assert not (tmp_path / "n.mcap").exists()
+
+
+def chunks_of(data: bytes) -> list[int]:
+    """Where the chunks begin."""
+    found, at = [], data.find(b"\x04\x00\x00\x00zstd")
+    while at >= 0:
+        found += [at - 37] if data[at - 37] == 6 else []
+        at = data.find(b"\x04\x00\x00\x00zstd", at + 1)
+    return found
+
+
+@pytest.mark.parametrize("place", [1, 5, 29, 40, 60], ids=str)
+def test_a_flipped_bit_costs_one_chunk(tmp_path, place):
+    """In its length, its sizes, its compression's name, its data; in a finished file or not."""
+    data = written(tmp_path / "r.mcap", ticks=5000)
+    whole = (tmp_path / "r.mcap").read_bytes()
+    third = chunks_of(whole)[2]
+    for end in (len(whole), chunks_of(whole)[-1]):
+        damaged = bytearray(whole[:end])
+        damaged[third + place] ^= 0x10
+        (tmp_path / "d.mcap").write_bytes(damaged)
+        recording = load(tmp_path / "d.mcap")
+        ticks = np.round(recording.time * 1e3).astype(int)
+        expected = 5000 if end == len(whole) else 4750
+        assert sorted(set(range(expected)) - set(ticks)) in ([*range(500, 750)], [])
+        if len(ticks) < expected:
+            assert recording.notes[0].startswith("damaged")
+            assert "1 gaps in time, the first of 0.251 s at 0.499 s" in recording.notes
+        assert np.array_equal(recording.column("/sensor", "load_cell"), data["sensor"][ticks, 3])
+
+
+def test_settings_that_are_other_than_written_are_not_believed(tmp_path):
+    written(tmp_path / "r.mcap")
+    before = load(tmp_path / "r.mcap")
+    whole = (tmp_path / "r.mcap").read_bytes()
+    name, value = "kp", CONTROLLER["kp"]
+    told = json.dumps({name: value}).strip("{}").encode()
+    assert whole.count(told) == 1
+    (tmp_path / "d.mcap").write_bytes(whole.replace(told, told[:-1] + b"7"))
+    recording = load(tmp_path / "d.mcap")
+    assert before.controller == CONTROLLER
+    assert recording.controller == {}
+    assert "wrong checksum" in recording.notes[0]
+    assert recording.ticks == before.ticks

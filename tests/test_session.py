@@ -10,6 +10,7 @@ import signal
 import time
 from dataclasses import replace
 from datetime import date
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,7 +37,7 @@ from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
 from rigtwin.hardware.session import permission
 from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
-from rigtwin.hardware.session.plan import parse_plan
+from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import Test, record_in_real_time
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
@@ -269,6 +270,25 @@ def test_without_the_drivers_client_one_line_says_how_to_get_it(
 def test_mistakes_in_a_list(tables, said):
     with pytest.raises(RigtwinError, match=said):
         parse_plan(tables, find)
+
+
+def test_two_sessions_do_not_run_into_one_folder(tmp_path):
+    plan, folder = tmp_path / "list.toml", tmp_path / "out"
+    plan.write_text('[[test]]\nexperiment = "imposed"\nname = "one"\n')
+    inner = []
+
+    def run(_test: PlannedTest, path: Path) -> bool:
+        with pytest.raises(RigtwinError, match="another session is running into") as error:
+            rigtwin.run_session(plan, folder, run)
+        inner.append(str(error.value))
+        path.write_text("the first one's")
+        return True
+
+    assert rigtwin.run_session(plan, folder, run)
+    assert inner
+    assert (folder / "one.mcap").read_text() == "the first one's"
+    with pytest.raises(RigtwinError, match="holds one.mcap already"):
+        rigtwin.run_session(plan, folder, run)
 
 
 def test_a_list_is_run_compared_and_resumed(tmp_path, capsys):

@@ -16,6 +16,7 @@ import pytest
 from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
+from rigtwin.cli import main
 from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
@@ -240,6 +241,25 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
     [fault] = draw_faults(1, seed, [kind])
     outcome = try_fault(fault, find(fault.experiment), TABLE, tmp_path)
     assert outcome.ok, outcome
+
+
+def test_who_interrupts_a_campaign_fails_no_session(tmp_path, monkeypatch, capsys):
+    def interrupt(*given):
+        os.kill(os.getpid(), signal.SIGINT)
+        return healthy(*given)
+
+    monkeypatch.setattr("rigtwin.hardware.faults.campaign.healthy", interrupt)
+    page = tmp_path / "faults.md"
+    assert main(["faults", "--each", "1", "--processes", "0", "--out", str(page)]) == 130
+    out = capsys.readouterr().out
+    assert "not run: interrupted after 0 of" in out
+    assert "failed:" not in out
+    assert not page.exists()
+
+
+def test_a_campaign_without_sessions_is_refused(capsys):
+    assert main(["faults", "--each", "0", "--processes", "0"]) == 1
+    assert "no session to run" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 from rigtwin.hardware.daq.calibration import (
     Still,
     correct_signs,
@@ -241,10 +242,7 @@ def check_card(
 
 def write_table(table: ChannelTable, path: str | Path) -> None:
     """Writes a channel table. Raises RigtwinError if it cannot."""
-    try:
-        Path(path).write_text(to_toml(table), encoding="utf-8")
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(Path(path), to_toml(table))
 
 
 def _require_values(values: Mapping[str, float], option: str, table: ChannelTable) -> None:

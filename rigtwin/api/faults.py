@@ -22,11 +22,12 @@ MOST = 1000
 @dataclass(frozen=True)
 class Campaign:
     """What faults did in sessions on the virtual card. undone: those that this computer could not
-    run, in words; drawn: how many there were to be."""
+    run, in words; drawn: how many there were to be; interrupted: whether somebody ended it."""
 
     results: tuple[FaultResult, ...]
     undone: tuple[str, ...]
     drawn: int
+    interrupted: bool = False
 
     @property
     def failed(self) -> tuple[FaultResult, ...]:
@@ -65,9 +66,11 @@ def faults(
     require_client()
     if seed < 0 or not 0 <= each <= MOST or not 0 <= processes <= MOST:
         raise RigtwinError(f"--seed: expected 0 or more; --each and --processes: 0 to {MOST}")
+    if each == processes == 0:
+        raise RigtwinError("--each 0 --processes 0: no session to run; expected 1 or more of one")
     channels = load_table(Path(card))
     todo = _draw(seed, each, processes)
-    results, undone = list[FaultResult](), list[str]()
+    results, undone, interrupted = list[FaultResult](), list[str](), False
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
         try:
             for number, fault in enumerate(todo):
@@ -78,8 +81,9 @@ def faults(
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
+            interrupted = True
             undone.append(f"interrupted after {len(results)} of {len(todo)}")
-    return Campaign(tuple(results), tuple(undone), len(todo))
+    return Campaign(tuple(results), tuple(undone), len(todo), interrupted)
 
 
 def _draw(seed: int, each: int, processes: int) -> list[Fault]:

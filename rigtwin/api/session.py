@@ -4,7 +4,7 @@ converters; one test, or a list of them."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import date
@@ -30,8 +30,11 @@ from rigtwin.hardware.session.record import (
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
+from rigtwin.recording.owner import open_alone
 
 PORTS = 65535
+LOCK = "session.lock"
+"""In a session's folder; who holds it runs into that folder alone."""
 Stop = Callable[[], str | None]
 """Called in every tick; a text ends the test and is its reason."""
 
@@ -126,7 +129,7 @@ def dry_run(
     Parameters
     ----------
     experiment, card, settings, seed, effects
-        As of `run_on_card`; with any effects, nothing is noted.
+        As of `run_on_card`; with any effects, or with the shipped table, nothing is noted.
     path
         Of the recording.
     progress
@@ -147,7 +150,9 @@ def dry_run(
     recording = load(Path(path)) if ended.ticks else None
     passed = ended.cause == COMPLETED
     peaks = predict_peaks(recording, test.card_configuration) if recording is not None else ()
-    if passed and not test.effects:
+    # The shipped table arms nothing, and where it lies nothing is written.
+    shipped = Path(card).resolve() == CARD.resolve()
+    if passed and not test.effects and not shipped:
         said = {"experiment": test.experiment, "date": date.today().isoformat()}
         enter(Path(card), key_of(test), said)
     return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
@@ -307,7 +312,8 @@ def run_session(
     Raises
     ------
     RigtwinError
-        For a mistake in any test of the list, before anything moves.
+        For a mistake in any test of the list, or a folder into which another session runs, before
+        anything moves.
     """
     folder = Path(folder)
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find))
@@ -315,6 +321,35 @@ def run_session(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
+    with _alone(folder):
+        return _run_tests(tests, folder, run, resume, real, prepare, told)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keeps a folder for this session while it runs. Raises RigtwinError if another one runs into
+    it."""
+    try:
+        held = open_alone(folder / LOCK)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {folder / LOCK}: {error.strerror}") from None
+    except RigtwinError:
+        raise RigtwinError(
+            f"another session is running into {folder}; wait for it, or name another --folder"
+        ) from None
+    with held:
+        yield
+
+
+def _run_tests(
+    tests: Sequence[PlannedTest],
+    folder: Path,
+    run: Callable[[PlannedTest, Path], bool],
+    resume: bool,
+    real: bool,
+    prepare: Callable[[PlannedTest], object],
+    told: Callable[[str], object],
+) -> bool:
     paths = {test.name: folder / f"{test.name}.mcap" for test in tests}
     todo = [test for test in tests if not (resume and is_complete(paths[test.name], real))]
     taken = [test.name for test in todo if paths[test.name].exists()]

@@ -5,14 +5,18 @@ from __future__ import annotations
 
 import argparse
 import io
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from keyword import iskeyword
+from pathlib import Path
 from types import ModuleType
 
 from rigtwin.cli.files import check_files
 from rigtwin.errors import RigtwinError
+from rigtwin.files import printable
 
 OVERVIEW = """\
 The digital twin of a test rig, and the tool that says why the twin and the rig disagree.
@@ -56,6 +60,10 @@ COMMANDS = (
 """In the order of the help; each has a module of its name here."""
 
 
+LONGEST = 4000
+"""Characters of a message."""
+
+
 def _module(command: str) -> ModuleType:
     return import_module(f"rigtwin.cli.{command}{'_' if iskeyword(command) else ''}")
 
@@ -77,35 +85,59 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a
     test that tripped, 130 interrupted."""
-    for stream in (sys.stdout, sys.stderr):
+    try:
+        return _main(arguments)
+    except KeyboardInterrupt:
+        # Also while packages are imported.
+        _say("interrupted")
+        return 130
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            # Closed by whoever started the program: nobody wants to hear what it says.
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+        stream = getattr(sys, name)
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that cannot show a sign gets a question mark, not the end of the program.
             stream.reconfigure(errors="replace")
     parser = _parser()
     parsed = parser.parse_args(arguments)
+    if parsed.command is None and not parsed.version:
+        parser.error("a command is missing; rigtwin --help lists them")
+    try:
+        code = _execute(parsed)
+        sys.stdout.flush()
+        return code
+    except RigtwinError as error:
+        _say(error)
+        return 1
+    except BrokenPipeError:
+        # Nobody reads on: that is no fault, and there is nobody to tell.
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        _say(f"{error.filename}: {error.strerror}" if error.filename else error.strerror or error)
+        return 1
+    except MemoryError:
+        _say("not enough memory for that; make the test shorter")
+        return 1
+
+
+def _execute(parsed: argparse.Namespace) -> int:
     if parsed.version:
         print(f"rigtwin {import_module('rigtwin').__version__}")
         return 0
-    if parsed.command is None:
-        parser.error("a command is missing; rigtwin --help lists them")
-    try:
-        check_files(parsed)
-        return _module(parsed.command).execute(parsed)
-    except RigtwinError as error:
-        print(f"rigtwin: {' '.join(str(error).split())}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        sys.stderr.close()
-        return 1
-    except OSError as error:
-        print(f"rigtwin: {error.strerror or error}", file=sys.stderr)
-        return 1
-    except MemoryError:
-        print("rigtwin: not enough memory for that; make the test shorter", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("rigtwin: interrupted", file=sys.stderr)
-        return 130
+    check_files(parsed)
+    return _module(parsed.command).execute(parsed)
+
+
+def _say(error: object) -> None:
+    """A fault in one line, which names no more of what is wrong than anybody reads."""
+    said = printable(" ".join(str(error).split()))
+    print(f"rigtwin: {said[:LONGEST]}{'…' if len(said) > LONGEST else ''}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.console import writable, write_text
+from rigtwin.console import writable
+from rigtwin.files import write_whole
 
 SUMMARY = "find the friction compensator's settings from a recording"
 MORE = """\
@@ -43,6 +44,6 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.out is None:
         print(found.toml(), end="")
     else:
-        write_text(parsed.out, found.toml())
+        write_whole(parsed.out, found.toml())
         print(f"settings in {parsed.out}, for --config")
     return 0

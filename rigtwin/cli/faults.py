@@ -12,6 +12,7 @@ import rigtwin
 from rigtwin.cli.options import counting_bar
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 from rigtwin.hardware.daq import CARD
 
 if TYPE_CHECKING:
@@ -73,7 +74,8 @@ def execute(parsed: argparse.Namespace) -> int:
     Returns
     -------
     int
-        4 unless every session was stopped as it must be, else 0.
+        130 if it was interrupted, which says nothing of the rig and writes no file; 4 unless every
+        session was stopped as it must be; else 0.
     """
     from rigtwin.hardware.faults.kinds import KINDS
 
@@ -103,6 +105,8 @@ def execute(parsed: argparse.Namespace) -> int:
     for one in found.undone:
         print(f"not run: {one}")
     print(said)
+    if found.interrupted:
+        return 130
     if parsed.out is not None:
         _write(parsed.out, said, rows, list(found.failed))
     if parsed.json is not None:
@@ -146,13 +150,9 @@ def _write(
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     lines += ["", *(f"- failed: {_describe(result)}" for result in failed)]
     try:
-        old = path.read_text(encoding="utf-8") if path.exists() else ""
-        before, mark, _ = old.partition(MARK)
-        path.write_text(
-            f"{before}{MARK}\n\n" + "\n".join(lines).rstrip() + "\n"
-            if mark
-            else "\n".join(lines) + "\n",
-            "utf-8",
-        )
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+        old = path.read_text(encoding="utf-8") if path.is_file() else ""
+    except (OSError, UnicodeDecodeError):
+        raise RigtwinError(f"cannot read {path}, whose table is to be replaced") from None
+    before, mark, _ = old.partition(MARK)
+    table_only = "\n".join(lines) + "\n"
+    write_whole(path, f"{before}{MARK}\n\n{table_only.rstrip()}\n" if mark else table_only)

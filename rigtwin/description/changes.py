@@ -7,7 +7,6 @@ checked.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,6 +14,7 @@ from typing import Any, TypeVar
 from rigtwin.components.quantity import Choice, Quantity, fields
 from rigtwin.description.configuration import Configuration, groups, parameters
 from rigtwin.errors import RigtwinError
+from rigtwin.files import parse_toml
 
 Applied = TypeVar("Applied")
 POSTERIOR = "posterior"
@@ -135,7 +135,7 @@ def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Appl
         Naming file and fault.
     """
     try:
-        return apply(tomllib.loads(path.read_text(encoding="utf-8-sig")))
+        return apply(parse_toml(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

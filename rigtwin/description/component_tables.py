@@ -15,6 +15,7 @@ from rigtwin.description.machine import Component, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.tolerance import Tolerance
+from rigtwin.recording.schema import NAME as FIELD_NAME
 
 TYPES: dict[str, type] = {
     "mass": components.Mass,
@@ -119,6 +120,11 @@ class Components:
         for key in ("channel", "command", "unit"):
             if key in table and not isinstance(table[key], str):
                 self.mistakes.note(where, f"{key} = {table[key]}: expected a text, in quotes")
+            elif key != "unit" and not FIELD_NAME.fullmatch(str(table.get(key, name))):
+                self.mistakes.note(
+                    where,
+                    f"{key} = {table[key]!r}: expected letters without accents, digits and _",
+                )
         channel: tuple[str, str] | None = None
         if kind in SENSED:
             unit = UNITS[SENSED[kind]][turns]
@@ -217,7 +223,7 @@ class Components:
             component = component._replace(inertia=self._mechanism.armature(element, mjcf))
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
-            if constant <= 0.0:
+            if not constant > 0.0:
                 self.mistakes.note(
                     where,
                     f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
@@ -236,6 +242,14 @@ class Components:
                 self.mistakes.note(where, f"unknown key {key!r}; {near(key, known)}")
                 continue
             component = self._value(name, where, component, key, given, meanings[key])
+        for key, meaning in meanings.items():
+            value = getattr(component, key)
+            if key not in table and not meaning.low <= value <= meaning.high:
+                self.mistakes.note(
+                    where,
+                    f"{key} of {element} {mjcf!r} in the MJCF is {value:g}: expected a number "
+                    f"from {meaning.low:g} to {meaning.high:g}",
+                )
         return component
 
     def _value(

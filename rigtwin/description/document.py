@@ -4,7 +4,6 @@ line."""
 from __future__ import annotations
 
 import re
-import tomllib
 from collections import namedtuple
 from collections.abc import Mapping
 from importlib.resources import files
@@ -21,6 +20,7 @@ from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.overlooked import overlooked
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
+from rigtwin.files import parse_toml
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments")
 NOMINAL = ("known", "rough")
@@ -45,7 +45,7 @@ def examine(path: Path) -> tuple[Machine | None, list[str]]:
     any."""
     mistakes = Mistakes()
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = parse_toml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
     except (ValueError, RecursionError) as error:
@@ -216,11 +216,18 @@ class _Reader:
             required=("output", "formula"),
         )
         settings, inputs = table.get("settings", {}), table.get("inputs", {})
-        if not isinstance(settings, Mapping) or not all(
-            isinstance(v, int | float) for v in settings.values()
-        ):
+        if not isinstance(settings, Mapping):
             self._mistakes.note("[controller] settings", "expected a table of numbers")
             return None
+        if not isinstance(inputs, Mapping):
+            self._mistakes.note(
+                "[controller] inputs", 'expected a table, such as { position = "/sensor.position" }'
+            )
+            return None
+        values = {
+            key: self._mistakes.number(f"[controller] settings.{key}", v, -1e300, 1e300)
+            for key, v in settings.items()
+        }
         outputs = {
             c.channel[1]: n
             for n, c in components.found.items()
@@ -233,19 +240,22 @@ class _Reader:
                 f"no actuator takes the command {output!r}; {near(output, outputs)}",
             )
         try:
-            compiled: Formula = formula(
-                str(table.get("formula", "0")), {key: float(v) for key, v in settings.items()}
-            )
+            compiled: Formula = formula(str(table.get("formula", "0")), values)
         except ValueError as error:
             self._mistakes.note("[controller] formula", str(error))
             return None
+        if not compiled.inputs:
+            self._mistakes.note(
+                "[controller] formula",
+                f"{compiled.text!r:.60} reads nothing; expected a sensor or a demand in it",
+            )
         unused = [key for key in settings if not re.search(rf"\b{re.escape(key)}\b", compiled.text)]
         if unused:
             self._mistakes.note("[controller] settings", f"{', '.join(unused)} not in the formula")
         channels: dict[str, Channel] = {}
         for name in compiled.inputs:
             known = components.found.get(name)
-            wanted = inputs.get(name) if isinstance(inputs, Mapping) else None
+            wanted = inputs.get(name)
             if wanted is not None:
                 topic, _, field = str(wanted).partition(".")
                 if topic not in ("/command", "/sensor") or not field:

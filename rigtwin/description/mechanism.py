@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from rigtwin.description.machine import Joint
+from rigtwin.description.model_checks import check_text, check_values
 from rigtwin.errors import RigtwinError
 
 OBJECTS = {
@@ -76,10 +77,12 @@ class Mechanism:
         """Raises RigtwinError if it is none."""
         if not path.is_file():
             raise RigtwinError(f"model {path} does not exist")
+        check_text(path)
         try:
             self.model = compile_model(path)
         except ValueError as error:
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
+        check_values(path, self.model)
 
     def names(self, element: str) -> list[str]:
         """Names of all elements of a sort."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from typing import Any
 
 
@@ -23,11 +24,10 @@ class Mistakes(list[str]):
 
     def number(self, where: str, value: object, low: float, high: float) -> float:
         """The value if it is a number between the bounds; else the lower one, and a mistake."""
-        number = (
-            float(value)
-            if isinstance(value, int | float) and not isinstance(value, bool)
-            else math.nan
-        )
+        number = math.nan
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            with suppress(OverflowError):
+                number = float(value)
         if low <= number <= high:
             return number
         shown = repr(value) if isinstance(value, str) else str(value)

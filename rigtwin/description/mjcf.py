@@ -16,6 +16,7 @@ from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 
 ATTRIBUTES: dict[type, dict[str, str]] = {
     Guide: {"coulomb": "frictionloss", "viscous": "damping", "stiffness": "stiffness"},
@@ -171,10 +172,7 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
     for change in changes:
         if not _apply(document, machine, change):
             left.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
-    try:
-        path.write_bytes(document.text())
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, document.text())
     return tuple(left)
 
 

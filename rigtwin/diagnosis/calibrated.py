@@ -13,6 +13,7 @@ from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.errors import RigtwinError
+from rigtwin.files import printable, write_whole
 
 if TYPE_CHECKING:
     from rigtwin.diagnosis.result import Diagnosis
@@ -22,7 +23,7 @@ def toml(diagnosis: Diagnosis) -> str:
     """The file's text. Values in full precision, so that the twin is the same to the bit."""
     answer = diagnosis.answer
     lines = [f"# {answer.verdict}: {answer.sentence}"]
-    lines += [f"# from {recording}" for recording in answer.recordings]
+    lines += [f"# from {printable(str(recording))}" for recording in answer.recordings]
     lines += [
         f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
     ]
@@ -79,8 +80,5 @@ def save(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes it. Raises RigtwinError if it cannot, or if the data were not fit for a diagnosis."""
     if diagnosis.evidence is None:
         raise RigtwinError(f"{path} not written: the data cannot be diagnosed")
-    try:
-        path.write_text(toml(diagnosis), encoding="utf-8")
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, toml(diagnosis))
     return path

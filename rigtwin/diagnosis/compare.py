@@ -167,8 +167,14 @@ def compare_recordings(
     Raises
     ------
     RigtwinError
-        If their periods differ, they have too little in common or share no sensor.
+        If one is of another machine, their periods differ, they have too little in common or share
+        no sensor.
     """
+    for each in (first, second):
+        if each.machine != machine.name:
+            raise RigtwinError(
+                f"{each.path}: it is of machine {each.machine!r}; expected {machine.name!r}"
+            )
     if first.period != second.period:
         raise RigtwinError(
             f"periods differ: {first.path} has {first.period:g} "

@@ -11,6 +11,8 @@ import numpy as np
 from rigtwin.components import ForceActuator
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
+from rigtwin.diagnosis.dead_commands import dead_commands
+from rigtwin.diagnosis.direction import runs_backwards
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
@@ -99,10 +101,13 @@ def find_faults(
         found += _check_values(machine, recording)
     if not found:
         predicted = model_of(machine, recording, configuration, STEPS).predict(configuration.plant)
-        for stage in (_check_alive, _check_order, _check_scale):
-            found += stage(machine, recording, predicted)
-            if any(fault.fatal for fault in found):
-                break
+        found += _check_alive(machine, recording, predicted)
+        if not any(fault.fatal for fault in found):
+            found += _check_order(machine, recording, predicted)
+        if not any(fault.fatal for fault in found):
+            found += _check_inputs(machine, recording, configuration, predicted)
+        if not any(fault.fatal for fault in found):
+            found += _check_scale(machine, recording, predicted)
     return tuple(sorted(found, key=lambda fault: not fault.fatal))
 
 
@@ -194,6 +199,9 @@ def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
 
 
 def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+    if not any(np.ptp(recording.column(*channel)) for channel in channels(machine)):
+        yield Fault("dead", "recording", "no channel changes throughout: nothing was recorded")
+        return
     still = {
         row.name
         for row, model in zip(machine.rows, predicted, strict=True)
@@ -248,6 +256,18 @@ def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:
         if share > 0.0:
             message = f"{where} is cut off {end} {extreme:.4g} ({share:.2g} % of the ticks)"
             yield Fault("clipped", where, message, fatal=False)
+
+
+def _check_inputs(
+    machine: Machine, recording: Recording, configuration: Configuration, predicted: Array
+) -> Iterator[Fault]:
+    dead = dead_commands(machine, recording, configuration)
+    for where, moved in dead.items():
+        message = f"{where} does not change throughout, but {moved}: a dead or disconnected channel"
+        yield Fault("dead", where, message)
+    if not dead and runs_backwards(machine, recording, configuration, predicted):
+        message = "its time runs backwards: from its end, the machine goes as it should"
+        yield Fault("backwards", "recording", message)
 
 
 def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:

@@ -12,7 +12,7 @@ from rigtwin import __version__
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.finding import Answer
 from rigtwin.diagnosis.text import number
-from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 
 if TYPE_CHECKING:
     from rigtwin.diagnosis.result import Diagnosis
@@ -86,8 +86,5 @@ def html(diagnosis: Diagnosis) -> str:
 
 def write(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes the page. Raises RigtwinError if it cannot."""
-    try:
-        path.write_text(html(diagnosis), encoding="utf-8")
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, html(diagnosis))
     return path

@@ -15,15 +15,16 @@ from rigtwin.numerics.arrays import Array
 def read_matlab(path: Path) -> Columns:
     """Vectors, and the columns of matrices. Raises RigtwinError for what MATLAB did not write."""
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
     try:
         content: Any = loadmat(str(path), squeeze_me=True, struct_as_record=False)
         form = "MATLAB v5"
     except NotImplementedError:
         content, form = _hdf(path), "MATLAB v7.3"
-    except (ValueError, MatReadError, TypeError, EOFError) as error:
-        raise RigtwinError(f"{path} is not a MATLAB file: {str(error).splitlines()[0]}") from None
+    except (OSError, RigtwinError):
+        raise
+    except Exception as error:  # of a damaged file, whatever the reader stumbles over
+        raise _unreadable(path, error) from None
     found: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith(("__", "#")):
@@ -79,13 +80,22 @@ def _hdf(path: Path) -> dict[str, Any]:
     def content(group: Any) -> dict[str, Any]:
         found: dict[str, Any] = {}
         for name, item in group.items():
-            if name.startswith("#"):
+            # A link may lead nowhere.
+            if name.startswith("#") or item is None:
                 continue
             found[name] = content(item) if isinstance(item, h5py.Group) else item[()]
         return found
 
-    with h5py.File(path, "r") as file:
-        return content(file)
+    try:
+        with h5py.File(path, "r") as file:
+            return content(file)
+    except Exception as error:  # of a damaged file, whatever the reader stumbles over
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: Exception) -> RigtwinError:
+    said = (str(error).splitlines() or [type(error).__name__])[0]
+    return RigtwinError(f"{path} is not a MATLAB file, or damaged: {said}")
 
 
 def read_parquet(path: Path) -> Columns:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
 from rigtwin.errors import RigtwinError
+from rigtwin.files import parse_toml
 from rigtwin.importing.units import unit_of
+from rigtwin.recording.schema import NAME, check_names
 
 TOPICS = ("/command", "/sensor")
 TABLES = ("machine", "experiment", "time", "columns", "constants", "channels", "controller")
@@ -65,7 +67,7 @@ class Map:
 def load(path: Path) -> Map:
     """Reads a map. Raises RigtwinError naming the file, the key and what was expected."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        document = parse_toml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
@@ -88,9 +90,10 @@ def _require_keys(where: str, table: object, known: tuple[str, ...]) -> Mapping[
 
 
 def _number(where: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
-    number = (
-        float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-    )
+    number = math.nan
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        with suppress(OverflowError):
+            number = float(value)
     if not (low <= number <= high and math.isfinite(number)):
         limits = f" from {low:g} to {high:g}" if math.isfinite(low) else ""
         shown = repr(value) if isinstance(value, str) else str(value)
@@ -132,6 +135,8 @@ def _map(document: Mapping[str, Any]) -> Map:
     }
     if twice := sorted(set(columns) & set(constants)):
         raise RigtwinError(f"[constants] {twice[0]}: [columns] has that name too")
+    for topic in TOPICS:
+        check_names(topic, [field for of, field in map(_channel, channels) if of == topic])
     found = {_channel(name): _source(name, table, constants) for name, table in channels.items()}
     controller = document.get("controller", {})
     if not isinstance(controller, Mapping) or not all(
@@ -155,8 +160,11 @@ def _map(document: Mapping[str, Any]) -> Map:
 
 def _channel(name: str) -> tuple[str, str]:
     topic, dot, field = name.partition(".")
-    if topic not in TOPICS or not dot or not field.isidentifier():
-        raise RigtwinError(f'[channels] {name!r}: expected "/command.NAME" or "/sensor.NAME"')
+    if topic not in TOPICS or not dot or not NAME.fullmatch(field):
+        raise RigtwinError(
+            f'[channels] {name!r}: expected "/command.NAME" or "/sensor.NAME", the name of letters '
+            "without accents, digits and _"
+        )
     return topic, field
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,11 +50,15 @@ def read_text(path: Path) -> Columns:
     lines = _decode(path).splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
-    found = find_layout(lines)
+    try:
+        found = find_layout(lines)
+    except RigtwinError as error:
+        raise RigtwinError(f"{path}: {error}") from None
     if found is None:
         raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
-    for name in dict.fromkeys(n for n in found.names if found.names.count(n) > 1):
-        raise RigtwinError(f"{path}: two columns are named {name!r}")
+    for name, count in Counter(found.names).items():
+        if count > 1:
+            raise RigtwinError(f"{path}: {count} columns are named {name!r}")
     numbers, rows, notes = _rows(path, lines, found)
     values, wrong = {}, {}
     for place, name in enumerate(found.names):
@@ -124,7 +129,13 @@ def _decode(path: Path) -> str:
 def _cells(line: str, separator: str) -> list[str]:
     if separator == " ":
         return line.split()
-    cells = next(csv.reader(io.StringIO(line), delimiter=separator), [])
+    if '"' not in line:
+        cells = line.split(separator) if line else []
+    else:
+        try:
+            cells = next(csv.reader(io.StringIO(line), delimiter=separator), [])
+        except csv.Error as error:
+            raise RigtwinError(f"a line that begins {line[:30]!r}: {error}") from None
     return [cell.strip() for cell in cells]
 
 

@@ -19,6 +19,7 @@ import numba
 from numba import types
 
 import controllers
+from rigtwin.numerics.kept_code import KeptCode
 
 COMPILED = ("numerics", "components", "simulation", "models")
 """Folders whose compiled code calls each other's."""
@@ -78,11 +79,14 @@ def kernel(function: Function) -> Function:
 
     No Python objects inside, the interpreter lock released, cached on disk.
     """
+    compiled: Any = numba.njit(nogil=True)(function)
     if _CACHE is None:
-        return cast(Function, numba.njit(nogil=True)(function))
+        return cast(Function, compiled)
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     numba.config.CACHE_DIR = str(_CACHE)  # type: ignore[attr-defined]
     try:
-        return cast(Function, numba.njit(nogil=True, cache=True)(function))
+        # As njit(cache=True) does, but with files that are checked.
+        compiled._cache = KeptCode(function)
     finally:
         numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+    return cast(Function, compiled)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+import re
+from io import BytesIO, StringIO
 from pathlib import Path
 
 import numpy as np
 from scipy.io import savemat
 
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 from rigtwin.recording.channels import channels_of
 from rigtwin.recording.reader import Recording
+
+SHORT, LONGEST = 31, 55
+"""Characters of a name that any MATLAB reads, and at most: a unit's has its topic before it, and 63
+in all."""
+MATLAB_NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{LONGEST - 1}}}")
 
 
 def export(recording: Recording, path: Path) -> None:
@@ -22,22 +31,28 @@ def export(recording: Recording, path: Path) -> None:
         raise RigtwinError(
             f"cannot export to {path.name!r}: the name must end in {' or '.join(writers)}"
         )
-    try:
-        writers[path.suffix.lower()](recording, path)
-    except OSError as error:
-        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, writers[path.suffix.lower()](recording))
 
 
-def _csv(recording: Recording, path: Path) -> None:
+def _csv(recording: Recording) -> bytes:
     there = channels_of(recording.columns)
     names = ["time", *(f"{channel.topic[1:]}.{channel.name}" for channel in there)]
     units = ["s", *(channel.unit for channel in there)]
     table = np.column_stack([recording.time, *(recording.column(c.topic, c.name) for c in there)])
-    header = ",".join(names) + "\n" + ",".join(units)
-    np.savetxt(path, table, fmt="%.15g", delimiter=",", header=header, comments="")
+    written = StringIO()
+    csv.writer(written, lineterminator="\n").writerows([names, units])
+    np.savetxt(written, table, fmt="%.15g", delimiter=",")
+    return written.getvalue().encode()
 
 
-def _mat(recording: Recording, path: Path) -> None:
+def _mat(recording: Recording) -> bytes:
+    for channel in recording.columns.values():
+        for name in channel:
+            if not MATLAB_NAME.fullmatch(name):
+                raise RigtwinError(
+                    f"channel {name!r:.60} cannot be a field in MATLAB: expected at most "
+                    f"{LONGEST} letters, digits and _ behind a letter; export to .csv"
+                )
     content: dict[str, object] = {
         "time": recording.time,
         "period": recording.period,
@@ -50,4 +65,8 @@ def _mat(recording: Recording, path: Path) -> None:
         for channel in channels_of(recording.columns)
     }
     content["units"] = {name: unit for name, unit in units.items()}
-    savemat(path, content, oned_as="column")
+    written = BytesIO()
+    # Older MATLAB reads names of up to 31 characters.
+    longest = max(map(len, units), default=0)
+    savemat(written, content, oned_as="column", long_field_names=longest > SHORT)
+    return written.getvalue()

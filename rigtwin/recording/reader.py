@@ -14,18 +14,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import zstandard
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
-from mcap.exceptions import InvalidMagic, McapError
+from mcap.exceptions import InvalidMagic
 from mcap.records import Channel, Message, Metadata, Schema
-from mcap.stream_reader import CRCValidationError, StreamReader
 from numpy.typing import NDArray
 
 from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
+from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
+from rigtwin.recording.records import Lost, read_records, unseal
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -40,18 +40,6 @@ from rigtwin.recording.schema import (
 
 if TYPE_CHECKING:
     import pandas
-
-_DAMAGE = (
-    McapError,
-    CRCValidationError,
-    struct.error,
-    zstandard.ZstdError,
-    RuntimeError,
-    EOFError,
-    UnicodeDecodeError,
-    ValueError,
-)
-"""What the mcap package raises on a file that ends or breaks in the middle."""
 
 
 @dataclass(frozen=True)
@@ -170,39 +158,44 @@ def load(path: Path) -> Recording:
     raw: dict[int, tuple[list[int], list[bytes]]] = {}
     notes: list[str] = []
     states: list[Mapping[str, str]] = []
+    lost: list[Lost] = []
+    doubtful: list[str] = []
     try:
         with path.open("rb") as file:
             if not file.read(1):
                 raise RigtwinError(f"{path} is empty; expected an MCAP recording")
             file.seek(0)
-            try:
-                for record in StreamReader(file, validate_crcs=True).records:
-                    if isinstance(record, Message):
-                        times, data = raw.setdefault(record.channel_id, ([], []))
-                        times.append(record.log_time)
-                        data.append(record.data)
-                    elif isinstance(record, Metadata):
-                        metadata[record.name] = record.metadata
-                        if record.name == TRANSITION_RECORD:
-                            states.append(record.metadata)
-                    elif isinstance(record, Schema):
-                        schemas[record.id] = record
-                    elif isinstance(record, Channel):
-                        channels[record.id] = record
-            except (InvalidMagic, struct.error):
-                if not channels and not metadata:
-                    raise RigtwinError(f"{path} is not an MCAP file") from None
-                notes.append("damaged or cut off")
-            except _DAMAGE:
-                notes.append("damaged or cut off")
+            for record in read_records(file):
+                if isinstance(record, Lost):
+                    lost.append(record)
+                elif isinstance(record, Message):
+                    times, data = raw.setdefault(record.channel_id, ([], []))
+                    times.append(record.log_time)
+                    data.append(record.data)
+                elif isinstance(record, Metadata):
+                    values, whole = unseal(record.metadata)
+                    if not whole:
+                        doubtful.append(record.name)
+                    metadata[record.name] = values
+                    if record.name == TRANSITION_RECORD and values not in states:
+                        states.append(values)
+                elif isinstance(record, Schema):
+                    schemas[record.id] = record
+                elif isinstance(record, Channel):
+                    channels[record.id] = record
+    except (InvalidMagic, struct.error):
+        raise RigtwinError(f"{path} is not an MCAP file") from None
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    if lost and not metadata and not channels:
+        raise RigtwinError(f"{path} is not an MCAP file")
 
     about = metadata.get(RECORD)
     if about is None:
         raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
     period = _period(path, about)
-    controller = _controller(path, about)
+    # What the controller was told is believed only as it was written.
+    controller = {} if RECORD in doubtful else _controller(path, about)
     tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
     for number, (times, data) in raw.items():
         channel = channels.get(number)
@@ -216,7 +209,9 @@ def load(path: Path) -> Recording:
                 "expected ns since the start"
             )
         values = _decode(path, channel, schemas.get(channel.schema_id), data)
-        tables[channel.topic] = (np.array(times, np.int64), values)
+        stamps = np.array(times, np.int64)
+        _look_at_order(path, channel.topic, stamps, notes)
+        tables[channel.topic] = (stamps, values)
     if not tables:
         said = (
             f"; it ended: {metadata[END_RECORD].get('reason', '')}"
@@ -225,28 +220,45 @@ def load(path: Path) -> Recording:
         )
         raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
     time, columns = _align(tables, notes)
+    notes[:0] = _describe_damage(lost, doubtful, time)
     if not len(time):
         raise RigtwinError(
             f"{path}: {' and '.join(tables)} have no tick in common; "
             "expected the same times on each"
         )
     _look_at_times(path, time, period, notes)
-    if notes and "cut off" in notes[0]:
-        notes[0] += f"; readable up to {time[-1]:.3f} s"
     return Recording(
         path=path,
-        machine=about.get("machine", DEFAULT_MACHINE),
-        experiment=about.get("experiment", ""),
+        machine=printable(about.get("machine", DEFAULT_MACHINE)),
+        experiment=printable(about.get("experiment", "")),
         period=period,
         time=time,
         columns=columns,
         controller=controller,
-        twin=metadata.get(TWIN_RECORD, {}),
-        end=metadata.get(END_RECORD, {}).get("reason", ""),
+        twin=_printable(metadata.get(TWIN_RECORD, {})),
+        end=printable(metadata.get(END_RECORD, {}).get("reason", "")),
         notes=tuple(notes),
         transitions=_sort(states),
-        lateness=metadata.get(LATENESS_RECORD, {}),
+        lateness=_printable(metadata.get(LATENESS_RECORD, {})),
     )
+
+
+def _describe_damage(lost: list[Lost], doubtful: list[str], time: Array) -> list[str]:
+    """What of a file cannot be read, or not believed, for people."""
+    notes = []
+    if any(each.first is None for each in lost):
+        end = f"; readable up to {time[-1]:.3f} s" if len(time) else ""
+        notes.append(f"damaged or cut off{end}")
+    for first, last in dict.fromkeys((each.first, each.last) for each in lost):
+        if first is not None and last is not None:
+            notes.append(f"damaged: what was recorded from {first:.3f} to {last:.3f} s is lost")
+    if RECORD in doubtful:
+        notes.append(
+            "damaged: what it says of the test has a wrong checksum; the controller's "
+            "settings are left out"
+        )
+    notes += [f"damaged: {name} has a wrong checksum" for name in doubtful if name != RECORD]
+    return notes
 
 
 def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
@@ -270,19 +282,24 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
     found: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
-            for record in StreamReader(file, validate_crcs=True).records:
+            for record in read_records(file):
                 if isinstance(record, Metadata) and record.name == TRANSITION_RECORD:
-                    found.append(record.metadata)
+                    values, _ = unseal(record.metadata)
+                    found += [values] if values not in found else []
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except _DAMAGE:
+    except (InvalidMagic, struct.error):
         pass
     return _sort(found)
 
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """By time: on a full disk the last ones stand in the room kept near the file's beginning."""
-    return tuple(sorted(transitions, key=_moment))
+    return tuple(sorted(map(_printable, transitions), key=_moment))
+
+
+def _printable(values: Mapping[str, str]) -> dict[str, str]:
+    return {printable(name): printable(value) for name, value in values.items()}
 
 
 def _moment(transition: Mapping[str, str]) -> float:
@@ -318,7 +335,10 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         raise RigtwinError(
             f"{path}: metadata config is not a JSON object with an object 'controller'"
         ) from None
-    return controller
+    return {
+        printable(name): printable(value) if isinstance(value, str) else value
+        for name, value in controller.items()
+    }
 
 
 def _decode(
@@ -374,7 +394,11 @@ def _decode(
 def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
     """Fields that hold numbers throughout."""
     return (
-        [name for name in rows[0] if all(isinstance(row.get(name), int | float) for row in rows)]
+        [
+            name
+            for name in rows[0]
+            if name.isprintable() and all(isinstance(row.get(name), int | float) for row in rows)
+        ]
         if rows
         else []
     )
@@ -415,6 +439,18 @@ def _protobuf(
         return {name: getattr(message, name) for name in names}
 
     return names, [item.number for item in found.fields] if doubles else [], decode
+
+
+def _look_at_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
+    """Stamps as the messages stand in the file. Raises RigtwinError if they run backwards."""
+    falls = int(np.sum(np.diff(stamps) < 0))
+    if 2 * falls > len(stamps) - 1:
+        raise RigtwinError(
+            f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
+            f"{stamps[-1] * 1e-9:.3f} s; expected rising times"
+        )
+    if falls:
+        notes.append(f"{falls} messages on {topic} come after later ones; sorted by time")
 
 
 def _align(

@@ -6,12 +6,14 @@ encoded and decoded at once.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 from google.protobuf import descriptor_pb2
 from numpy.typing import NDArray
 
+from rigtwin.errors import RigtwinError
 from rigtwin.recording.channels import CHANNELS
 
 WRITTEN_FORMAT = "1"
@@ -30,12 +32,31 @@ CARD_RECORD = "rigtwin.card"
 LATENESS_RECORD = "rigtwin.lateness"
 """Name of the metadata record that says how late the ticks of a loop in real time were."""
 
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+"""Of a field, as protobuf takes it."""
 _DOUBLE_WIRE_TYPE = 1
 
 
 def type_name(topic: str) -> str:
     """Full name of a topic's message type, e.g. `rigtwin.Command`."""
     return "rigtwin." + topic.strip("/").capitalize()
+
+
+def check_names(topic: str, names: Sequence[str]) -> None:
+    """Raises RigtwinError for names that the fields of a topic cannot have together: a recording
+    with them could be written and not be read."""
+    for name in names:
+        if not NAME.fullmatch(name):
+            raise RigtwinError(
+                f"{topic}.{name}: expected a name of letters without accents, digits and _"
+            )
+    # Readers tell fields apart by their names in camel case too.
+    seen: dict[str, str] = {}
+    for name in names:
+        same = re.sub(r"_(.?)", lambda found: found.group(1).upper(), name)
+        if same in seen:
+            raise RigtwinError(f"{topic} cannot have both {seen[same]} and {name}; rename one")
+        seen[same] = name
 
 
 def descriptor(topic: str, names: Sequence[str]) -> bytes:

@@ -45,12 +45,14 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.owner import open_alone
+from rigtwin.recording.records import seal
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
     RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
+    check_names,
     descriptor,
     tags,
     type_name,
@@ -112,6 +114,8 @@ class Writer:
         topic, by default those of the channel table. Raises RigtwinError.
         """
         self._fields = dict(fields or {})
+        for topic, names in self._fields.items():
+            check_names(topic, names)
         try:
             self._file: BinaryIO = open_alone(path)
         except OSError as error:
@@ -158,7 +162,7 @@ class Writer:
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record now."""
-        record = _encode(Metadata(name=name, metadata=dict(values)))
+        record = _encode(Metadata(name=name, metadata=seal(values)))
         if self._full:
             self._put_into_room(record)
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rigtwin.errors import RigtwinError
+from rigtwin.files import printable, write_whole
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
 COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
 RIG_SENSORS = ("structure_lvdt", "load_cell")
 """By which a quarter car's recording is known."""
+MOST_PANELS = 40
+LARGEST = 1e100
+"""A picture's axis has no room for more."""
 KINDS = (".png", ".svg", ".pdf")
 
 
@@ -182,14 +187,25 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
         for panel in panels
     ]
     there = [(title, traces) for title, traces in there if traces]
+    left_out = f" · {MOST_PANELS} of {len(there)} channels" if len(there) > MOST_PANELS else ""
+    there = there[:MOST_PANELS]
     figure = Figure(figsize=(11, 1.9 * len(there) + 0.8), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (title, traces) in zip(axes, there, strict=True):
         for trace in traces:
             signal = trace.value(*(recording.column(*channel)[ticks] for channel in trace.needs))
-            axis.plot(time, signal, color=trace.colour, linewidth=0.9, label=trace.label)
-        axis.set_ylabel(title, fontsize=9)
+            if np.max(np.abs(signal), initial=0.0, where=~np.isnan(signal)) > LARGEST:
+                raise RigtwinError(
+                    f"{recording.path}: {title} goes beyond {LARGEST:g}, which cannot be drawn"
+                )
+            axis.plot(
+                *_part(time, signal, recording.period),
+                color=trace.colour,
+                linewidth=0.9,
+                label=trace.label,
+            )
+        axis.set_ylabel(title, fontsize=9, parse_math=False)
         axis.grid(alpha=0.3)
         axis.legend(
             loc="lower right",
@@ -202,8 +218,16 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
         axis.margins(x=0)
     axes[-1].set_xlabel("time, s")
     ending = f" · {recording.end}" if recording.end else ""
-    figure.suptitle(f"{recording.path.name} · {recording.experiment}{ending}", fontsize=11)
+    about = f"{recording.path.name} · {recording.experiment}{ending}{left_out}"
+    about = printable(about.encode("utf-8", "replace").decode())
+    figure.suptitle(about, fontsize=11, parse_math=False)
     save(figure, out)
+
+
+def _part(time: Array, signal: Array, period: float) -> tuple[Array, Array]:
+    """A signal without a line across what was not recorded."""
+    gaps = np.nonzero(np.diff(time) > 1.5 * period)[0] + 1
+    return np.insert(time, gaps, np.nan), np.insert(signal, gaps, np.nan)
 
 
 def check_ending(out: Path) -> None:
@@ -214,7 +238,6 @@ def check_ending(out: Path) -> None:
 
 def save(figure: Figure, out: Path) -> None:
     """Writes a figure. Raises RigtwinError if the file cannot be written."""
-    try:
-        figure.savefig(out, dpi=110)
-    except OSError as error:
-        raise RigtwinError(f"cannot write {out}: {error.strerror}") from None
+    drawn = BytesIO()
+    figure.savefig(drawn, dpi=110, format=out.suffix[1:].lower())
+    write_whole(out, drawn.getvalue())

@@ -57,7 +57,11 @@ class FormulaDemands:
         for name, text in self.formulas.items():
             compiled = formula(text, {})
             inputs = [time] * max(len(compiled.inputs), 1)
-            found[name] = compiled.replayed({}, inputs, configuration.timing.period)
+            values = compiled.replayed({}, inputs, configuration.timing.period)
+            if not np.isfinite(values).all():
+                at = time[np.argmin(np.isfinite(values))]
+                raise RigtwinError(f"demand {name}: {text!r:.60} is not finite at {at:.3f} s")
+            found[name] = values
         return found
 
 

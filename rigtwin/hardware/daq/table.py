@@ -31,6 +31,8 @@ HEADROOM = 1.05
 seen to exceed it."""
 _ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
 _DIGITAL = re.compile(r"port\d/line\d{1,2}")
+OLDEST = 10 * 365
+"""Days after which a calibration is none."""
 _FREE_TEXT = ("device", "address", "timing", "calibrated", "operator", "note")
 _TIMINGS = ("hardware", "software")
 
@@ -306,6 +308,11 @@ def require_trust(table: ChannelTable, today: date) -> None:
         ) from None
     if calibrated > today:
         raise RigtwinError(f"card.calibrated = {table.calibrated}: that is after today, {today}")
+    if (today - calibrated).days > OLDEST:
+        raise RigtwinError(
+            f"card.calibrated = {table.calibrated}: that is more than {OLDEST // 365} years ago; "
+            "rigtwin card check calibrates anew"
+        )
     if not table.operator.strip():
         raise RigtwinError("card.operator is missing: expected who calibrated it")
 
@@ -339,5 +346,7 @@ def to_toml(table: ChannelTable) -> str:
 
 
 def _quote(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    # What came in another encoding than UTF-8 has no sign of its own.
+    known = text.encode("utf-8", "replace").decode()
+    escaped = known.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'

@@ -21,7 +21,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.virtual import DriverError, VirtualCard
 
 SERVICE = "nidaqmx_grpc.NiDAQmx"
-LOCAL = "localhost"
+LOCAL = "127.0.0.1"
+"""By number: what listens at a name may listen at one of its addresses alone."""
 
 
 class CardError(grpc.RpcError):

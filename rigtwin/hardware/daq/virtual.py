@@ -202,6 +202,12 @@ class VirtualCard:
 
     def _await(self, request: Message) -> None:
         """Outside the lock: others may write while a reader waits for its sample."""
+        if request.num_samps_per_chan > BUFFERED:
+            raise DriverError(
+                BAD_VALUE,
+                "Requested value is not a supported value for this property. Samples: "
+                f"{request.num_samps_per_chan}; the buffer holds {BUFFERED}",
+            )
         task = self._tasks.get(request.task.name)
         if task is not None and task.running and task.clocked and self._begun:
             self._time.wait(task.next + max(request.num_samps_per_chan, 1) - 1)

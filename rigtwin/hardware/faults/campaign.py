@@ -209,6 +209,8 @@ def try_fault(
     ------
     RigtwinError
         Only if the session could not even begin.
+    KeyboardInterrupt
+        If an operator ended it who is none of the fault.
     """
     test = plan_test(fault, experiment, table)
     period, name = test.configuration.timing.period, fault.kind.name
@@ -226,9 +228,15 @@ def try_fault(
         virtual.glitch = (name, fault.at)
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
+    interrupted: list[str] = []
     with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
 
         def stop() -> str | None:
+            asked = find_request()
+            if asked is not None and (fault.kind.place != "operator" or virtual.tick < fault.at):
+                # Somebody at the keyboard, who means the campaign and not this session.
+                interrupted.append(asked)
+                return asked
             if virtual.tick >= fault.at:
                 if name == "operator's signal" and virtual.tick == fault.at:
                     signals = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -245,8 +253,14 @@ def try_fault(
 
         fails = fault.kind.place in ("controller", "loop")
         updating = _make_failing_update(fault, virtual) if fails else healthy
-        record_at_leisure(card, test, path, stop, show_full_disk, updating)
+        try:
+            record_at_leisure(card, test, path, stop, show_full_disk, updating)
+        except RigtwinError:
+            if not interrupted:
+                raise
     stop_file.unlink(missing_ok=True)
+    if interrupted:
+        raise KeyboardInterrupt(interrupted[0])
     return judge(fault, test, bench, path)
 
 

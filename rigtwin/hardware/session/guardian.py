@@ -29,6 +29,7 @@ from rigtwin.hardware.session.guardian_settings import (
 )
 from rigtwin.hardware.session.recorder import ROW
 from rigtwin.hardware.supervisor import Transition
+from rigtwin.interruptions import held_back
 
 STARTED = 30.0
 """s within which the guardian must be there."""
@@ -50,13 +51,14 @@ class Guardian:
         arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
-            self._process.start()
+            with held_back():
+                self._process.start()
             theirs.close()
             if not self._pipe.poll(STARTED):
                 raise RigtwinError("the guardian process does not start")
             said = self._answer()
             if said != "ready":
-                raise RigtwinError(str(said))
+                raise RigtwinError(said or "the guardian process ended before the session began")
         except BaseException:
             self._release()
             raise

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
 from rigtwin.numerics.arrays import Array
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
@@ -175,10 +177,9 @@ def draw(found: StabilityMap, out: Path) -> None:
     lag = "" if found.critical is not None else f", lags of {1e3 * found.lag:g} ms"
     axes.set_title(f"stability of the {found.model} model{lag}", fontsize=11)
     axes.legend(loc="upper right", fontsize=9)
-    try:
-        figure.savefig(out, dpi=120)
-    except OSError as error:
-        raise RigtwinError(f"cannot write {out}: {error.strerror}") from None
+    drawn = BytesIO()
+    figure.savefig(drawn, dpi=120, format=out.suffix[1:].lower())
+    write_whole(out, drawn.getvalue())
 
 
 def _change(setting: tuple[QuarterCar, float], name: str, value: float) -> tuple[QuarterCar, float]:

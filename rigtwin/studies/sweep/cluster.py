@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import socket
 import time
 from collections import deque
 from collections.abc import Callable
@@ -18,6 +20,7 @@ ANSWERS = 5.0
 """s that a scheduler may take to answer."""
 PATIENCE = 60.0
 """s without any worker until a sweep gives up."""
+ADDRESS = re.compile(r"(?:[a-z]+://)?\[?(?P<host>[^\[\]/\s]+)\]?:(?P<port>\d+)/?")
 KEPT = "what is done is kept, run again to go on"
 
 
@@ -47,6 +50,21 @@ class _Remote:
         self.future.add_done_callback(lambda _: fn(self))
 
 
+def _knock(address: str) -> None:
+    """Raises RigtwinError unless something listens there: dask's own client takes long to find out,
+    and complains again when it ends."""
+    found = ADDRESS.fullmatch(address)
+    expected = "expected a scheduler's address, such as tcp://host:8786"
+    if found is None:
+        raise RigtwinError(f"no cluster at {address!r}: {expected}")
+    try:
+        with socket.create_connection((found["host"], int(found["port"])), ANSWERS):
+            pass
+    except (OSError, OverflowError) as error:
+        said = getattr(error, "strerror", None) or error
+        raise RigtwinError(f"no cluster at {address}: {said}; {expected}") from None
+
+
 class Cluster:
     """The workers of a cluster.
 
@@ -73,6 +91,7 @@ class Cluster:
             raise RigtwinError(missing) from None
         self.lost: tuple[type[BaseException], ...] = (KilledWorker,)
         self.address = address
+        _knock(address)
         try:
             self._client = Client(address, timeout=ANSWERS, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:

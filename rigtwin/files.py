@@ -1,0 +1,74 @@
+"""Files: written whole or not at all; TOML as its standard has it."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from rigtwin.errors import RigtwinError
+
+LONGEST = 100
+"""Characters of a name that its half-written copy keeps."""
+INTEGER = 64
+"""Bits of an integer in TOML."""
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Writes a file that stays as it was, or away, if that fails half-way.
+
+    Parameters
+    ----------
+    path
+        Where to. What is no plain file, such as /dev/stdout, is written to directly.
+    content
+        Its bytes, or its text, which becomes UTF-8; what is none, such as the name of a file in
+        another encoding, becomes question marks.
+
+    Raises
+    ------
+    RigtwinError
+        If it cannot be written.
+    """
+    data = content.encode("utf-8", "replace") if isinstance(content, str) else content
+    try:
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            target.write_bytes(data)
+            return
+        beside = target.with_name(f"{target.name[:LONGEST]}.{uuid4().hex[:8]}.part")
+        try:
+            beside.write_bytes(data)
+            if target.exists():
+                shutil.copymode(target, beside)
+            beside.replace(target)
+        except BaseException:
+            with suppress(OSError):
+                beside.unlink()
+            raise
+    except OSError as error:
+        raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML. Raises ValueError if it is none; integers have 64 bits there, and
+    Python cannot even print those of thousands of digits."""
+    document = tomllib.loads(text)
+    waiting: list[object] = [document]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, dict):
+            waiting += each.values()
+        elif isinstance(each, list):
+            waiting += each
+        elif isinstance(each, int) and each.bit_length() > INTEGER:
+            raise ValueError(f"an integer of {each.bit_length()} bits; expected {INTEGER} at most")
+    return document
+
+
+def printable(text: str) -> str:
+    """A text of another program in one line, without what would command a terminal."""
+    return "".join(each if each.isprintable() else "?" for each in text)

@@ -1,0 +1,118 @@
+"""The records of an MCAP file, whatever of it is whole: damage costs the chunk that it hits and not
+what comes after it; and metadata that say of themselves whether they are as written."""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import zstandard
+from mcap.exceptions import InvalidMagic, McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+
+DAMAGE = (
+    McapError,
+    CRCValidationError,
+    struct.error,
+    zstandard.ZstdError,
+    RuntimeError,
+    EOFError,
+    UnicodeDecodeError,
+    ValueError,
+    MemoryError,
+)
+"""What the mcap package raises on a file that ends or breaks in the middle."""
+_COMPRESSION = b"\x04\x00\x00\x00zstd"
+"""How a chunk names its compression, and where that stands in it."""
+_PLACE = 37
+_CHECKSUM = "crc32"
+"""Key of metadata that holds the checksum of the others."""
+
+
+@dataclass(frozen=True)
+class Lost:
+    """Something that cannot be read. first, last: s, of a chunk; None of anything else."""
+
+    first: float | None = None
+    last: float | None = None
+
+
+def read_records(file: BinaryIO) -> Iterator[McapRecord | Lost]:
+    """Everything that can be read of a file, in order, chunks taken apart.
+
+    Parameters
+    ----------
+    file
+        Open at its beginning, and seekable.
+
+    Yields
+    ------
+    McapRecord or Lost
+        The records, and where some are missing. A record may come twice around a damaged place.
+
+    Raises
+    ------
+    InvalidMagic, struct.error
+        If it does not begin as an MCAP file does.
+    """
+    size = os.fstat(file.fileno()).st_size
+    reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
+    known, resumed, begun = 0, -1, False
+    while True:
+        try:
+            for record in reader.records:
+                begun = True
+                if not isinstance(record, Chunk):
+                    yield record
+                    continue
+                try:
+                    parts = breakup_chunk(record, validate_crc=True)
+                except DAMAGE:
+                    yield Lost(1e-9 * record.message_start_time, 1e-9 * record.message_end_time)
+                    continue
+                known = file.tell()
+                yield from parts
+            return
+        except DAMAGE as error:
+            if not begun and isinstance(error, InvalidMagic | struct.error):
+                raise
+            yield Lost()
+            found = _find_chunk(file, max(known, resumed + 1))
+            if found is None:
+                return
+            resumed = found
+            file.seek(found)
+            reader = StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=size)
+
+
+def _find_chunk(file: BinaryIO, start: int) -> int | None:
+    """Where the next compressed chunk begins; None if there is none."""
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        at = data.find(_COMPRESSION, start + _PLACE)
+        while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
+            at = data.find(_COMPRESSION, at + 1)
+        return at - _PLACE if at >= 0 else None
+
+
+def seal(values: Mapping[str, str]) -> dict[str, str]:
+    """Metadata with a checksum of themselves."""
+    return {**values, _CHECKSUM: _checksum(values)}
+
+
+def unseal(values: Mapping[str, str]) -> tuple[dict[str, str], bool]:
+    """Metadata without their checksum, and whether they are as they were written, as far as that
+    was said."""
+    bare = {name: value for name, value in values.items() if name != _CHECKSUM}
+    return bare, values.get(_CHECKSUM, _checksum(bare)) == _checksum(bare)
+
+
+def _checksum(values: Mapping[str, str]) -> str:
+    return f"{zlib.crc32(json.dumps(values, sort_keys=True).encode()):08x}"

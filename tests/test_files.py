@@ -1,0 +1,127 @@
+"""Files of results: whole or not there; nothing in them commands a terminal or a parser."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from rigtwin.cli import main
+from rigtwin.errors import RigtwinError
+from rigtwin.files import printable, write_whole
+from rigtwin.recording import Writer, load
+from rigtwin.recording.export import export
+from rigtwin.recording.schema import END_RECORD
+from rigtwin.render.plot import _part, draw
+from rigtwin.studies.sweep.cluster import Cluster
+
+
+def recording_of(path: Path, values: np.ndarray, names: list[str], machine: str = "bench"):
+    """Of sensors; values: shape (ticks, sensors)."""
+    with Writer(path, machine, 1e-3, {}, machine, {"/sensor": names}) as writer:
+        writer.append(sensor=values)
+    return load(path)
+
+
+def test_a_file_that_cannot_be_finished_stays_as_it_was(tmp_path, monkeypatch):
+    path = tmp_path / "a.html"
+    write_whole(path, "before")
+
+    def full(_: Path, __: bytes) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(RigtwinError, match=r"cannot write .*a\.html: No space left on device"):
+        write_whole(path, "after")
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_links_and_devices_stay_what_they_are(tmp_path):
+    link, path = tmp_path / "link", tmp_path / "file"
+    link.symlink_to(path)
+    write_whole(link, "through")
+    assert link.is_symlink()
+    assert path.read_text() == "through"
+    write_whole(Path(os.devnull), "nowhere")
+    assert not Path(os.devnull).is_file()
+    write_whole(path, "name \udcff")
+    assert path.read_text() == "name ?"
+
+
+def test_what_a_recording_says_of_itself_commands_no_terminal(tmp_path, capsys):
+    path = tmp_path / "e.mcap"
+    with Writer(path, "\x1b[31mred\n\x07", 1e-3, {"\x1bkey": "\x1b"}, "\x1b[2J") as writer:
+        writer.append(sensor=np.arange(1200.0).reshape(300, 4))
+        writer.add_metadata(END_RECORD, {"reason": "\x9b31m"})
+        writer.finish("\x1b[0m")
+    assert main(["info", str(path)]) == 0
+    assert printable(capsys.readouterr().out.replace("\n", "")).count("\x1b") == 0
+    assert load(path).machine == "?[2J"
+    assert main(["info", str(tmp_path / "\x1b[31m.mcap")]) == 1
+    assert "\x1b" not in capsys.readouterr().err
+
+
+def test_names_that_matlab_does_not_take_are_said(tmp_path):
+    long, values = "x" * 40, np.arange(600.0).reshape(300, 2)
+    good = recording_of(tmp_path / "g.mcap", values, [long, "ok"])
+    export(good, tmp_path / "g.mat")
+    assert np.array_equal(
+        loadmat(tmp_path / "g.mat", simplify_cells=True)["sensor"][long], values[:, 0]
+    )
+    for name in ("_lead", "x" * 56):
+        bad = recording_of(tmp_path / "b.mcap", values, [name, "ok"])
+        with pytest.raises(RigtwinError, match="cannot be a field in MATLAB"):
+            export(bad, tmp_path / "b.mat")
+    assert not (tmp_path / "b.mat").exists()
+
+
+def test_a_header_with_commas_is_quoted(tmp_path):
+    recording = recording_of(tmp_path / "g.mcap", np.ones((300, 1)), ["a"])
+    odd = replace(recording, columns={"/sensor": {"a,b": np.ones(300)}})
+    export(odd, tmp_path / "g.csv")
+    assert (tmp_path / "g.csv").read_text().splitlines()[0] == 'time,"sensor.a,b"'
+
+
+def test_pictures_of_odd_recordings(tmp_path):
+    values = np.array([[1e308], [-1e308]] * 150)
+    with pytest.raises(RigtwinError, match=r"a goes beyond 1e\+100, which cannot be drawn"):
+        draw(recording_of(tmp_path / "h.mcap", values, ["a"]), tmp_path / "h.png")
+    tex = recording_of(tmp_path / "$\\frac{$.mcap", np.ones((300, 1)), ["a"], "$\\frac{$")
+    draw(tex, tmp_path / "t.svg")
+    line, gap = np.arange(5.0), np.array([0.0, 1.0, 2.0, 7.0, 8.0])
+    assert np.isnan(_part(gap, line, 1.0)[1]).tolist() == [False] * 3 + [True] + [False] * 2
+    assert _part(line, line, 1.0)[0].tolist() == line.tolist()
+    many = recording_of(tmp_path / "m.mcap", np.ones((300, 45)), [f"c{n}" for n in range(45)])
+    draw(many, tmp_path / "m.svg")
+    assert (tmp_path / "m.svg").stat().st_size > 0
+
+
+@pytest.mark.parametrize("address", ["nonsense", "tcp://", "tcp://127.0.0.1:1", "a:99999999999"])
+def test_a_cluster_that_is_not_there_is_one_line(address):
+    with pytest.raises(RigtwinError, match="expected a scheduler's address"):
+        Cluster(address)
+
+
+def test_streams_that_are_closed_stop_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    path = recording_of(tmp_path / "g.mcap", np.ones((300, 1)), ["a"]).path
+    assert main(["info", str(path)]) == 0
+    assert main(["info", str(tmp_path / "absent.mcap")]) == 1
+
+    class Closed:
+        def write(self, _: str) -> int:
+            raise BrokenPipeError
+
+        def flush(self) -> None: ...
+
+        def fileno(self) -> int:
+            raise OSError
+
+    monkeypatch.setattr(sys, "stdout", Closed())
+    assert main(["--version"]) == 1

@@ -1,0 +1,39 @@
+"""Ctrl-C in a terminal: every process gets it, and one line is said."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from rigtwin.cli import main
+from rigtwin.interruptions import held_back
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
+def test_a_process_started_meanwhile_gets_no_interruption():
+    code = "import os, signal; os.kill(os.getpid(), signal.SIGINT); print('still there')"
+    with held_back():
+        started = subprocess.Popen([sys.executable, "-S", "-c", code], stdout=subprocess.PIPE)
+    assert started.communicate(timeout=20)[0] == b"still there\n"
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
+def test_the_one_that_starts_it_gets_it_behind():
+    reached = []
+    with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
+        os.kill(os.getpid(), signal.SIGINT)
+        reached.append(True)
+    assert reached
+
+
+def test_an_interruption_while_packages_are_imported_is_one_line(monkeypatch, capsys):
+    def interrupt(_: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rigtwin.cli.import_module", interrupt)
+    assert main(["list"]) == 130
+    assert capsys.readouterr().err == "rigtwin: interrupted\n"
