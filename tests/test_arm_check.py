@@ -62,7 +62,8 @@ def test_motors_put_in_what_energy_and_friction_take(machine):
     time = np.linspace(0.0, 4.0, 40001)
     w = 2.0 * np.pi / 4.0 * np.arange(1, len(GUIDES[machine]) + 1)[:, None]
     position = 0.3 * np.sin(w * time)
-    travel = Travel(position, 0.3 * w * np.cos(w * time), -0.3 * w**2 * np.sin(w * time))
+    rate = np.asarray(0.3 * w * np.cos(w * time), float)
+    travel = Travel(position, rate, np.asarray(-0.3 * w**2 * np.sin(w * time), float))
     whole = NOMINAL[machine]
     bare = whole._replace(drags=tuple(Drag() for _ in whole.drags), belt=Drag())
     power = np.sum(drive(bare, travel) * travel.speed, axis=0)
@@ -127,7 +128,8 @@ def test_answers_are_scored_by_the_table():
         return {"effects": said, "verdict": verdict, "seconds": 1.0}
 
     both = answer("coulomb@shoulder", "gain@torque_2")
-    assert is_right(pair, both) and not is_wrong(pair, both)
+    assert is_right(pair, both)
+    assert not is_wrong(pair, both)
     assert not is_right(pair, answer("coulomb@shoulder"))
     assert is_wrong(pair, answer("coulomb@elbow", "gain@torque_2"))
     none = ArmCase("arm_2", "none", (), 1, 1)

@@ -3,8 +3,6 @@ MuJoCo's own."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest

@@ -53,7 +53,9 @@ def slides(folder: Path, replay: str, extra: str = "") -> Machine:
     return described(folder, "slides", SLIDES.format(extra=extra), SLIDES_TOML + replay)
 
 
-def coupled(machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1) -> CoupledModel:
+def coupled(
+    machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1
+) -> CoupledModel:
     record = recording(machine, columns)
     model = model_of(machine, record, machine.configuration_of(record), steps)
     assert isinstance(model, CoupledModel)
@@ -72,7 +74,9 @@ def test_a_double_pendulum_pushed_at_both_joints_goes_as_lagrange_has_it(tmp_pat
         found = coupled(machine, record, steps).predict(machine.plant)
         errors.append(float(np.max(np.abs(found - expected))))
     # Of first order: the speed half a step before the start is taken for that at the start.
-    assert errors[0] < 5e-3 and errors[1] < 0.6 * errors[0] and errors[2] < 0.4 * errors[0]
+    assert errors[0] < 5e-3
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.4 * errors[0]
 
 
 def test_two_masses_and_a_spring_go_as_their_modes_do(tmp_path: Path) -> None:
@@ -80,14 +84,19 @@ def test_two_masses_and_a_spring_go_as_their_modes_do(tmp_path: Path) -> None:
     push = np.zeros(1000)
     push[100:] = 1.5
     still = np.zeros(1000)
-    record = {"/command": {"push": push}, "/sensor": {"x_one": still, "x_two": still, "apart": still}}
+    record = {
+        "/command": {"push": push},
+        "/sensor": {"x_one": still, "x_two": still, "apart": still},
+    }
 
     def slope(t: float, y: np.ndarray) -> list[float]:
         pull = 80.0 * (y[1] - y[0]) + 1.5 * (y[3] - y[2])
         force = 3.0 if t >= 100 * PERIOD else 0.0
         return [y[2], y[3], pull / 2.0, (force - pull) / 3.5]
 
-    exact = solve_ivp(slope, (0.0, TIME[-1]), np.zeros(4), t_eval=TIME, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    exact = solve_ivp(
+        slope, (0.0, TIME[-1]), np.zeros(4), t_eval=TIME, rtol=1e-10, atol=1e-12, max_step=1e-3
+    )
     found = coupled(machine, record).move(machine.plant)[0]
     assert np.max(np.abs(found - exact.y[:2])) < 2e-3 * np.max(np.abs(exact.y[:2]))
 
@@ -117,9 +126,7 @@ def test_what_several_rub_on_one_body_adds_up(tmp_path: Path) -> None:
 
 
 def test_a_joint_that_is_led_takes_the_force_that_mujoco_says(tmp_path: Path) -> None:
-    led = (
-        'free = ["elbow"]\nmoved_by = ["angle_1", "drive_2"]\nobserve = ["angle_2", "torque_1"]\n'
-    )
+    led = 'free = ["elbow"]\nmoved_by = ["angle_1", "drive_2"]\nobserve = ["angle_2", "torque_1"]\n'
     head = ARM_TOML.split("free =")[0].replace(
         "[[replays]]", 'torque_1 = { sensor = "torque_1", effects = [] }\n[[replays]]'
     )

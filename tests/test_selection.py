@@ -121,10 +121,10 @@ def swing(start: np.ndarray) -> np.ndarray:
 
 
 def test_a_free_swings_start_is_found_beneath_coarse_bits():
-    truth = (0.6, 0.3)
+    truth = np.array((0.6, 0.3))
     measured = np.round(swing(truth) / 1.5e-3) * 1.5e-3
     first, error = np.array(read_start(measured, 5e-3)), np.array((1.5e-3, 0.1))
     slopes = find_slopes(swing, first, error)
     found = fit_start(swing, measured, first, error, 1e-3, slopes)
-    assert found == pytest.approx(np.array(truth), abs=2e-3)
+    assert found == pytest.approx(truth, abs=2e-3)
     assert abs(found[1] - truth[1]) < abs(first[1] - truth[1])

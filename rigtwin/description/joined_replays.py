@@ -110,7 +110,7 @@ class JoinedReplays:
         free: tuple[str, ...],
     ) -> ReplayOf | None:
         try:
-            first = [self._mechanism.joint(joint) for joint in joints][0]
+            first = next(self._mechanism.joint(joint) for joint in joints)
         except RigtwinError as error:
             self._mistakes.note(where, str(error))
             return None

@@ -97,8 +97,8 @@ class ReplayOf:
     them. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
     position actuator its motion through that actuator, a force actuator pushes it. closed: whether
     the controller commands that actuator, or the recording does; band: Hz up to which its signals
-    are judged, None for all that is measured; rotor: the component that the joint's motor turns; free:
-    joints that nothing prescribes, which go as the forces on them have it."""
+    are judged, None for all that is measured; rotor: the component that the joint's motor turns;
+    free: joints that nothing prescribes, which go as the forces on them have it."""
 
     name: str
     joint: Joint

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from rigtwin.components import Effect, Guide
+from rigtwin.description.machine import Structure
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge
@@ -35,6 +36,8 @@ GATEWAY_STARTS = 3
 """Sizes of the gateway that they are fitted together from."""
 GATEWAY = "coulomb"
 """Kind without which others do nothing."""
+DROPPED_AT_ONCE, LEAST_MISSED = 6, 3
+"""Effects beyond which not every one is left out in turn, but those that are missed least."""
 SECOND_ORDER = ("two_lags", "resonance")
 """Kinds that a lag and a delay may be taken for."""
 BEHIND = ("compliance", "backlash")
@@ -120,10 +123,7 @@ def fit_stepwise(singles: Sequence[Fit], growth: Growth, threads: Threads) -> li
 def _fit_regulars(growth: Growth, threads: Threads) -> list[Fit]:
     """What nearly every machine has, all of it together, and then without one after another: what
     is found in turn may stand for several of them at once."""
-    chosen: list[Effect] = []
-    for effect in growth.effects:
-        if effect.kind.name in REGULAR and effect.kind not in {each.kind for each in chosen}:
-            chosen.append(effect)
+    chosen = _choose_regulars(growth)
     if len(chosen) < 2:
         return []
     search = growth.search
@@ -147,8 +147,28 @@ def _fit_regulars(growth: Growth, threads: Threads) -> list[Fit]:
             for _, rest, values in without_each(found[-1])
             if is_possible(rest, search.plant)
         ]
+        if len(fewer) > DROPPED_AT_ONCE:
+            fewer = sorted(fewer, key=lambda pair: _misfit_of(search, *pair))[:LEAST_MISSED]
         found.append(min(threads.map(lambda pair: search.refine(*pair), fewer), key=growth.cost))
     return [fit for fit in found if not within_tolerance(fit, search.evidence, growth.thresholds)]
+
+
+def _choose_regulars(growth: Growth) -> list[Effect]:
+    """The regular effects: one of each kind, and where joints act on each other each at every
+    guide, as any of them moves all."""
+    coupled = growth.fitter.evidence.machine.structure is Structure.COUPLED
+    chosen: dict[object, Effect] = {}
+    for effect in growth.effects:
+        if effect.kind.name in REGULAR:
+            at = effect.group if coupled and effect.of is Guide else ""
+            chosen.setdefault((effect.kind, at), effect)
+    return list(chosen.values())
+
+
+def _misfit_of(search: Fitter, effects: Sequence[Effect], values: Values) -> float:
+    """Of an explanation with these very values."""
+    plant = with_values(search.plant, tuple(effects), values)
+    return search.space.misfit(search.evidence.residual(plant))
 
 
 def _leaders(level: Sequence[Fit], nothing: float) -> list[Fit]:

@@ -25,7 +25,7 @@ from rigtwin.components import (
     Rotor,
     measures,
 )
-from rigtwin.components.body import list_surplus, turn_gravity, list_parameters
+from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
@@ -213,9 +213,7 @@ class CoupledModel:
                 position = recover_motion(mover, signal, self._period)
             position = (position - self._zero[name]) / self._along[name][place]
             position = np.append(position, 2.0 * position[-1] - position[-2])
-            found[place] = (
-                position if self._steps == 1 else CubicSpline(time, position)(fine)
-            )
+            found[place] = position if self._steps == 1 else CubicSpline(time, position)(fine)
         return found
 
     def _push(self, plant: Plant) -> Array:
@@ -247,7 +245,9 @@ class CoupledModel:
             if not self._along[name][self._free].any():
                 load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
                 size = max(friction_size(dry[number], load), 1e-300)
-                errors = np.array([self._read[n][1] if n in self._read else 0.0 for n in self._leaders])
+                errors = np.array(
+                    [self._read[n][1] if n in self._read else 0.0 for n in self._leaders]
+                )
                 error = float(np.linalg.norm(self._along[name][self._held] * errors))
                 rigid = 1.0 / max(ELASTIC * error / size, 1e-12 / size)
             springs[number] = (
@@ -283,8 +283,8 @@ class CoupledModel:
             rows.append(self._along[name][None])
             position = (place - sensor.offset) / sensor.gain - self._zero[name]
             values.append(np.array([[position, speed / sensor.gain]]))
-        found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0].T
-        return np.ascontiguousarray(found)
+        found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
+        return np.array(found.T, np.float64, order="C")
 
     def _start_of(self, plant: Plant) -> Array:
         """Positions and velocities, shape (2, coordinates)."""
@@ -295,7 +295,10 @@ class CoupledModel:
         if key not in self._starts:
             judged = self._judged
             measured = self._measured(judged.rows)
-            sense, first = self._sense_from(plant, start, judged.rows), start[:, : self._loose].ravel()
+            sense, first = (
+                self._sense_from(plant, start, judged.rows),
+                start[:, : self._loose].ravel(),
+            )
             # A model that is far off elsewhere too is no reason to start otherwise.
             left = np.sqrt(np.mean((sense(first) - measured).reshape(len(judged.rows), -1) ** 2, 1))
             held = np.repeat(np.maximum(judged.held, left), self._remembered)
@@ -581,7 +584,7 @@ def _acts(guide: Guide) -> bool:
     return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
-def begin(contacts: Contacts, start: Array, prescribed: Array, held: Array, h: float) -> State:
+def begin(contacts: Contacts, start: Array, prescribed: Array, held: np.ndarray, h: float) -> State:
     """The state in which a machine starts.
 
     Parameters
@@ -600,7 +603,7 @@ def begin(contacts: Contacts, start: Array, prescribed: Array, held: Array, h: f
     State
         With all springs slack.
     """
-    place, speed = start.copy()
+    place, speed = start[0].copy(), start[1].copy()
     place[held] = prescribed[held, 0]
     speed[held] = (prescribed[held, 1] - prescribed[held, 0]) / h
     along, guides = contacts.along, contacts.guides

@@ -77,6 +77,18 @@ class Inputs(NamedTuple):
 
 
 @kernel
+def guide_of(values: Array) -> Guide:
+    """A guide by its values, shape (parameters,)."""
+    return Guide(*to_fixed_tuple(values, GUIDE))  # type: ignore[call-arg]
+
+
+@kernel
+def friction_of(values: Array) -> Friction:
+    """Dry friction by its values, shape (parameters,)."""
+    return Friction(values[0] > 0.0, *to_fixed_tuple(values[1:], NUMBERS))  # type: ignore[call-arg]
+
+
+@kernel
 def factor(matrix: Array, size: int) -> None:
     """The Cholesky factor of a positive definite matrix, in its place below the diagonal."""
     for i in range(size):
@@ -215,9 +227,8 @@ def advance(
                 damped[g] = implicit[g] = 0.0
                 if not contacts.acts[g]:
                     continue
-                guide = Guide(*to_fixed_tuple(contacts.guides[g], GUIDE))
-                changing = contacts.dry[g, 0] > 0.0
-                friction = Friction(changing, *to_fixed_tuple(contacts.dry[g, 1:], NUMBERS))
+                guide = guide_of(contacts.guides[g])
+                friction = friction_of(contacts.dry[g])
                 place[g], rate[g], load, among = contacts.zero[g], 0.0, 0.0, 0.0
                 for i in range(size):
                     along = contacts.along[g, i]
@@ -328,16 +339,14 @@ def advance(
             for g in range(guides):
                 if mounted[g] or not contacts.acts[g]:
                     continue
-                guide = Guide(*to_fixed_tuple(contacts.guides[g], GUIDE))
+                guide = guide_of(contacts.guides[g])
                 ahead = 0.0
                 for i in range(size):
                     ahead += contacts.along[g, i] * ahead_speed[i]
                 share = h / (guide.relaxation + h)
                 between = implicit[g] * ahead + (1.0 - implicit[g]) * rate[g]
                 own[g] -= implicit[g] * damped[g] * ahead + dry[g]
-                state.viscous[g] += share * (
-                    damping(guide, rate[g]) * between - state.viscous[g]
-                )
+                state.viscous[g] += share * (damping(guide, rate[g]) * between - state.viscous[g])
                 if contacts.rubs[g]:
                     _, by = slide(
                         place[g] + h * ahead - state.slider[g],
@@ -362,5 +371,3 @@ def advance(
                 state.place[i] += h * ahead_speed[i]
             for k in range(len(held)):
                 state.place[held[k]] = inputs.prescribed[held[k], number + 1]
-
-

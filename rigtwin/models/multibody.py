@@ -31,9 +31,9 @@ class Bodies(NamedTuple):
     """What compiled code needs of them. model, data: addresses of MuJoCo's; places, dofs: of the
     joints that move, in its vectors; ties: how far each of them goes for each coordinate's unit,
     shape (joints, coordinates), from `base`; qpos, qvel, bias, passive: its vectors; entries,
-    columns, first, count: its inertia matrix, a row's entries; added: inertia besides, of what turns
-    with the motors, shape (coordinates, coordinates); steady: whether inertia and bias are the same
-    everywhere; inertia, constant: then they are these, `added` not among them."""
+    columns, first, entered: its inertia matrix, a row's entries; added: inertia besides, of what
+    turns with the motors, shape (coordinates, coordinates); steady: whether inertia and bias are
+    the same everywhere; inertia, constant: then they are these, `added` not among them."""
 
     model: int
     data: int
@@ -48,7 +48,7 @@ class Bodies(NamedTuple):
     entries: Array
     columns: np.ndarray
     first: np.ndarray
-    count: np.ndarray
+    entered: np.ndarray
     added: Array
     steady: bool
     inertia: Array
@@ -91,7 +91,7 @@ def find_terms(bodies: Bodies, place: Array, speed: Array, inertia: Array, bias:
         for own in range(size):
             bias[own] += bodies.ties[joint, own] * force
         start = bodies.first[row]
-        for entry in range(start, start + bodies.count[row]):
+        for entry in range(start, start + bodies.entered[row]):
             value = bodies.entries[entry]
             for other in range(len(bodies.dofs)):
                 if bodies.dofs[other] != bodies.columns[entry]:
@@ -195,7 +195,6 @@ class Multibody:
             With these.
         """
 
-
         def alter(spec: mujoco.MjSpec) -> None:
             for name, (mass, mx, my, mz, *moments) in parameters.items():
                 body, centre = spec.body(name), np.array([mx, my, mz]) / mass
@@ -260,7 +259,7 @@ class Multibody:
             entries=data.M,
             columns=np.array(model.M_colind, np.int64),
             first=np.array(model.M_rowadr, np.int64),
-            count=np.array(model.M_rownnz, np.int64),
+            entered=np.array(model.M_rownnz, np.int64),
             added=np.zeros((size, size)) if added is None else added,
             steady=steady is not None,
             inertia=np.zeros((size, size)) if steady is None else steady[:, :-1].copy(),
