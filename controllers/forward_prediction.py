@@ -1,4 +1,4 @@
-"""Polynomial forward prediction: the command is where the desired motion will be one delay from now.
+"""Polynomial forward prediction: the command is where the desired motion will be a delay later.
 
     u(t) = Σ a_i r(t − i h),   exact for polynomials of degree n
 

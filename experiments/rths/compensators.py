@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -18,7 +17,6 @@ from experiments.rths.actuator import Plant, continuous, transfer
 from experiments.rths.building import PERIOD
 from experiments.rths.hybrid_test import Law
 from rigtwin.errors import RigtwinError
-from rigtwin.numerics.arrays import Array
 
 SAMPLE_KP, SAMPLE_KI = 2.0, 95.0
 SAMPLE_LEAD = (50.8, 168.6, 8570.0)
@@ -60,11 +58,13 @@ KALMAN = Weights(
     derivatives=5,
     decay=10.0,
     desired_noise=1e-12,
-    sensor_noise=1e-5,
+    sensor_noise=1.5e-6,
     offset_walk=1e-6,
     state_noise=1e-5,
 )
-
+"""Chosen on the first eight plants, case 4, 25 s of El Centro: with `sensor_noise` 1e-5 J2 is
+0.38 % on the worst of them and 0.02 points above the floor with noise; with 1e-6 it is 0.13 %, and
+0.26 points."""
 
 COMPENSATORS: Mapping[str, Callable[[], Law]] = {
     "none": pass_through,

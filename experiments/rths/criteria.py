@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import correlate
 
 from experiments.rths.building import PERIOD
 from rigtwin.numerics.arrays import Array
@@ -57,10 +58,7 @@ def delay(commanded: Array, measured: Array) -> float:
     """s by which measured comes later, in whole ticks: where the two correlate most."""
     most = round(LONGEST / PERIOD)
     inner = slice(most, len(commanded) - most)
-    at = [
-        float(measured[most + late : len(measured) - most + late] @ commanded[inner])
-        for late in range(-most, most + 1)
-    ]
+    at = correlate(measured, commanded[inner], mode="valid", method="fft")
     return (int(np.argmax(at)) - most) * PERIOD
 
 

@@ -144,16 +144,30 @@ def ideal_test(case: Case, ground: Array, piece: Specimen | None = None) -> Crit
     """The criteria of a test whose actuator follows exactly; what is left is that the force comes a
     tick late, and that the specimen is not the nominal one."""
     building, piece = numerical_part(case, Specimen()), piece or Specimen()
+    desired = _ideal_loop(
+        building.a,
+        building.ground,
+        building.force,
+        np.array([piece.stiffness, piece.damping, piece.mass]),
+        ground,
+    )
+    return judge(desired, desired[:, 0], move(whole_building(case), ground))
+
+
+@kernel
+def _ideal_loop(  # type: ignore[no-untyped-def]
+    building, by_ground, by_force, piece, ground
+):
     state, force = np.zeros(6), 0.0
     desired = np.empty((len(ground), 3))
-    for tick, acceleration in enumerate(ground):
+    for tick in range(len(ground)):
         desired[tick] = state[:3]
-        after = building.a @ state + building.ground * acceleration + building.force * force
+        after = building @ state + by_ground * ground[tick] + by_force * force
         # The actuator's acceleration is that of the floor over the next tick.
         pushed = (after[3] - state[3]) / PERIOD
-        force = piece.stiffness * state[0] + piece.damping * state[3] + piece.mass * pushed
+        force = piece[0] * state[0] + piece[1] * state[3] + piece[2] * pushed
         state = after
-    return judge(desired, desired[:, 0], move(whole_building(case), ground))
+    return desired
 
 
 def _both(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
