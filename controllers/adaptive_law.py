@@ -82,8 +82,8 @@ def adaptive_model(
 def _law(coefficients: list[float], period: float, corner: float, span: float) -> AdaptiveLaw:
     order = len(coefficients)
     one = state_filter(order, corner, period)
-    units = one.corner ** np.arange(order)
-    start = np.asarray(coefficients) * units
+    units = one.corner ** np.arange(order, dtype=np.float64)
+    start = np.asarray(coefficients, dtype=np.float64) * units
     reach = span * np.abs(start)
     points = order + 1
     stencils = np.array([derivative_weights(power, points, period) for power in range(order)])

@@ -16,11 +16,11 @@ def derivative_weights(order: int, points: int, period: float) -> Array:
     powers = np.vander(-np.arange(points, dtype=float), increasing=True).T
     wanted = np.zeros(points)
     wanted[order] = math.factorial(order) / period**order
-    return np.linalg.solve(powers, wanted)
+    return np.asarray(np.linalg.solve(powers, wanted), dtype=np.float64)
 
 
 def prediction_weights(ahead: float, points: int) -> Array:
     """Weights of r(t), r(t−h), ... that give r(t + ahead·h), exactly for polynomials of a degree
     below `points`; shape (points,)."""
     powers = np.vander(-np.arange(points, dtype=float), increasing=True).T
-    return np.linalg.solve(powers, ahead ** np.arange(points))
+    return np.asarray(np.linalg.solve(powers, ahead ** np.arange(points)), dtype=np.float64)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, expm, solve_discrete_are
+from scipy.linalg import block_diag, expm, matrix_balance, solve_discrete_are
 
 from controllers.linear_law import LinearLaw
 
@@ -84,7 +84,7 @@ def sampled_actuator(actuator: Actuator, period: float) -> tuple[Array, Array, A
 
 def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> LinearLaw:
     """The law for an actuator, the period in s and what is weighed."""
-    a, b, c = sampled_actuator(actuator, period)
+    a, b, c = sampled_actuator(_balanced(actuator), period)
     # The chain of derivatives in units of the decay-free period, or its numbers differ by T^m.
     order, unit = weights.derivatives, 50.0 * period
     chain = np.eye(order, k=1) - weights.decay * unit * np.eye(order)
@@ -110,6 +110,15 @@ def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> Linea
     corrected = np.eye(total) - gain @ seen
     closed = whole - np.outer(entry, regulator)
     return LinearLaw(closed @ corrected, closed @ gain, -regulator @ corrected, -regulator @ gain)
+
+
+def _balanced(actuator: Actuator) -> Actuator:
+    """The same actuator in states of one size; companion forms differ by decades in theirs, which
+    no Riccati equation survives."""
+    a, change = matrix_balance(actuator.a, permute=False)
+    b, c = np.linalg.solve(change, actuator.b), actuator.c @ change
+    size = math.sqrt(float(np.linalg.norm(b) / np.linalg.norm(c)))
+    return Actuator(a, b / size, c * size, actuator.delay)
 
 
 def _cost(

@@ -30,7 +30,7 @@ def state_filter(order: int, corner: float, period: float) -> StateFilter:
     both[: order - 1, 1:order] = np.eye(order - 1)
     both[order - 1, :order] = [-float(math.comb(order, power)) for power in range(order)]
     both[order - 1, order] = 1.0
-    both = expm(both * omega * period)
+    both = np.asarray(expm(both * omega * period), dtype=np.float64)
     return StateFilter(
         np.ascontiguousarray(both[:order, :order]),
         np.ascontiguousarray(both[:order, order]),

@@ -149,9 +149,9 @@ def test_the_filters_states_are_derivatives(corner):
     for tick in range(2000):
         step_filter(one, state, (tick + 0.5) * PERIOD)
     lag = 3.0 / one.corner
-    assert state[0] == pytest.approx(2.0 - lag, rel=1e-6)
-    assert state[1] * one.corner == pytest.approx(1.0, rel=1e-6)
-    assert state[2] == pytest.approx(0.0, abs=1e-9)
+    assert state[0] == pytest.approx(2.0 - lag, rel=1e-4)
+    assert state[1] * one.corner == pytest.approx(1.0, rel=1e-4)
+    assert state[2] == pytest.approx(0.0, abs=5e-5)
 
 
 @pytest.mark.parametrize("make", [adaptive_time_series, adaptive_model])

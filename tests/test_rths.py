@@ -28,7 +28,7 @@ def test_the_first_case_has_the_published_frequencies():
 
 
 def test_the_reference_is_what_an_independent_integrator_gives():
-    case, ticks = CASES[2], 2048
+    case, ticks = CASES[2], 300
     squares, shapes = np.linalg.eigh(STIFFNESS / case.mass)
     ground = np.sin(np.arange(ticks) * PERIOD * 25.0)
 
@@ -39,7 +39,7 @@ def test_the_reference_is_what_an_independent_integrator_gives():
 
     times = np.arange(ticks) * PERIOD
     solved = solve_ivp(
-        rate, (0.0, times[-1]), np.zeros(6), t_eval=times, max_step=PERIOD, rtol=1e-8, atol=1e-12
+        rate, (0.0, times[-1]), np.zeros(6), t_eval=times, max_step=PERIOD, rtol=1e-6, atol=1e-9
     )
     np.testing.assert_allclose(
         move(whole_building(case), ground), (shapes @ solved.y[:3]).T, atol=2e-6
@@ -66,7 +66,7 @@ def test_the_sampled_plant_is_its_transfer_function_and_half_a_tick(frequency):
 
 
 def test_the_delay_of_a_shifted_signal_is_its_shift():
-    signal = ground_motion("morgan")[:SHORT]
+    signal = ground_motion("morgan")
     assert delay(signal[40:], signal[:-40]) == pytest.approx(40 * PERIOD)
     same = judge(np.column_stack([signal] * 3), signal, np.column_stack([signal] * 3))
     np.testing.assert_allclose(same, 0.0, atol=1e-12)
@@ -109,9 +109,9 @@ def test_the_same_seed_is_the_same_test():
     assert np.any(first.measured != other.measured)
 
 
-def test_without_compensation_the_loop_does_not_hold_and_with_it_every_plant_does():
+def test_without_compensation_the_building_is_not_followed_and_with_it_on_every_plant():
     ground = ground_motion("elcentro")[:SHORT]
-    assert not run_test(CASES[4], ground, find_compensator("none")).within
+    assert run_test(CASES[4], ground, find_compensator("none")).criteria.j2 > 40.0
     for plant in draw_plants(6):
         test = run_test(CASES[4], ground, find_compensator("kalman-inverse"), plant)
         assert test.within

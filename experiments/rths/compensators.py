@@ -49,7 +49,7 @@ def _inverse(order: int) -> list[float]:
 
 def nominal_actuator() -> Actuator:
     """The nominal plant."""
-    a, b = continuous(Plant())
+    a, b = (np.asarray(part, dtype=np.float64) for part in continuous(Plant()))
     return Actuator(a, b, np.eye(5)[0], 0.0)
 
 
