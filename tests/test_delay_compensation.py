@@ -113,7 +113,8 @@ def test_the_inverse_model_follows_better_the_more_derivatives_it_has():
 def test_the_smith_predictor_takes_the_delay_out_of_its_loop():
     delay, lag, gain = 0.02, 0.05, 1.0
     law = smith_predictor(gain, lag, delay, 20.0, 0.0, PERIOD)
-    whole, follows = closed(law, delay, lag)
+    _, follows = closed(law, delay, lag)
+    whole, _ = closed(smith_predictor(gain, lag, delay, 20.0, 1.0, PERIOD), delay, lag)
     assert np.max(np.abs(np.linalg.eigvals(whole))) < 1.0
     # With the model right, what is left is the closed loop without delay, and then the delay.
     z = cmath.exp(2j * math.pi * 3.0 * PERIOD)
