@@ -116,7 +116,8 @@ def _balanced(actuator: Actuator) -> Actuator:
     """The same actuator in states of one size; companion forms differ by decades in theirs, which
     no Riccati equation survives."""
     a, change = matrix_balance(actuator.a, permute=False)
-    b, c = np.linalg.solve(change, actuator.b), actuator.c @ change
+    b = np.asarray(np.linalg.solve(change, actuator.b), dtype=np.float64)
+    c = actuator.c @ change
     size = math.sqrt(float(np.linalg.norm(b) / np.linalg.norm(c)))
     return Actuator(a, b / size, c * size, actuator.delay)
 

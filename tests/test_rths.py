@@ -90,7 +90,7 @@ def test_the_authors_controller_gives_their_table(case):
 
 
 def test_compiled_and_python_are_the_same_test(monkeypatch):
-    ground = ground_motion("kobe")[8 * 4096 : 8 * 4096 + 5000]
+    ground = ground_motion("kobe")[8 * 4096 : 9 * 4096]
     for name in ("kalman-inverse", "adaptive-time-series", "adaptive-model"):
         law = find_compensator(name)
         compiled = run_test(CASES[3], ground, law, noise=BENCHMARK)
