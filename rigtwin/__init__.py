@@ -60,6 +60,7 @@ if TYPE_CHECKING:
         run_session,
     )
     from rigtwin.api.studies import (
+        HybridTest,
         Identifiability,
         ModelStability,
         Reproduction,
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
         blindcheck_wild,
         identifiability,
         reproduce,
+        rths,
         stability,
         tune,
     )
@@ -83,6 +85,7 @@ __all__ = [
     "DryRun",
     "Effect",
     "Experiment",
+    "HybridTest",
     "Identifiability",
     "Machine",
     "ModelStability",
@@ -114,6 +117,7 @@ __all__ = [
     "plan_test",
     "release_card",
     "reproduce",
+    "rths",
     "run",
     "run_on_card",
     "run_on_twin",
@@ -171,6 +175,7 @@ _MODULES = {
         "run_session",
     ),
     "studies": (
+        "HybridTest",
         "Identifiability",
         "ModelStability",
         "Reproduction",
@@ -181,6 +186,7 @@ _MODULES = {
         "blindcheck_wild",
         "identifiability",
         "reproduce",
+        "rths",
         "stability",
         "tune",
     ),

@@ -216,6 +216,7 @@ FUNCTIONS = {
     "reproduce": ("reproduce",),
     "tune": ("tune",),
     "stability": ("stability",),
+    "rths": ("rths",),
 }
 """What does a command's work."""
 

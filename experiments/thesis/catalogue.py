@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from experiments.rths import study as rths
 from experiments.thesis import (
     beams,
     friction_compensation,
@@ -36,6 +37,8 @@ STUDIES: dict[str, Study] = {
         beams,
     )
 }
+BENCHMARKS: dict[str, Study] = {rths.STUDY.name: rths.STUDY}
+"""Studies of what others published beside the thesis; each only where it is asked for by name."""
 TABLES = (
     *("Table 2.1",),
     *span("Table", "3.", 1, 5),
@@ -71,6 +74,8 @@ def asked(name: str | None) -> Asked:
         return Asked(tuple(STUDIES.values()), None)
     if name in STUDIES:
         return Asked((STUDIES[name],), None)
+    if name in BENCHMARKS:
+        return Asked((BENCHMARKS[name],), None)
     plain = name.strip().lower().removeprefix("chapter").removeprefix("appendix").strip(" -")
     chapter = tuple(study for study in STUDIES.values() if plain in study.chapter.lower().split())
     if chapter:
@@ -86,7 +91,7 @@ def asked(name: str | None) -> Asked:
     chapters = sorted({part for study in STUDIES.values() for part in study.chapter.split()})
     raise RigtwinError(
         f"nothing to reproduce under {name!r}; there are chapters "
-        f"{', '.join(chapters)}, studies {', '.join(STUDIES)}, "
+        f"{', '.join(chapters)}, studies {', '.join([*STUDIES, *BENCHMARKS])}, "
         "and tables, figures and equations such as table-5.1, figure-6.26, equation-6.1"
     )
 

@@ -13,10 +13,10 @@ from rigtwin.studies.sweep import Store, Workers, run_jobs
 def job(which: tuple[str, int, str]) -> Result:
     """The work of one job: a study's name, its number of seeds, the job's key. Runs in any
     process."""
-    from experiments.thesis.catalogue import STUDIES
+    from experiments.thesis.catalogue import BENCHMARKS, STUDIES
 
     study, seeds, key = which
-    return STUDIES[study].jobs(seeds)[key]()
+    return (STUDIES | BENCHMARKS)[study].jobs(seeds)[key]()
 
 
 def done(

@@ -5,6 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+from experiments.rths.actuator import draw_plants
+from experiments.rths.building import find_case
+from experiments.rths.compensators import find_compensator
+from experiments.rths.ground_motion import ground_motion
+from experiments.rths.hybrid_test import NONE, Noise, run_test
+from experiments.rths.hybrid_test import HybridTest as HybridTest
 from experiments.thesis.result import Reproduction
 from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
@@ -24,6 +30,7 @@ from rigtwin.studies.tuning.folder import RUNS, default_folder, write
 from rigtwin.studies.tuning.result import TuningResult, count_runs
 from rigtwin.studies.tuning.result import tune as tune_study
 
+MOST_PLANTS = 1000
 Progress = Callable[[int, int], object]
 """Called with what is done and with how much there is in all."""
 
@@ -180,6 +187,53 @@ def reproduce(
     """
     with open_workers(workers, cluster) as open_:
         return reproduce_thesis(what, seeds, Path(folder), open_, progress)
+
+
+def rths(
+    case: int = 1,
+    *,
+    quake: str = "elcentro",
+    compensator: str = "kalman-inverse",
+    plants: int = 1,
+    noise: Noise = NONE,
+    seed: int = 1,
+) -> list[HybridTest]:
+    """Runs the benchmark of real-time hybrid simulation: a building whose first column is real.
+
+    Parameters
+    ----------
+    case
+        Of the building, 1 to 4.
+    quake
+        elcentro, kobe or morgan.
+    compensator
+        By name; an unknown one is answered with what there is.
+    plants
+        How many actuators and specimens: the nominal one first, the others drawn.
+    noise
+        Of the converters, V rms.
+    seed
+        Of the plants and of the noise.
+
+    Returns
+    -------
+    list
+        Of each plant: the criteria J1 to J9, the largest force, motion and speed, and the signals.
+
+    Raises
+    ------
+    RigtwinError
+        For an unknown case, earthquake or compensator, or a number of plants that makes no sense.
+    """
+    building, law = find_case(case), find_compensator(compensator)
+    if not 1 <= plants <= MOST_PLANTS or seed < 0:
+        raise RigtwinError(
+            f"--plants {plants} --seed {seed}: expected 1 to {MOST_PLANTS}, 0 or more"
+        )
+    ground = ground_motion(quake)
+    return [
+        run_test(building, ground, law, plant, noise, seed) for plant in draw_plants(plants, seed)
+    ]
 
 
 def blindcheck(

@@ -56,6 +56,7 @@ COMMANDS = (
     "reproduce",
     "tune",
     "stability",
+    "rths",
 )
 """In the order of the help; each has a module of its name here."""
 

@@ -33,6 +33,7 @@ from controllers import (
     unpacked,
     update,
 )
+from controllers.linear_law import LinearLaw, pass_through
 from rigtwin.components import RigPlant
 from rigtwin.components.cylinder import state_space
 from rigtwin.components.gas_spring import stiffness
@@ -53,13 +54,14 @@ MOVED = np.array([1, 3])
 """Columns of Commands that reach the plant and come back: structure and voltage."""
 
 
-def decay(configuration: Configuration) -> float:
+def decay(configuration: Configuration, plate: LinearLaw | None = None) -> float:
     """How fast the slowest motion of the loop dies away, 1/s; below zero it grows, and only dry
     friction holds it.
 
-    A semi-active damper counts as its least damping, a compensator that makes steps as none.
+    plate: a delay compensator between the structure model and its cylinder. A semi-active damper
+    counts as its least damping, a compensator that makes steps as none.
     """
-    matrix = closed_loop(configuration)
+    matrix = closed_loop(configuration, plate)
     reached = np.abs(matrix) > 0.0
     loop = np.flatnonzero(_reachable(reached.T, DRIVEN) & _reachable(reached, DRIVEN))
     largest = float(np.max(np.abs(np.linalg.eigvals(matrix[np.ix_(loop, loop)]))))
@@ -74,9 +76,9 @@ def _reachable(edges: NDArray[np.bool_], start: tuple[int, ...]) -> NDArray[np.b
     return found
 
 
-def closed_loop(configuration: Configuration) -> Array:
+def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) -> Array:
     """The matrix that takes the state from one tick to the next: of the mechanics, commands under
-    way, sensors, controller."""
+    way, sensors, controller, delay compensator of the plate."""
     period, plant = configuration.timing.period, configuration.plant
     a, b, c = mechanics(plant, configuration.controller.preload)
     (own, by_sensors), (from_state, direct) = linear_controller(configuration)
@@ -90,16 +92,22 @@ def closed_loop(configuration: Configuration) -> Array:
     sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*part)) for part in parts)
     sensing_d = np.diag([each[3] for each in transducers])
 
-    sizes = [len(a), sum(registers), len(sensing_a), SIZE]
+    law = plate or pass_through()
+    sizes = [len(a), sum(registers), len(sensing_a), SIZE, len(law.a)]
     starts = np.concatenate([[0], np.cumsum(sizes)])
-    x, held, memory, state = (slice(int(starts[i]), int(starts[i + 1])) for i in range(4))
+    x, held, memory, state, own_law = (slice(int(starts[i]), int(starts[i + 1])) for i in range(5))
     total = int(starts[-1])
     # Measurements and commands at a tick, as rows over the state.
     measured = np.zeros((3, total))
     measured[:, x], measured[:, memory] = sensing_d @ c, sensing_c
     commands = direct @ measured
     commands[:, state] += from_state
+    wanted = commands[0].copy()
+    commands[0] = law.d[0] * wanted + law.d[1] * measured[0]
+    commands[0, own_law] += law.c
     matrix = np.zeros((total, total))
+    matrix[own_law] = np.outer(law.b[:, 0], wanted) + np.outer(law.b[:, 1], measured[0])
+    matrix[own_law, own_law] += law.a
     matrix[x, x] = expm(a * period)
     first = held.start
     for number, (delay, length) in enumerate(zip(late, registers, strict=True)):

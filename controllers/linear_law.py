@@ -1,0 +1,94 @@
+"""A linear sampled law of two inputs, what is desired and what is measured: the form that every
+delay compensator with constant coefficients takes.
+
+    u[k]   = C x[k] + D (r[k], y[k])
+    x[k+1] = A x[k] + B (r[k], y[k])
+
+So one tick serves all of them, and their poles, noise and margins follow from four matrices.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, solve_discrete_lyapunov
+
+from controllers.compiled import compilable
+
+Array = NDArray[np.float64]
+
+
+class LinearLaw(NamedTuple):
+    """a: shape (n, n); b: (n, 2), columns desired and measured; c: (n,); d: (2,). Sampled."""
+
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+
+
+def pass_through() -> LinearLaw:
+    """No compensation: the command is what is desired."""
+    return LinearLaw(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros(1), np.array([1.0, 0.0]))
+
+
+def filtered(weights: Array) -> LinearLaw:
+    """The law u[k] = Σ weights[i] r[k−i]; weights: shape (n,)."""
+    size = max(len(weights) - 1, 1)
+    entry = np.zeros((size, 2))
+    entry[0, 0] = 1.0
+    late = np.zeros(size)
+    late[: len(weights) - 1] = weights[1:]
+    return LinearLaw(np.eye(size, k=-1), entry, late, np.array([weights[0], 0.0]))
+
+
+def add_feedback(law: LinearLaw, proportional: float, integral: float, period: float) -> LinearLaw:
+    """The law and a PI of what is desired minus what is measured, added to its command.
+
+    proportional: 1; integral: 1/s, summed after the tick (forward Euler); period: s.
+    """
+    a = np.asarray(block_diag(law.a, np.eye(1)))
+    b = np.vstack([law.b, [[period, -period]]])
+    d = law.d + proportional * np.array([1.0, -1.0])
+    return LinearLaw(a, b, np.append(law.c, integral), d)
+
+
+@compilable
+def step_linear(law: LinearLaw, state: Array, desired: float, measured: float) -> float:
+    """One tick: returns the command. state: shape (n,), advanced in place."""
+    size = len(state)
+    command = law.d[0] * desired + law.d[1] * measured
+    after = np.empty(size)
+    for row in range(size):
+        command += law.c[row] * state[row]
+        total = law.b[row, 0] * desired + law.b[row, 1] * measured
+        for column in range(size):
+            total += law.a[row, column] * state[column]
+        after[row] = total
+    state[:] = after
+    return command
+
+
+def response(law: LinearLaw, frequency: float, period: float) -> tuple[complex, complex]:
+    """From desired and from measured to the command, at a frequency in Hz; period: s."""
+    z = np.exp(2j * np.pi * frequency * period)
+    inner = np.linalg.solve(z * np.eye(len(law.a)) - law.a, law.b)
+    desired, measured = law.c @ inner + law.d
+    return complex(desired), complex(measured)
+
+
+def noise_gain(law: LinearLaw) -> tuple[float, float]:
+    """rms of the command per rms of white noise on what is desired, and on what is measured.
+
+    Raises ValueError for a law that is not stable by itself, such as one that integrates.
+    """
+    if np.max(np.abs(np.linalg.eigvals(law.a))) >= 1.0:
+        raise ValueError("the law integrates: its noise gain is that of the loop around it")
+    gains = []
+    for column in range(2):
+        entry = law.b[:, [column]]
+        spread = solve_discrete_lyapunov(law.a, entry @ entry.T)
+        gains.append(float(np.sqrt(law.c @ spread @ law.c + law.d[column] ** 2)))
+    return gains[0], gains[1]

@@ -1,0 +1,94 @@
+"""`rigtwin rths`: the benchmark of real-time hybrid simulation."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import rigtwin
+from rigtwin.console import table, writable, write_json
+
+SUMMARY = "run the benchmark of real-time hybrid simulation: a building whose first column is real"
+MORE = """\
+examples:
+  rigtwin rths --case 1 --quake elcentro --compensator sample
+  rigtwin rths --case 4 --plants 20                the compensator that follows best
+  rigtwin reproduce rths                           all of them, beside what is published"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--case", type=int, default=1, help="of the building, 1 to 4 (default 1)")
+    parser.add_argument(
+        "--quake", default="elcentro", help="elcentro, kobe or morgan (default elcentro)"
+    )
+    parser.add_argument(
+        "--compensator",
+        default="kalman-inverse",
+        metavar="NAME",
+        help="by name (default kalman-inverse)",
+    )
+    parser.add_argument(
+        "--plants",
+        type=int,
+        default=1,
+        help="actuators to try: the nominal one, then drawn ones (default 1)",
+    )
+    parser.add_argument(
+        "--noise", action="store_true", help="with the noise of the benchmark's converters"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of plants and noise (default 1)")
+    parser.add_argument(
+        "--json", type=Path, metavar="F.json", help="also write the figures to a file"
+    )
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    """Prints the criteria and the largest force, motion and speed of every plant."""
+    from experiments.rths.hybrid_test import BENCHMARK, NONE
+
+    if parsed.json is not None:
+        writable(parsed.json)
+    tests = rigtwin.rths(
+        parsed.case,
+        quake=parsed.quake,
+        compensator=parsed.compensator,
+        plants=parsed.plants,
+        noise=BENCHMARK if parsed.noise else NONE,
+        seed=parsed.seed,
+    )
+    rows: list[tuple[str, ...]] = [
+        ("plant", "J1 ms", *(f"J{number} %" for number in range(2, 10)), "N", "mm", "mm/s", "")
+    ]
+    for number, test in enumerate(tests):
+        if not test.stable:
+            rows.append((_named(number), *[""] * 12, "unstable"))
+            continue
+        figures = [
+            *(f"{value:.2f}" for value in test.criteria),
+            f"{test.force:.0f}",
+            f"{1e3 * test.motion:.2f}",
+            f"{1e3 * test.speed:.0f}",
+        ]
+        rows.append((_named(number), *figures, "" if test.within else "beyond a limit"))
+    print(table(rows))
+    if parsed.json is not None:
+        write_json(parsed.json, {"case": parsed.case, "quake": parsed.quake, "plants": _all(tests)})
+    return 0
+
+
+def _named(number: int) -> str:
+    return str(number) if number else "nominal"
+
+
+def _all(tests: list[rigtwin.HybridTest]) -> list[dict[str, object]]:
+    return [
+        {
+            "criteria": test.criteria._asdict() if test.stable else None,
+            "force": test.force,
+            "motion": test.motion,
+            "speed": test.speed,
+            "stable": test.stable,
+            "within": test.within,
+        }
+        for test in tests
+    ]
