@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         write_table,
     )
     from rigtwin.api.faults import Campaign, faults
+    from rigtwin.api.look import look
     from rigtwin.api.machines import (
         Configuration,
         Effect,
@@ -109,6 +110,7 @@ __all__ = [
     "identifiability",
     "import_data",
     "load",
+    "look",
     "machine",
     "machines",
     "plan_test",
@@ -161,6 +163,7 @@ _MODULES = {
         "write_table",
     ),
     "faults": ("Campaign", "faults"),
+    "look": ("look",),
     "session": (
         "DryRun",
         "SessionResult",
