@@ -97,7 +97,7 @@ def save(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes it. Raises RigtwinError if it cannot, or if the data were not fit for a diagnosis."""
     if diagnosis.evidence is None:
         raise RigtwinError(f"{path} not written: the data cannot be diagnosed")
-    return write(path, toml(diagnosis).splitlines())
+    return write(path, toml(diagnosis).removesuffix("\n").split("\n"))
 
 
 def write(path: Path, lines: Sequence[str]) -> Path:
