@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         write_table,
     )
     from rigtwin.api.faults import Campaign, faults
+    from rigtwin.api.look import look
     from rigtwin.api.machines import (
         Configuration,
         Effect,
@@ -112,6 +113,7 @@ __all__ = [
     "identifiability",
     "import_data",
     "load",
+    "look",
     "machine",
     "machines",
     "plan_test",
@@ -165,6 +167,7 @@ _MODULES = {
         "write_table",
     ),
     "faults": ("Campaign", "faults"),
+    "look": ("look",),
     "session": (
         "DryRun",
         "SessionResult",

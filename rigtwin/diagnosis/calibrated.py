@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.components.effect import GROUPS
+from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml
 from rigtwin.description.settings import Nothing
@@ -27,17 +28,33 @@ def toml(diagnosis: Diagnosis) -> str:
     lines += [
         f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
     ]
-    nominal = flatten(Configuration(plant=diagnosis.described.plant, controller=Nothing()))
-    corrected = flatten(Configuration(plant=diagnosis.machine.plant, controller=Nothing()))
-    for group in diagnosis.described.plant._fields:
-        changed = {
-            key: value for key, value in corrected[group].items() if value != nominal[group][key]
-        }
-        if changed:
-            lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in changed.items())]
+    lines += format_changes(diagnosis.described.plant, diagnosis.machine.plant)
     if answer.effects:
         lines += ["", *format_toml(_posterior(diagnosis))]
     return "\n".join(lines) + "\n"
+
+
+def format_changes(described: Plant, corrected: Plant) -> list[str]:
+    """What a corrected plant has other than the described one.
+
+    Parameters
+    ----------
+    described, corrected
+        Of one machine.
+
+    Returns
+    -------
+    list of str
+        TOML, a line each, one table a component that differs.
+    """
+    nominal = flatten(Configuration(plant=described, controller=Nothing()))
+    changed = flatten(Configuration(plant=corrected, controller=Nothing()))
+    lines: list[str] = []
+    for group in described._fields:
+        own = {key: value for key, value in changed[group].items() if value != nominal[group][key]}
+        if own:
+            lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in own.items())]
+    return lines
 
 
 def _posterior(diagnosis: Diagnosis) -> Posterior:
