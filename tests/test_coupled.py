@@ -214,7 +214,7 @@ def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> 
     predicted = model.predict(machine.plant)
     for row, signal, noise in zip(machine.rows, predicted, (2e-5, 1e-4), strict=True):
         left = signal - record.column(*row.channel)
-        assert np.std(left) < 1.1 * noise
+        assert np.std(left) < 1.2 * noise
 
 
 @pytest.mark.slow
