@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from benchmarks import arms
 from rigtwin.components import Base, Body
 from rigtwin.components.body import (
     about_frame,
@@ -17,6 +18,8 @@ from rigtwin.components.body import (
 from rigtwin.description.document import examine
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.models.choose import model_of
 from tests.helpers import arm
 from tests.helpers.arm import MJCF, TOML, described_arm, motion, recording, torques
@@ -145,6 +148,17 @@ def test_every_body_within_its_bounds_can_be_made(seed):
     assert np.linalg.eigvalsh(matrix).min() > 0.0
     point = about_frame(1.0, np.array([0.0, 0.0, 1.0]), np.zeros((3, 3)))
     assert point == pytest.approx([1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_a_payload_heavier_than_where_a_search_starts_is_weighed(tmp_path):
+    machine, data = arms.describe(6, tmp_path), arms.record(6, 7.0)
+    evidence = Evidence(machine, [data], [machine.configuration_of(data)])
+    fitter = Fitter(evidence.halve_steps())
+    effect = next(each for each in machine.effects() if each.name == "payload@tool")
+    found = fitter.fit_one(fitter.screen(effect))
+    ((mass, *place),) = found.values
+    assert mass == pytest.approx(arms.PAYLOAD, rel=0.02)
+    assert place == pytest.approx(arms.PLACE, abs=2e-3)
 
 
 @pytest.mark.slow

@@ -22,6 +22,9 @@ INERTIAL = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 """The ten parameters: kg, kg m and kg m², about the body's frame."""
 PLACES = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 """Where a payload is looked for first, in reaches from the centre of mass, to either side."""
+PAYLOADS = (0.3, 3.0)
+"""Masses of a payload that is looked for, in masses of the body: heavy ones, as mass times lever
+leads a search that starts too light away from where it has to go."""
 FURTHEST = 6.0
 """Reaches from its frame at which a payload can sit."""
 TILT = 0.8
@@ -154,7 +157,7 @@ def _loaded(at: Context) -> Starts:
     body: Body = getattr(at.plant, at.effect.group)
     centre = np.array([body.centre_x, body.centre_y, body.centre_z])
     values = []
-    for share in (0.05, 0.3):
+    for share in PAYLOADS:
         for place in PLACES:
             for side in (1.0, -1.0) if any(place) else (1.0,):
                 at_place = centre + side * body.reach * np.array(place)
