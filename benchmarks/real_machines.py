@@ -97,6 +97,7 @@ CASES = {
     "damper-277": damper(277e3),
     "body": bench("body", "quarter.toml", "map.toml"),
     "wheel": bench("wheel", "wheel.toml", "wheel_map.toml"),
+    "bench": bench("body", "quarter-car-bench", "quarter_car_bench"),
     "swing": pendulum("lift_and_drop", "pendulum.toml", "map.toml"),
     "held": pendulum("sin_sin", "held.toml", "held_{}.toml"),
     "emps": Case("emps", "emps", "", ("DATA_EMPS",), ("DATA_EMPS_PULSES",)),
@@ -106,7 +107,9 @@ CASES = {
 def imported(case: Case, name: str, folder: Path) -> rigtwin.Recording:
     """One of a case's files as a recording."""
     data = next(path for path in folder.iterdir() if path.stem == name)
-    if case.folder == "emps":
+    if case.description == "quarter-car-bench":
+        mapping = SHIPPED / "maps" / f"{case.map}.toml"
+    elif case.folder == "emps":
         mapping = SHIPPED / "maps" / f"{name.removeprefix('DATA_').lower()}.toml"
     else:
         mapping = folder / case.map.format(name.rpartition("_")[2])
@@ -139,7 +142,8 @@ def tell(name: str, case: Case, data: Path) -> None:
             (folder / "held.toml").write_text(HELD)
             for kp in (100, 200, 400, 800):
                 (folder / f"held_{kp}.toml").write_text(HELD_MAP.format(kp))
-        on = rigtwin.machine(folder / case.description if name != "emps" else "emps")
+        own = folder / case.description
+        on = rigtwin.machine(own if own.is_file() else case.description)
         fitted = [imported(case, each, folder) for each in case.fitted]
         held_out = [imported(case, each, folder) for each in case.held_out]
         nominal = override(on.configuration, case.settings)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import rigtwin
 from rigtwin.components import Guide
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine, Structure
@@ -203,3 +204,65 @@ def test_a_replay_that_cannot_be_is_refused(tmp_path: Path, replay: str, said: s
     (tmp_path / "slides.toml").write_text(SLIDES_TOML + replay)
     with pytest.raises(RigtwinError, match=said):
         load(tmp_path / "slides.toml")
+
+
+def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> None:
+    machine = rigtwin.machine("cart-pole")
+    record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
+    configuration = machine.configuration_of(record)
+    model = model_of(machine, record, configuration, configuration.substeps)
+    predicted = model.predict(machine.plant)
+    for row, signal, noise in zip(machine.rows, predicted, (2e-5, 1e-4), strict=True):
+        left = signal - record.column(*row.channel)
+        assert np.std(left) < 1.2 * noise
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("effect", "parameter", "value"),
+    [("coulomb@rail", "coulomb", 1.5), ("viscous@pivot", "viscous", 0.02)],
+)
+def test_a_hidden_effect_is_found_at_its_joint(
+    tmp_path: Path, effect: str, parameter: str, value: float
+) -> None:
+    machine, path = rigtwin.machine("cart-pole"), tmp_path / "run.mcap"
+    record = rigtwin.run(machine, "pushes", effects=[f"{effect}={value}"], path=path)
+    answer = rigtwin.diagnose(record, machine=machine)
+    (found,) = answer.effects
+    assert str(found.name) == effect
+    assert found.parameters[parameter].value == pytest.approx(value, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("values", "instead"),
+    [
+        ({"mass": 2.0}, 'mass="2" pos="0 0 -0.15" diaginertia="0.02 0.02 0.00166666667"'),
+        ({"centre_x": 0.1}, 'mass="1.2" pos="0.1 0 -0.15" diaginertia="0.012 0.012 0.001"'),
+    ],
+)
+def test_another_body_swings_as_that_of_a_changed_mjcf(
+    tmp_path: Path, values: dict[str, float], instead: str
+) -> None:
+    body = '[components.lower]\nbody = "lower"\ntype = "body"\n[components.floor]\nbody = "upper"\n'
+    toml = ARM_TOML.replace("[[replays]]", body + 'type = "base"\n[[replays]]')
+    written = 'mass="1.2" pos="0 0 -0.15" diaginertia="0.012 0.012 0.001"'
+    still = np.zeros(1000)
+    record = {
+        "/command": dict(zip(("drive_1", "drive_2"), TORQUES, strict=True)),
+        "/sensor": {"angle_1": still, "angle_2": still},
+    }
+    (tmp_path / "one").mkdir()
+    (tmp_path / "other").mkdir()
+    told = arm(tmp_path / "one", toml)
+    found = coupled(told, record).predict(
+        told.plant._replace(lower=told.plant.lower._replace(**values))
+    )
+    assert written in ARM
+    other = arm(tmp_path / "other", toml, ARM.replace(written, instead))
+    expected = coupled(other, record).predict(other.plant)
+    assert np.max(np.abs(expected - coupled(told, record).predict(told.plant))) > 0.05
+    assert found == pytest.approx(expected, abs=1e-6)
+    # A base that is turned about the joints' own axis is a shoulder that is turned.
+    tilted = told.plant._replace(floor=told.plant.floor._replace(tilt_y=0.2))
+    hanging = coupled(told, record).predict(tilted)
+    assert np.max(np.abs(hanging - coupled(told, record).predict(told.plant))) > 0.05

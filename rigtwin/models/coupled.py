@@ -274,15 +274,17 @@ class CoupledModel:
         """Positions and velocities as the first samples have them, shape (2, coordinates). A joint
         that no sensor sees is where the MJCF has it, at rest."""
         size = self._bodies.coordinates
-        rows = [FIRMNESS * np.eye(size)]
-        values = [np.stack([FIRMNESS * self._bodies.place(), np.zeros(size)], axis=1)]
+        rows: list[Array] = [FIRMNESS * np.eye(size)]
+        still = np.zeros((size, 2))
+        still[:, 0] = FIRMNESS * self._bodies.place()
+        values: list[Array] = [still]
         for name in self._seen:
             sensor = getattr(plant, name)
             measured = self._read[name][0] if name in self._read else self._column(name)
             place, speed = read_start(measured, self._period)
             rows.append(self._along[name][None])
             position = (place - sensor.offset) / sensor.gain - self._zero[name]
-            values.append(np.array([[position, speed / sensor.gain]]))
+            values.append(np.array([[position, speed / sensor.gain]], float))
         found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
         return np.array(found.T, np.float64, order="C")
 
@@ -328,10 +330,9 @@ class CoupledModel:
         return sense
 
     def _find_judged(self) -> Judged | None:
-        """How a start is fitted; None where the error of one as it is read does not show, or nobody
-        asks for it."""
+        """How a start is fitted; None where the error of one as it is read does not show."""
         rows = [n for n, row in enumerate(self.rows) if row.kind == "position"]
-        if not rows or not self._machine.rough:
+        if not rows:
             return None
         held, noises = [], []
         for number in rows:
@@ -339,7 +340,8 @@ class CoupledModel:
             measured = self._recording.column(*row.channel)
             noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
             noises.append(noise)
-            held.append(max(self._machine.form_of(row) * float(np.std(measured)), noise, 1e-300))
+            form = self._machine.form_of(row) if self._machine.rough else 0.0
+            held.append(max(form * float(np.std(measured)), noise, 1e-300))
         error = start_error(float(np.max(noises)), self._period, self._ticks)
         errors = np.repeat(error, self._loose)
         plant = self._configuration.plant

@@ -195,14 +195,21 @@ class Multibody:
             With these.
         """
 
+        turned = np.empty(4)
+
         def alter(spec: mujoco.MjSpec) -> None:
             for name, (mass, mx, my, mz, *moments) in parameters.items():
                 body, centre = spec.body(name), np.array([mx, my, mz]) / mass
                 shifted = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
                 about = arrange_moments(moments) - shifted
+                principal, axes = np.linalg.eigh(about)
+                axes[:, 2] *= np.linalg.det(axes)
+                mujoco.mju_mat2Quat(turned, np.ascontiguousarray(axes).ravel())
                 body.explicitinertial = True
-                body.mass, body.ipos, body.iquat = mass, centre, (1.0, 0.0, 0.0, 0.0)
-                body.fullinertia = [*np.diag(about), about[0, 1], about[0, 2], about[1, 2]]
+                body.mass, body.ipos, body.iquat = mass, centre, turned
+                # A rounding below nothing is nothing.
+                body.inertia = np.maximum(principal, 1e-15)
+                body.fullinertia = np.full(6, np.nan)
             if gravity is not None:
                 spec.option.gravity = gravity(np.array(spec.option.gravity))
 
