@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,3 +82,13 @@ def _print_never(machine: Machine) -> None:
         print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
     if can.motions and not can.unseen and not can.alike:
         print("never identifiable: none; what a recording does not excite, its diagnosis says")
+    for each in can.sums:
+        print(f"seen of bodies and rotors: {_write_sum(each)}")
+
+
+def _write_sum(terms: Mapping[str, float]) -> str:
+    """A sum as it is written by hand."""
+    first, *others = terms
+    return first + "".join(
+        f" {'-' if terms[name] < 0.0 else '+'} {abs(terms[name]):.4g} {name}" for name in others
+    )

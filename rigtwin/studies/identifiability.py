@@ -33,6 +33,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording, reader
 from rigtwin.signals.excitation import multisine
 from rigtwin.simulation.experiment import find_experiment
+from rigtwin.studies.base_parameters import find_base_parameters
 
 SECONDS = 8.0
 """Of each made-up motion."""
@@ -79,12 +80,16 @@ class Identifiability:
         Effect → others that together do what it does.
     motions : tuple of str
         What it was tried on; empty where nothing says how far the machine may move.
+    sums : tuple of mappings
+        Base parameters of bodies and rotors of joints that act on each other, however far they
+        move: parameter → its coefficient (`find_base_parameters`).
     """
 
     seen: tuple[str, ...]
     unseen: tuple[str, ...]
     alike: Mapping[str, tuple[str, ...]]
     motions: tuple[str, ...]
+    sums: tuple[Mapping[str, float], ...] = ()
 
 
 def find_identifiable(machine: Machine) -> Identifiability:
@@ -98,17 +103,18 @@ def find_identifiable(machine: Machine) -> Identifiability:
     Returns
     -------
     Identifiability
-        Of all effects that are searched for; empty where the description does not say how far the
-        machine may move: its joints need a range, or it needs an experiment.
+        Of all effects that are searched for; empty but for its sums where the description does not
+        say how far the machine may move: its joints need a range, or it needs an experiment.
 
     Raises
     ------
     RigtwinError
         If one of its own experiments cannot be run.
     """
+    sums = find_base_parameters(machine)
     recordings = list(_make_up(machine))
     if not recordings:
-        return Identifiability((), (), {}, ())
+        return Identifiability((), (), {}, (), sums)
     tried = _Tried(machine, recordings)
     responses = {e.name: tried.response(e) for e in machine.effects() if e.searched}
     unseen = [name for name, own in responses.items() if own is None]
@@ -123,7 +129,7 @@ def find_identifiable(machine: Machine) -> Identifiability:
                 break
     seen = [name for name in responses if name not in unseen and name not in alike]
     return Identifiability(
-        tuple(seen), tuple(unseen), alike, tuple(str(r.experiment) for r in recordings)
+        tuple(seen), tuple(unseen), alike, tuple(str(r.experiment) for r in recordings), sums
     )
 
 
