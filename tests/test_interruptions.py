@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import pytest
 
@@ -27,6 +29,22 @@ def test_the_one_that_starts_it_gets_it_behind():
     with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
         os.kill(os.getpid(), signal.SIGINT)
         reached.append(True)
+    assert reached
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
+def test_another_thread_that_takes_it_changes_nothing():
+    reached, over = [], threading.Event()
+    other = threading.Thread(target=over.wait)
+    other.start()
+    try:
+        with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+            reached.append(True)
+    finally:
+        over.set()
+        other.join()
     assert reached
 
 
