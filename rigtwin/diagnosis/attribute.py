@@ -140,6 +140,7 @@ def _attribute_rough(
         search.coarse,
         judge,
         search.effects,
+        search.least,
         search.threads,
     )
     selection = _settle(selection, final)
