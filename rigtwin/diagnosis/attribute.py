@@ -140,7 +140,6 @@ def _attribute_rough(
         search.coarse,
         judge,
         search.effects,
-        search.least,
         search.threads,
     )
     selection = _settle(selection, final)

@@ -18,7 +18,7 @@ from rigtwin.diagnosis.finding import Support
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
-from rigtwin.diagnosis.proposals import propose_additions, propose_replacements
+from rigtwin.diagnosis.proposals import propose_replacements
 from rigtwin.diagnosis.ranking import LATE
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import SelectionRules
@@ -29,8 +29,6 @@ SHAKES, SHAKEN, PRICE = (0.6, 1.6), 2, 0.1
 price of a parameter they are the foremost."""
 ROUNDS = 5
 """Times that an explanation is chosen and its neighbours are judged too."""
-ADDED = 4
-"""Further effects that are tried beside the chosen ones at most."""
 JUDGED = 4
 """Explanations of each number of parameters that are judged at first."""
 
@@ -211,7 +209,8 @@ def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]
             if all(own in others or not _is_rare(own) for own in other.fit.effects)
         )
         share = math.exp(2.0 * rival) - math.exp(2.0 * each.score)
-        return each.complete or share >= rules.rarely**2 or rival - each.score >= rules.far
+        far = rules.far_and_complete if each.complete else rules.far
+        return share >= rules.rarely**2 or rival - each.score >= far
 
     return [
         each
@@ -275,7 +274,6 @@ def select(
     coarse: Fitter,
     judge: HeldOutJudge,
     effects: Sequence[Effect],
-    least: float,
     threads: Threads,
 ) -> Selection:
     """Chooses among explanations, and judges those next to the one that is chosen.
@@ -290,8 +288,6 @@ def select(
         Of fits to the evidence.
     effects
         Candidates.
-    least
-        χ² that a further one must promise to explain.
     threads
         Runs fits side by side.
 
@@ -318,9 +314,6 @@ def select(
         ]
         if chosen.fit.effects:
             near += propose_replacements(coarse, chosen.fit, effects, threads)
-            more = propose_additions(coarse, chosen.fit, effects, least, threads)
-            more.sort(key=lambda each: each.promised)
-            near += [(each.effects, each.values) for each in more[:ADDED]]
         fresh = [pair for pair in dict.fromkeys(near) if pair not in tried_starts]
         if not fresh:
             break
