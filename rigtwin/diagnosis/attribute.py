@@ -187,9 +187,29 @@ def _conclude(
     rules = thresholds.known
     cost = partial(penalised_cost, price=thresholds.price)
     gap = max(nothing.misfit - evidence.expected, 0.0)
+
+    def explained_by(fit: Fit) -> float:
+        return min((nothing.misfit - fit.misfit) / gap, 1.0) if gap > 0.0 else 0.0
+
+    def left_by(fit: Fit) -> float:
+        expected = evidence.expected_misfit(fit.plant)
+        return max(fit.misfit - expected, 0.0) / expected
+
     pool = sorted([*tried, nothing], key=cost)
+    rough = left_by(pool[0]) > rules.too_much
+    if rough:
+        # What explains nearly all is named though the model is not exact, but nothing beside it.
+        most = min(
+            (len(fit.effects) for fit in pool if explained_by(fit) >= rules.nearly_all),
+            default=None,
+        )
+        pool = [fit for fit in pool if most is None or len(fit.effects) <= most]
     best = pool[0]
-    expected = evidence.expected_misfit(best.plant)
+    expected, left, explained = (
+        evidence.expected_misfit(best.plant),
+        left_by(best),
+        explained_by(best),
+    )
     temper = thresholds.temper + thresholds.form_temper * max(best.misfit - expected, 0.0)
     apart = np.array([(cost(fit) - cost(best)) / (2.0 * temper) for fit in pool])
     weights = np.exp(-np.minimum(apart, 700.0))
@@ -203,14 +223,9 @@ def _conclude(
     )
     if found and len(best.effects) == 1 and within_tolerance(best, evidence, thresholds):
         found = False
-    left = max(best.misfit - expected, 0.0) / expected
-    explained = min((nothing.misfit - best.misfit) / gap, 1.0) if gap > 0.0 else 0.0
     more = left > thresholds.unexplained
-    named = (
-        ranking[0]
-        if found and not (more and (explained < rules.enough or left > rules.too_much))
-        else None
-    )
+    enough = rules.nearly_all if rough else rules.enough
+    named = ranking[0] if found and not (more and explained < enough) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
     return Attribution(
         nothing=nothing,

@@ -23,7 +23,9 @@ class NamingRules:
     enough: float
     """Share of the gap that they must explain to be named at all if something is left."""
     too_much: float
-    """χ² per degree of freedom above 1 from which what is left forbids to name anything."""
+    """χ² per degree of freedom above 1 from which what is left forbids to name anything,"""
+    nearly_all: float = 1.0
+    """unless that share of the gap is explained."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,9 @@ class Thresholds:
     """How much of what is left widens that."""
     member: float = 0.05
     """Probability from which an effect belongs to the class that is reported."""
-    known: NamingRules = field(default=NamingRules(most=2, more=0.5, enough=0.97, too_much=0.4))
+    known: NamingRules = field(
+        default=NamingRules(most=2, more=0.5, enough=0.97, too_much=0.4, nearly_all=0.995)
+    )
     """Of a machine whose nominal values are well known: what is left is something else."""
     rough: NamingRules = field(
         default=NamingRules(most=6, more=0.08, enough=0.75, too_much=math.inf)
