@@ -1,0 +1,75 @@
+"""A slider as it stands on a page: its scale and the digits that are shown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rigtwin.looking.slider import Slider
+
+POSITIONS = 400
+"""Of a slider, at least so many."""
+WIDE = 10.0
+"""Ratio of a positive range's ends from which its scale is logarithmic."""
+LEAST, LARGEST = 0.1, 1e5
+"""Between which the largest number of a range is written in the unit itself."""
+PREFIXED = {"s": "ms", "m": "mm", "V": "mV", "rad": "mrad"}
+"""Unit → a thousandth of it."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """low, high, step: of the positions; logarithmic: whether positions are decimal logarithms;
+    factor: what a value is multiplied by before; label: what is written beside it."""
+
+    slider: Slider
+    low: float
+    high: float
+    step: float
+    logarithmic: bool
+    factor: float
+    label: str
+
+    def position(self, value: float) -> float:
+        """Where a value is, at an end if it is beyond."""
+        if math.isnan(value):
+            return self.low
+        inside = min(max(value, self.slider.low), self.slider.high)
+        scaled = math.log10(inside) if self.logarithmic else self.factor * inside
+        return min(max(scaled, self.low), self.high)
+
+    def value(self, position: float) -> float:
+        """What a position means, in the slider's unit and within its range."""
+        meant = 10.0**position if self.logarithmic else position / self.factor
+        return min(max(meant, self.slider.low), self.slider.high)
+
+
+def knob_of(slider: Slider) -> Knob:
+    """The scale of a slider: logarithmic where all of a wide range is positive, in thousandths or
+    other powers of the unit where its numbers would be long."""
+    if slider.low > 0.0 and slider.high > WIDE * slider.low:
+        low, high = math.log10(slider.low), math.log10(slider.high)
+        label = f"log10 {slider.parameter}, {slider.unit}"
+        return Knob(slider, low, high, _step(low, high), True, 1.0, label)
+    largest = max(abs(slider.low), abs(slider.high))
+    unit, factor = slider.unit, 1.0
+    if not LEAST <= largest < LARGEST:
+        power = 3 * math.floor((math.log10(largest) + 1.0) / 3.0)
+        factor = 10.0**-power
+        named = PREFIXED.get(unit) if power == -3 else None
+        unit = named or f"1e{power} {'' if unit == '1' else unit}".strip()
+    low, high = factor * slider.low, factor * slider.high
+    return Knob(
+        slider,
+        low,
+        high,
+        _step(low, high),
+        False,
+        factor,
+        slider.parameter if unit == "1" else f"{slider.parameter}, {unit}",
+    )
+
+
+def _step(low: float, high: float) -> float:
+    """A power of ten that leaves enough positions."""
+    return 10.0 ** math.floor(math.log10((high - low) / POSITIONS))
