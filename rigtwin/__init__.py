@@ -125,6 +125,7 @@ __all__ = [
     "run_on_twin",
     "run_session",
     "serve_card",
+    "show_look",
     "stability",
     "tune",
     "what_changed",

@@ -65,15 +65,12 @@ class Controls:
         self._handles[name] = []
         for number, knob in enumerate(self._knobs[name]):
             slider = server.gui.add_slider(
-                knob.label,
+                knob.label(self._values[name][number]),
                 min=knob.low,
                 max=knob.high,
                 step=knob.step,
                 initial_value=knob.position(self._values[name][number]),
-                marks=(
-                    (knob.low, f"{knob.low:.3g}"),
-                    (knob.high, f"{knob.high:.3g}"),
-                ),
+                marks=((knob.low, knob.ends[0]), (knob.high, knob.ends[1])),
                 hint=f"{effect.kind.meaning}; the twin's own value: {knob.slider.nominal:.4g} "
                 f"{knob.slider.unit}",
             )
@@ -100,6 +97,7 @@ class Controls:
                     self._handles[name], self._knobs[name], self._values[name], strict=True
                 ):
                     handle.value = knob.position(value)
+                    handle.label = knob.label(value)
 
     def lock(self, locked: bool) -> None:
         """Lets nobody move anything, or everybody again."""
@@ -135,6 +133,8 @@ class Controls:
         if event.client_id is None:
             return
         with self._lock:
-            self._values[name][number] = knob.value(event.target.value)
+            value = knob.value(event.target.value)
+            self._values[name][number] = value
+            event.target.label = knob.label(value)
             self._tick(name)
         self._changed()

@@ -9,7 +9,7 @@ from rigtwin.looking.slider import Slider
 
 POSITIONS = 400
 """Of a slider, at least so many."""
-WIDE = 10.0
+WIDE = 30.0
 """Ratio of a positive range's ends from which its scale is logarithmic."""
 LEAST, LARGEST = 0.1, 1e5
 """Between which the largest number of a range is written in the unit itself."""
@@ -20,7 +20,7 @@ PREFIXED = {"s": "ms", "m": "mm", "V": "mV", "rad": "mrad"}
 @dataclass(frozen=True)
 class Knob:
     """low, high, step: of the positions; logarithmic: whether positions are decimal logarithms;
-    factor: what a value is multiplied by before; label: what is written beside it."""
+    factor: what a value is multiplied by where they are not; unit: of the positions then."""
 
     slider: Slider
     low: float
@@ -28,7 +28,20 @@ class Knob:
     step: float
     logarithmic: bool
     factor: float
-    label: str
+    unit: str
+
+    def label(self, value: float) -> str:
+        """What is written beside it: of a logarithm, the value itself too."""
+        name, unit = self.slider.parameter, "" if self.unit == "1" else self.unit
+        if self.logarithmic:
+            return f"{name} {value:.3g} {unit}".strip()
+        return f"{name}, {unit}" if unit else name
+
+    @property
+    def ends(self) -> tuple[str, str]:
+        """What is written under its ends, in the unit of `label`."""
+        scale = 1.0 if self.logarithmic else self.factor
+        return f"{scale * self.slider.low:.4g}", f"{scale * self.slider.high:.4g}"
 
     def position(self, value: float) -> float:
         """Where a value is, at an end if it is beyond."""
@@ -49,8 +62,7 @@ def knob_of(slider: Slider) -> Knob:
     other powers of the unit where its numbers would be long."""
     if slider.low > 0.0 and slider.high > WIDE * slider.low:
         low, high = math.log10(slider.low), math.log10(slider.high)
-        label = f"log10 {slider.parameter}, {slider.unit}"
-        return Knob(slider, low, high, _step(low, high), True, 1.0, label)
+        return Knob(slider, low, high, _step(low, high), True, 1.0, slider.unit)
     largest = max(abs(slider.low), abs(slider.high))
     unit, factor = slider.unit, 1.0
     if not LEAST <= largest < LARGEST:
@@ -59,15 +71,7 @@ def knob_of(slider: Slider) -> Knob:
         named = PREFIXED.get(unit) if power == -3 else None
         unit = named or f"1e{power} {'' if unit == '1' else unit}".strip()
     low, high = factor * slider.low, factor * slider.high
-    return Knob(
-        slider,
-        low,
-        high,
-        _step(low, high),
-        False,
-        factor,
-        slider.parameter if unit == "1" else f"{slider.parameter}, {unit}",
-    )
+    return Knob(slider, low, high, _step(low, high), False, factor, unit)
 
 
 def _step(low: float, high: float) -> float:

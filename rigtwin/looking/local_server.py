@@ -59,6 +59,8 @@ def open_server(port: int, label: str) -> LocalServer:
     if server.get_port() != free:
         stop_server(server)
         raise RigtwinError(f"no page on port {port}: it was taken just now; 0 takes a free one")
+    # Where there is no graphics card, shadows are most of what a picture costs.
+    server.scene.configure_default_lights(cast_shadow=False)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 

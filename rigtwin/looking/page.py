@@ -122,6 +122,11 @@ class Page:
                 self._now = float(self._scrubber.value)
                 self._refresh("plots", "scene")
 
+    @property
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """Of the effects that are in the twin now."""
+        return self._controls.values
+
     def wait(self) -> None:
         """Returns when the page is closed. Raises what went wrong in it."""
         while not self._closed:
@@ -137,9 +142,9 @@ class Page:
         with self._wake:
             self._closed = True
             self._wake.notify_all()
-        stop_server(self._server)
         for thread in self._threads:
             thread.join(timeout=1.0)
+        stop_server(self._server)
 
     def __enter__(self) -> Page:
         return self
@@ -227,9 +232,12 @@ class Page:
         finally:
             done.set()
             teller.join()
-            self._controls.lock(False)
-            for button in buttons:
-                button.disabled = False
+            if not self._closed:
+                self._controls.lock(False)
+                for button in buttons:
+                    button.disabled = False
+        if self._closed:
+            return
         self._controls.set(
             {
                 effect.name: value

@@ -39,7 +39,7 @@ class Plots:
             title=_title(sensor, unit),
             height=HEIGHT,
         )
-        self._left = server.gui.add_uplot(
+        self._residual = server.gui.add_uplot(
             (start, *[np.zeros(len(start))] * 3),
             (
                 uplot.Series(label="time, s"),
@@ -48,7 +48,7 @@ class Plots:
                 uplot.Series(label="now", stroke=NOW, width=1),
             ),
             scales={"x": uplot.Scale(time=False)},
-            title=f"left: measured less predicted, {unit}",
+            title=_title("residual: measured less predicted", unit),
             height=HEIGHT,
         )
 
@@ -57,7 +57,7 @@ class Plots:
         if sensor != self._sensor:
             unit = self._look.units[self._look.sensors.index(sensor)]
             self._traces.title = _title(sensor, unit)
-            self._left.title = f"left: measured less predicted, {unit}"
+            self._residual.title = _title("residual: measured less predicted", unit)
         self._sensor, self._stretch = sensor, stretch
 
     def draw(self, prediction: Prediction, now: float) -> None:
@@ -69,7 +69,7 @@ class Plots:
         time, traces = thin(look.time[part], [measured, nominal, predicted])
         self._traces.data = mark(time, traces, now)
         time, traces = thin(look.time[part], [measured - nominal, measured - predicted])
-        self._left.data = mark(time, traces, now)
+        self._residual.data = mark(time, traces, now)
 
 
 def _title(sensor: str, unit: str) -> str:

@@ -24,9 +24,10 @@ class Scene:
         self._body = Body(machine)
         self._server = server
         shapes = self._body.shapes()
-        place, centre = self._body.camera()
+        place, centre, angle = self._body.camera()
         server.initial_camera.position = place
         server.initial_camera.look_at = centre
+        server.initial_camera.fov = angle
         self._machine = _add(server, "/machine", shapes)
         moving = [shape for shape in shapes if shape.moves]
         self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
+from rigtwin.looking.skeleton import draw_bones
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.mechanics import SCENE
 
@@ -21,6 +23,10 @@ PLANE = 4.0
 """Times the machine's size that a plane without end is drawn."""
 THIN = 1e-3
 """The same, of its thickness."""
+BONE = (150, 160, 175)
+"""Colour of a body that has no shape, red, green, blue."""
+ASPECT = 16.0 / 9.0
+"""Width over height of the pictures that cameras of an MJCF are set for."""
 BALL = 2
 """Subdivisions of an icosahedron that is drawn as a ball."""
 
@@ -82,6 +88,29 @@ class Body:
                     turn=model.geom_quat[number].copy(),
                 )
             )
+        return [*found, *self._bones({shape.body for shape in found})]
+
+    def _bones(self, shaped: set[int]) -> list[Shape]:
+        """Of all bodies that move, have a mass, and no shape of their own."""
+        found = []
+        for body in range(1, self._model.nbody):
+            moves = int(self._model.body_weldid[body]) != 0
+            if body in shaped or not moves or self._model.body_mass[body] <= 0.0:
+                continue
+            mesh = draw_bones(self._model, body)
+            found.append(
+                Shape(
+                    body=body,
+                    moves=True,
+                    vertices=np.asarray(mesh.vertices),
+                    faces=np.asarray(mesh.faces),
+                    colour=BONE,
+                    opacity=1.0,
+                    edges=False,
+                    position=np.zeros(3),
+                    turn=np.array([1.0, 0.0, 0.0, 0.0]),
+                )
+            )
         return found
 
     def poses(self, positions: Mapping[str, float]) -> tuple[Array, Array]:
@@ -103,9 +132,9 @@ class Body:
         mujoco.mj_kinematics(self._model, self._data)
         return self._data.xpos.copy(), self._data.xquat.copy()
 
-    def camera(self) -> tuple[Array, Array]:
-        """Where the machine is looked at from, and to: m, as the first camera of the MJCF does, or
-        from aside and above."""
+    def camera(self) -> tuple[Array, Array, float]:
+        """Where the machine is looked at from, and to, m, and the upright angle of what is seen,
+        rad: as the first camera of the MJCF has it, or from aside and above."""
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -115,8 +144,15 @@ class Body:
             place = self._data.cam_xpos[0].copy()
             forward = -self._data.cam_xmat[0].reshape(3, 3)[:, 2]
             ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
-            return place, place + ahead * forward
-        return centre + statistic.extent * np.array([0.7, -1.4, 0.7]), centre
+            return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
+        aside = statistic.extent * np.array([0.7, -1.4, 0.7])
+        return centre + aside, centre, _widen(self._model.vis.global_.fovy)
+
+
+def _widen(angle: float) -> float:
+    """The upright angle, rad, of a picture as high as wide, in which is seen what one of `ASPECT`
+    with an upright angle in degrees shows."""
+    return 2.0 * math.atan(ASPECT * math.tan(0.5 * math.radians(angle)))
 
 
 def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:

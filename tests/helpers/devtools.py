@@ -34,9 +34,7 @@ class Tab:
     def call(self, method: str, **params: object) -> dict[str, Any]:
         """One command, and its result."""
         self._number += 1
-        self._connection.send(
-            json.dumps({"id": self._number, "method": method, "params": params})
-        )
+        self._connection.send(json.dumps({"id": self._number, "method": method, "params": params}))
         while True:
             reply = json.loads(self._connection.recv(timeout=PATIENCE))
             if reply.get("id") == self._number:
