@@ -29,10 +29,16 @@ from tests.helpers.devtools import Tab, browser
 
 EFFECT, TRUE = "coulomb@guide", 6.0
 DRAGS = 12
+SMALL = (1200, 600)
+"""Pixels of a window whose picture is soon drawn without a graphics card."""
 DRIVE = """
-window.labels = () => [...document.querySelectorAll('label')];
+window.titled = title => [...document.querySelectorAll('.mantine-Paper-root')].find(
+  e => e.textContent.trim() === title);
 window.after = (text, steps) => {
-  const all = labels(), at = all.findIndex(l => l.textContent.trim() === text);
+  const [kind, component] = text.split('@');
+  const folder = component ? titled(component)?.parentElement : document;
+  const all = [...(folder?.querySelectorAll('label') ?? [])];
+  const at = all.findIndex(l => l.textContent.trim() === kind);
   return at < 0 ? null : document.getElementById(all[at + steps].htmlFor);
 };
 window.box = element => {
@@ -112,16 +118,14 @@ def press(tab: Tab, text: str) -> None:
 
 
 def open_folder(tab: Tab, title: str) -> None:
-    tab.ask(
-        "[...document.querySelectorAll('[class*=folderLabel], .mantine-Paper-root')]"
-        f".find(e => e.textContent.trim() === '{title}').click()"
-    )
+    tab.ask(f"titled('{title}').click()")
+    time.sleep(1.0)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="needs chromium")
 def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
-    with browser(tmp_path) as running, running.tab(page.url) as first:
+    with browser(tmp_path, SMALL) as running, running.tab(page.url) as first:
         tab = opened(first)
         assert tab.ask("overall()") == pytest.approx(look.nominal.overall, rel=0.01)
         (slider,) = look.sliders[EFFECT]
@@ -168,7 +172,7 @@ def test_an_arm_of_six_joints_follows_a_drag(tmp_path):
     recording = rigtwin.run(
         rigtwin.machine("tx40"), "swing", seed=1, effects={"viscous@joint_2": 9.0}
     )
-    with rigtwin.show_look(rigtwin.look(recording)) as page, browser(tmp_path) as running:  # noqa: SIM117
+    with rigtwin.show_look(rigtwin.look(recording)) as page, browser(tmp_path, SMALL) as running:  # noqa: SIM117
         with running.tab(page.url) as first:
             tab = opened(first)
             open_folder(tab, "joint_2")

@@ -45,7 +45,9 @@ class Controls:
         for title, names, opened in self._folders(tuple(first)):
             with server.gui.add_folder(title, expand_by_default=opened):
                 for name in names:
-                    self._add(server, name)
+                    # In its component's folder an effect's kind says all.
+                    full = title != look.effects[name].component
+                    self._add(server, name, name if full else look.effects[name].kind.name)
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
         """Titles, effects, and whether they are open."""
@@ -57,9 +59,9 @@ class Controls:
         few = sum(len(knobs) for knobs in self._knobs.values()) <= FEW
         return [*folders, *((title, names, few) for title, names in by_component.items())]
 
-    def _add(self, server: viser.ViserServer, name: str) -> None:
+    def _add(self, server: viser.ViserServer, name: str, label: str) -> None:
         effect = self._look.effects[name]
-        tick = server.gui.add_checkbox(name, False, hint=effect.kind.meaning)
+        tick = server.gui.add_checkbox(label, False, hint=effect.kind.meaning)
         tick.on_update(lambda event: self._on_tick(name, event))
         self._ticks[name] = tick
         self._handles[name] = []

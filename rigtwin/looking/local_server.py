@@ -12,6 +12,8 @@ from rigtwin.errors import RigtwinError
 
 HOST = "127.0.0.1"
 PORTS = 65535
+AMBIENT = 0.8
+"""Light from everywhere, so that nothing is black."""
 
 
 class LocalServer(viser.ViserServer):
@@ -59,8 +61,11 @@ def open_server(port: int, label: str) -> LocalServer:
     if server.get_port() != free:
         stop_server(server)
         raise RigtwinError(f"no page on port {port}: it was taken just now; 0 takes a free one")
-    # Where there is no graphics card, shadows are most of what a picture costs.
+    # Where there is no graphics card, mirrored surroundings and shadows are most of what a picture
+    # costs, and whoever drags a slider waits for pictures.
+    server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=AMBIENT)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 
