@@ -51,6 +51,8 @@ window.track = (text, steps) => {
   const slider = after(text, steps);
   return box(slider && (slider.querySelector('.mantine-Slider-track') || slider));
 };
+window.scrubbed = () => parseFloat(
+  after('time, s', 0).querySelector('[role=slider]').getAttribute('aria-valuenow'));
 window.button = text => box(
   [...document.querySelectorAll('button')].find(b => b.textContent.trim() === text));
 window.overall = () => parseFloat(document.getElementById('overall')?.textContent);
@@ -151,6 +153,11 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
         marked = tab.ask("Array.from(traces()[0][0])")
         drag(tab, "time, s", [0.5], steps=0)
         assert tab.ask("Array.from(traces()[0][0])") != marked
+        left, y, width, _ = tab.wait_for("box(after('play', 0))")
+        seen = tab.ask("scrubbed()")
+        tab.click(left + width / 2, y)
+        tab.wait_for(f"scrubbed() > {seen} + 0.2 || scrubbed() < {seen}")
+        tab.click(left + width / 2, y)
         press(tab, "fit what is ticked")
         tab.wait_for("notes().includes('fitted in')")
         assert tab.ask("overall()") < 0.06 * look.nominal.overall

@@ -31,7 +31,7 @@ def draw_bones(model: mujoco.MjModel, body: int) -> trimesh.Trimesh:
         In the body's frame, m.
     """
     size = float(model.stat.extent)
-    parts = [trimesh.creation.icosphere(subdivisions=2, radius=WIDER * THICK * size)]
+    drawn = trimesh.creation.icosphere(subdivisions=2, radius=WIDER * THICK * size)
     carried = [
         model.body_pos[child]
         for child in range(1, model.nbody)
@@ -39,5 +39,5 @@ def draw_bones(model: mujoco.MjModel, body: int) -> trimesh.Trimesh:
     ]
     for end in (*carried, model.body_ipos[body]):
         if float(np.linalg.norm(end)) > SHORTEST * size:
-            parts.append(trimesh.creation.cylinder(radius=THICK * size, segment=[np.zeros(3), end]))
-    return trimesh.util.concatenate(parts)
+            drawn += trimesh.creation.cylinder(radius=THICK * size, segment=[np.zeros(3), end])
+    return drawn

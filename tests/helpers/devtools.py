@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 from tests.helpers.browser import BROWSER
 
@@ -24,7 +25,7 @@ PATIENCE = 60.0
 class Tab:
     """One tab of a browser. errors: what its console was told; asked: addresses it asked for."""
 
-    def __init__(self, connection: ClientConnection) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._connection, self._number = connection, 0
         self.errors: list[str] = []
         self.asked: set[str] = set()
