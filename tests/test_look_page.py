@@ -7,8 +7,10 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
 
@@ -231,26 +233,33 @@ def test_the_command_ends_with_ctrl_c(look, tmp_path):
     assert (running.returncode, said, complaints) == (0, "closed\n", "")
 
 
-def answer_of(look: Look) -> dict[str, object]:
+def answer_of(look: Look, effect: str, values: tuple[float, ...]) -> dict[str, object]:
     return {
         "machine": look.machine.name,
         "recordings": [str(look.recording.path)],
         "sentence": "dry friction of the guide",
         "effects": [
-            {
-                "component": "guide",
-                "kind": "coulomb",
-                "parameters": {"coulomb": {"value": TRUE}},
-                "confidence": 0.97,
-            },
+            found(effect, look, values),
             {"component": "computer", "kind": "setting", "parameters": {}, "confidence": 0.9},
         ],
     }
 
 
+def found(effect: str, look: Look, values: tuple[float, ...]) -> dict[str, object]:
+    """A finding as a diagnosis' JSON has it."""
+    kind, _, component = effect.partition("@")
+    names = look.effects[effect].kind.parameters
+    return {
+        "component": component,
+        "kind": kind,
+        "parameters": {n: {"value": v} for n, v in zip(names, values, strict=True)},
+        "confidence": 0.97,
+    }
+
+
 def test_it_begins_with_what_was_diagnosed(look, tmp_path):
     path = tmp_path / "why.json"
-    path.write_text(json.dumps(answer_of(look)))
+    path.write_text(json.dumps(answer_of(look, EFFECT, (TRUE,))))
     given = read_answer(path, look)
     assert given.values == {EFFECT: (TRUE,)}
     assert given.beside == ("setting@computer",)
@@ -270,7 +279,9 @@ def test_it_begins_with_what_was_diagnosed(look, tmp_path):
 )
 def test_what_is_no_diagnosis_of_it_is_said_in_one_line(look, tmp_path, change, said):
     path = tmp_path / "why.json"
-    path.write_text("no" if change is None else json.dumps({**answer_of(look), **change}))
+    path.write_text(
+        "no" if change is None else json.dumps({**answer_of(look, EFFECT, (TRUE,)), **change})
+    )
     with pytest.raises(rigtwin.RigtwinError, match=re.escape(said)) as error:
         rigtwin.show_look(look, diagnosis=path)
     assert "\n" not in str(error.value)
@@ -328,3 +339,26 @@ def test_every_machine_can_be_drawn_and_posed(name):
     there, back = body.poses({})
     assert np.array_equal(still, there)
     assert not (np.array_equal(moved, still) and np.array_equal(turned, back))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", rigtwin.machines())
+def test_every_machine_has_a_page_that_follows_its_effects(name):
+    machine = rigtwin.machine(name)
+    experiments = list(rigtwin.experiments(machine))
+    if not experiments:
+        pytest.skip("described without an experiment")
+    experiment = "imposed" if name == "suspension-rig" else experiments[0]
+    settings = {"timing": {"duration": 4.0}}
+    look = rigtwin.look(rigtwin.run(machine, experiment, seed=1, settings=settings))
+    effect = next(iter(look.effects))
+    largest = {effect: tuple(slider.high for slider in look.sliders[effect])}
+    answer = answer_of(look, effect, largest[effect])
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "why.json"
+        path.write_text(json.dumps(answer))
+        with rigtwin.show_look(look, diagnosis=path) as page:
+            until = time.monotonic() + 20.0
+            while page.prediction.overall == look.nominal.overall and time.monotonic() < until:
+                time.sleep(0.05)
+            assert page.prediction.overall == look.predict(largest).overall

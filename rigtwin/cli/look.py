@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_machine, add_settings, settings_of
-from rigtwin.console import writable
+from rigtwin.console import apart, writable
 
 SUMMARY = "see a recording beside its twin, and move what may be wrong by hand"
 MORE = """\
@@ -45,16 +45,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
-    if parsed.save_twin is not None:
-        writable(parsed.save_twin)
+    out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
+    writable(apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None)))
     look = rigtwin.look(
         rigtwin.load(parsed.recording, parsed.machine),
         settings=settings_of(parsed),
         without=parsed.without,
     )
-    page = rigtwin.show_look(
-        look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=parsed.save_twin
-    )
+    page = rigtwin.show_look(look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=out)
     with page:
         print(f"{page.url}, until Ctrl-C", flush=True)
         try:

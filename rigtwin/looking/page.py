@@ -6,7 +6,6 @@ server's take down what is asked for, one predicts and fits what was asked for l
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -18,18 +17,16 @@ from rigtwin.looking.controls import Controls
 from rigtwin.looking.given import Given
 from rigtwin.looking.local_server import HOST, open_server, stop_server
 from rigtwin.looking.look import Look
-from rigtwin.looking.plots import STRETCHES, WHOLE, Plots
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.scene import Scene
 from rigtwin.looking.texts import describe_errors, describe_fit, describe_given, note
+from rigtwin.looking.timeline import Timeline
 from rigtwin.numerics.arrays import Array
 
 FRAME = 1.0 / 30.0
 """s, from one picture to the next while time runs."""
 PLOTTED = 4
 """Every so many of them the plots' mark moves too."""
-RATES = {"as it was": 1.0, "a quarter as fast": 0.25, "a tenth as fast": 0.1}
-MAGNIFIED = {"as it is": 1.0, "10 times": 10.0, "100 times": 100.0}
 
 
 class Page:
@@ -52,8 +49,11 @@ class Page:
         self._stale = {"text", "plots", "scene"}
         self._measured = look.positions()
         self._predicted = self._measured
-        self._now = float(look.time[0])
-        self._build(given)
+        try:
+            self._build(given)
+        except BaseException:
+            stop_server(self._server)
+            raise
         self._threads = [
             threading.Thread(target=self._guard, args=(work,), daemon=True)
             for work in (self._predict, self._draw)
@@ -80,52 +80,18 @@ class Page:
         values = {} if given is None else given.values
         self._controls = Controls(self._server, look, values, self._on_moved)
         self._controls.set(values)
-        panel = gui.add_panel()
-        with panel.add_tab("time"):
-            self._build_time()
-        panel.dock_left()
-        panel.set_width(560)
-
-    def _build_time(self) -> None:
-        look, gui = self._look, self._server.gui
-        worst = max(look.nominal.percent, key=lambda name: look.nominal.percent[name])
-        start, end = float(look.time[0]), float(look.time[-1])
-        self._scrubber = gui.add_slider(
-            "time, s",
-            min=start,
-            max=end,
-            step=10.0 ** math.floor(math.log10((end - start) / 1000.0)),
-            initial_value=start,
-            marks=((start, f"{start:g}"), (end, f"{end:g}")),
-        )
-        self._play = gui.add_checkbox("play", False)
-        self._rate = gui.add_dropdown("how fast", tuple(RATES))
-        self._sensor = gui.add_dropdown("sensor", look.sensors, initial_value=worst)
-        self._stretch = gui.add_dropdown("shown", tuple(STRETCHES), initial_value=WHOLE)
-        self._plots = Plots(self._server, look, worst)
-        if look.predicts_motion:
-            self._magnified = gui.add_dropdown("gap in the picture", tuple(MAGNIFIED))
-            self._magnified.on_update(lambda _: self._refresh("scene"))
-            gui.add_html(note("solid: the machine as measured; orange: the twin's prediction"))
-        else:
-            self._magnified = None
-            gui.add_html(
-                note("this twin moves as measured: what it predicts are forces, so it has no ghost")
-            )
-        self._play.on_update(lambda _: self._refresh())
-        for chosen in (self._sensor, self._stretch):
-            chosen.on_update(lambda _: self._refresh("plots"))
-
-        @self._scrubber.on_update
-        def _(event: object) -> None:
-            if getattr(event, "client_id", None) is not None:
-                self._now = float(self._scrubber.value)
-                self._refresh("plots", "scene")
+        self._timeline = Timeline(self._server, look, self._refresh)
+        self._server.on_client_connect(lambda _: self._refresh())
 
     @property
     def values(self) -> dict[str, tuple[float, ...]]:
         """Of the effects that are in the twin now."""
         return self._controls.values
+
+    @property
+    def prediction(self) -> Prediction:
+        """What the page shows of the twin with these effects, or a moment ago with others."""
+        return self._prediction
 
     def wait(self) -> None:
         """Returns when the page is closed. Raises what went wrong in it."""
@@ -256,51 +222,35 @@ class Page:
 
     def _draw(self) -> None:
         """What is no longer so, until the page is closed."""
-        frame, last = 0, time.monotonic()
+        frame, last = 0, None
         while True:
             with self._wake:
-                if self._plays:
+                if self._timeline.plays:
                     self._wake.wait(FRAME)
                 else:
-                    self._wake.wait_for(lambda: self._stale or self._closed or self._plays)
+                    self._wake.wait_for(lambda: self._stale or self._closed or self._timeline.plays)
                 if self._closed:
                     return
                 stale, self._stale = self._stale, set()
                 prediction, predicted = self._prediction, self._predicted
             here = time.monotonic()
-            if self._plays:
-                self._advance((here - last) * RATES[self._rate.value])
-                frame += 1
+            if self._timeline.plays:
+                self._timeline.advance(0.0 if last is None else here - last)
+                frame, last = frame + 1, here
                 stale |= {"scene"} if frame % PLOTTED else {"scene", "plots"}
-            last = here
+            else:
+                last = None
             if "text" in stale:
                 self._errors.content = describe_errors(self._look, prediction)
             if "plots" in stale:
-                self._plots.show(self._sensor.value, self._stretch.value)
-                self._plots.draw(prediction, self._now)
-                if self._plays:
-                    self._scrubber.value = self._now
+                self._timeline.draw(prediction)
             if "scene" in stale:
                 self._pose(predicted)
 
-    @property
-    def _plays(self) -> bool:
-        """Whether time runs: somebody asked for it, and somebody looks."""
-        return self._play.value and bool(self._server.get_clients())
-
-    def _advance(self, seconds: float) -> None:
-        """Lets time go on; from the end it begins again."""
-        start, end = float(self._look.time[0]), float(self._look.time[-1])
-        self._now = self._now + seconds if self._now + seconds <= end else start
-
     def _pose(self, predicted: Mapping[str, Array]) -> None:
-        look = self._look
-        tick = min(
-            round((self._now - look.time[0]) / (look.time[1] - look.time[0])), len(look.time) - 1
-        )
-        magnify = 1.0 if self._magnified is None else MAGNIFIED[self._magnified.value]
+        tick = self._timeline.tick
         self._scene.draw(
             {joint: float(values[tick]) for joint, values in self._measured.items()},
             {joint: float(values[tick]) for joint, values in predicted.items()},
-            magnify,
+            self._timeline.magnify,
         )

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.components import PositionActuator, measures
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Component, Machine, Structure
 from rigtwin.numerics.arrays import Array
 
 SMOOTHING = 20.0
@@ -50,14 +50,28 @@ def joint_positions(
         for name, component in machine.components.items():
             part = getattr(machine.plant, name)
             says = "command" if isinstance(part, PositionActuator) else measures(part)
-            if says != wanted or component.joint in found or component.channel is None:
+            signal = _find_signal(component, columns)
+            if says != wanted or signal is None or component.joint in ("", *found):
                 continue
-            topic, label = component.channel
-            signal = columns.get(topic, {}).get(label)
+            summed = np.cumsum(signal - np.mean(signal)) * period
+            found[component.joint] = summed if wanted == "velocity" else signal
+    for name, component in machine.components.items():
+        # What is measured between joints says where the last of them is.
+        signal = _find_signal(component, columns)
+        unknown = [(joint, share) for joint, share in component.acts_on if joint not in found]
+        if measures(getattr(machine.plant, name)) == "position" and len(unknown) == 1:
+            known = [share * found[joint] for joint, share in component.acts_on if joint in found]
             if signal is not None:
-                summed = np.cumsum(signal - np.mean(signal)) * period
-                found[component.joint] = summed if wanted == "velocity" else signal
+                ((joint, share),) = unknown
+                found[joint] = (signal - sum(known)) / share
     return found
+
+
+def _find_signal(component: Component, columns: Mapping[str, Mapping[str, Array]]) -> Array | None:
+    if component.channel is None:
+        return None
+    topic, name = component.channel
+    return columns.get(topic, {}).get(name)
 
 
 def _smooth(signal: Array, period: float) -> Array:
