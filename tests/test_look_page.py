@@ -23,6 +23,7 @@ from rigtwin.looking.given import read_answer
 from rigtwin.looking.knob import knob_of
 from rigtwin.looking.local_server import HOST, open_server, stop_server
 from rigtwin.looking.page import Page
+from rigtwin.looking.scale import shorten
 from rigtwin.looking.shapes import Body
 from rigtwin.looking.traces import BUCKETS, mark, thin
 from tests.helpers.browser import BROWSER
@@ -305,6 +306,24 @@ def test_a_wide_positive_range_is_logarithmic():
     assert knob.label(0.03) == "stribeck_velocity 0.03 m/s"
     small = knob_of(Slider("backlash@guide", "backlash", "m", 0.0, 0.016, 0.0, 0.001))
     assert (small.label(0.0), small.low, small.high) == ("backlash, mm", 0.0, 16.0)
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "scale"),
+    [
+        (0.0, "m", (1.0, "m")),
+        (0.5, "m", (1.0, "m")),
+        (0.05, "m", (1e3, "mm")),
+        (2e-4, "rad", (1e3, "mrad")),
+        (2e-5, "m/N", (1e6, "1e-6 m/N")),
+        (0.01, "1", (1e3, "1e-3")),
+        (2e5, "N/m", (1e-6, "1e6 N/m")),
+    ],
+)
+def test_numbers_are_short_in_their_unit(largest, unit, scale):
+    factor, named = shorten(largest, unit)
+    assert (factor, named) == (pytest.approx(scale[0]), scale[1])
+    assert largest == 0.0 or 0.1 <= factor * largest < 1e5
 
 
 @pytest.mark.parametrize("ticks", [2, 2 * BUCKETS, 10_007])

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from rigtwin.looking.scale import shorten
 from rigtwin.looking.slider import Slider
 
 POSITIONS = 400
 """Of a slider, at least so many."""
 WIDE = 30.0
 """Ratio of a positive range's ends from which its scale is logarithmic."""
-LEAST, LARGEST = 0.1, 1e5
-"""Between which the largest number of a range is written in the unit itself."""
-PREFIXED = {"s": "ms", "m": "mm", "V": "mV", "rad": "mrad"}
-"""Unit → a thousandth of it."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +29,10 @@ class Knob:
 
     def label(self, value: float) -> str:
         """What is written beside it: of a logarithm, the value itself too."""
-        name, unit = self.slider.parameter, "" if self.unit == "1" else self.unit
+        name = self.slider.parameter
         if self.logarithmic:
-            return f"{name} {value:.3g} {unit}".strip()
-        return f"{name}, {unit}" if unit else name
+            return f"{name} {value:.3g} {self.unit}".strip()
+        return f"{name}, {self.unit}" if self.unit else name
 
     @property
     def ends(self) -> tuple[str, str]:
@@ -62,14 +59,9 @@ def knob_of(slider: Slider) -> Knob:
     other powers of the unit where its numbers would be long."""
     if slider.low > 0.0 and slider.high > WIDE * slider.low:
         low, high = math.log10(slider.low), math.log10(slider.high)
-        return Knob(slider, low, high, _step(low, high), True, 1.0, slider.unit)
-    largest = max(abs(slider.low), abs(slider.high))
-    unit, factor = slider.unit, 1.0
-    if not LEAST <= largest < LARGEST:
-        power = 3 * math.floor((math.log10(largest) + 1.0) / 3.0)
-        factor = 10.0**-power
-        named = PREFIXED.get(unit) if power == -3 else None
-        unit = named or f"1e{power} {'' if unit == '1' else unit}".strip()
+        unit = "" if slider.unit == "1" else slider.unit
+        return Knob(slider, low, high, _step(low, high), True, 1.0, unit)
+    factor, unit = shorten(max(abs(slider.low), abs(slider.high)), slider.unit)
     low, high = factor * slider.low, factor * slider.high
     return Knob(slider, low, high, _step(low, high), False, factor, unit)
 

@@ -8,6 +8,7 @@ from viser import uplot
 
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
+from rigtwin.looking.scale import shorten
 from rigtwin.looking.traces import mark, thin
 from rigtwin.numerics.arrays import Array
 
@@ -23,9 +24,8 @@ class Plots:
     """Two plots of one sensor, one over the other."""
 
     def __init__(self, server: viser.ViserServer, look: Look, sensor: str) -> None:
-        self._look, self._sensor, self._stretch = look, sensor, WHOLE
-        unit = look.units[look.sensors.index(sensor)]
-        start = _flat(look.time)
+        self._look, self._row, self._stretch = look, -1, WHOLE
+        start = np.array([look.time[0], look.time[-1]])
         self._traces = server.gui.add_uplot(
             (start, *[np.zeros(len(start))] * 4),
             (
@@ -36,7 +36,6 @@ class Plots:
                 uplot.Series(label="now", stroke=NOW, width=1),
             ),
             scales={"x": uplot.Scale(time=False)},
-            title=_title(sensor, unit),
             height=HEIGHT,
         )
         self._residual = server.gui.add_uplot(
@@ -48,36 +47,38 @@ class Plots:
                 uplot.Series(label="now", stroke=NOW, width=1),
             ),
             scales={"x": uplot.Scale(time=False)},
-            title=_title("residual: measured less predicted", unit),
             height=HEIGHT,
         )
+        self.show(sensor, WHOLE)
 
     def show(self, sensor: str, stretch: str) -> None:
         """Chooses what `draw` draws: a sensor, and one of `STRETCHES`."""
-        if sensor != self._sensor:
-            unit = self._look.units[self._look.sensors.index(sensor)]
-            self._traces.title = _title(sensor, unit)
-            self._residual.title = _title("residual: measured less predicted", unit)
-        self._sensor, self._stretch = sensor, stretch
+        look, row = self._look, self._look.sensors.index(sensor)
+        self._stretch = stretch
+        if row == self._row:
+            return
+        self._row = row
+        left = look.measured[row] - look.nominal.signals[row]
+        # A page's axes have three decimals.
+        self._factor, unit = shorten(float(np.max(np.abs(look.measured[row]))), look.units[row])
+        self._finer, unit_left = shorten(float(np.max(np.abs(left))), look.units[row])
+        self._traces.title = _title(sensor, unit)
+        self._residual.title = _title("residual: measured less predicted", unit_left)
 
     def draw(self, prediction: Prediction, now: float) -> None:
         """Draws a twin's prediction with the time `now`, s, marked."""
-        look, row = self._look, self._look.sensors.index(self._sensor)
+        look, row = self._look, self._row
         part = _window(look.time, now, STRETCHES[self._stretch])
         measured = look.measured[row][part]
         nominal, predicted = look.nominal.signals[row][part], prediction.signals[row][part]
         time, traces = thin(look.time[part], [measured, nominal, predicted])
-        self._traces.data = mark(time, traces, now)
+        self._traces.data = mark(time, [self._factor * trace for trace in traces], now)
         time, traces = thin(look.time[part], [measured - nominal, measured - predicted])
-        self._residual.data = mark(time, traces, now)
+        self._residual.data = mark(time, [self._finer * trace for trace in traces], now)
 
 
-def _title(sensor: str, unit: str) -> str:
-    return sensor if unit in ("", "1") else f"{sensor}, {unit}"
-
-
-def _flat(time: Array) -> Array:
-    return np.array([time[0], time[-1]])
+def _title(name: str, unit: str) -> str:
+    return f"{name}, {unit}" if unit else name
 
 
 def _window(time: Array, now: float, length: float) -> slice:
