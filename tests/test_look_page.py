@@ -231,7 +231,7 @@ def test_the_command_ends_with_ctrl_c(look, tmp_path):
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+, until Ctrl-C\n", running.stdout.readline())
     running.send_signal(signal.SIGINT)
     said, complaints = running.communicate(timeout=30.0)
-    assert (running.returncode, said, complaints) == (0, "closed\n", "")
+    assert (running.returncode, said, complaints) == (0, "closing\n", "")
 
 
 def answer_of(look: Look, effect: str, values: tuple[float, ...]) -> dict[str, object]:

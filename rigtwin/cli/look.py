@@ -58,5 +58,6 @@ def execute(parsed: argparse.Namespace) -> int:
         try:
             page.wait()
         except KeyboardInterrupt:
-            print("closed")
+            # A browser that is open holds connections, which are waited for a few seconds.
+            print("closing", flush=True)
     return 0
