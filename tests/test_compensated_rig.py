@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -65,3 +68,15 @@ def test_a_motorcycle_that_trips_without_compensation_comes_to_rest_with_it():
     tested = rigtwin.run(rig, "motorcycle", seed=1, settings=settings, controller=controller)
     assert len(tested.time) == 2500
     assert np.std(tested["/sensor.structure_lvdt"][-500:]) < 3e-4
+
+
+@pytest.mark.slow
+def test_what_tripped_is_diagnosed_and_runs_with_the_compensator_of_the_corrected_twin(capsys):
+    example = Path(__file__).parents[1] / "examples" / "late_cylinder.py"
+    runpy.run_path(str(example))["main"]([])
+    nominal, tripped, why, tested = capsys.readouterr().out.splitlines()
+    assert "completed" in nominal
+    assert "trip" in tripped
+    assert why.startswith("The structure cylinder has a delay of 0.00")
+    assert " and " not in why
+    assert "completed, 10.0 s" in tested

@@ -217,6 +217,18 @@ def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> 
         assert np.std(left) < 1.2 * noise
 
 
+def test_a_search_takes_longer_steps_where_they_change_next_to_nothing(tmp_path: Path) -> None:
+    machine = rigtwin.machine("cart-pole")
+    record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
+    configuration = machine.configuration_of(record)
+    model = model_of(machine, record, configuration, 8)
+    thinned, own = model.thin(2.5e-3), model.predict(machine.plant)
+    assert thinned is not model
+    change = thinned.predict(machine.plant) - own
+    assert np.all(np.std(change, axis=1) <= 5e-3 * np.std(own, axis=1))
+    assert model.thin(1e-5) is model
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "parameter", "value"),

@@ -128,6 +128,21 @@ def test_a_deviation_within_tolerance_is_no_finding(nominal):
     assert not within_tolerance(fit(34.0 * 1.02), nominal)
 
 
+def test_what_a_fit_leaves_without_an_effect_is_foreseen(nominal):
+    fitter = Fitter(evidence_of(recorded("imposed", ("mass@carriage=38", "gain@motor=1.05"))))
+    names = ("mass@carriage", "gain@motor", "stiffness@tyre")
+    effects = tuple(rig_effect(name) for name in names)
+    fit = fitter.refine(effects, [fitter.starts(effect).values[0] for effect in effects])
+    foreseen = fitter.predict_without(fit)
+    again = [fitter.refine(rest, values) for _, rest, values in foreseen]
+    # A stiffness that is nominal is missed least; a gain of 10 tolerances most.
+    assert foreseen[0][1] == effects[:2]
+    assert foreseen[2][1] == (effects[0], effects[2])
+    assert [each.misfit for each in again] == sorted(each.misfit for each in again)
+    assert foreseen[0][0] == pytest.approx(again[0].misfit, abs=5.0)
+    assert np.allclose(foreseen[0][2], again[0].values, rtol=2e-3)
+
+
 def test_spikes_go_and_steps_stay():
     signal = np.zeros(100)
     signal[50:] = 20.0

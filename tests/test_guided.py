@@ -175,7 +175,7 @@ def test_an_actuator_has_its_frequency_response(values, transfer):
         last = slice(10_000, 20_000)
         found = 2.0j * np.mean(position[last] * np.exp(-1j * w * time[last]))
         # A held command is half a tick late.
-        assert abs(found - transfer(1j * w) * np.exp(-0.5j * w * PERIOD)) < 0.01
+        assert abs(found - transfer(1j * w) * np.exp(-0.5j * w * PERIOD)) < 1e-3
 
 
 def test_a_play_is_its_width():

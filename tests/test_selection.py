@@ -3,6 +3,8 @@ to."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,12 +62,12 @@ DAMPER = find("damper-bench")
 EFFECTS = {str(effect.name): effect for effect in DAMPER.effects()}
 
 
-def explain(error: float, *names: str) -> Judged:
-    """An explanation by effects whose magnitudes are known well."""
+def explain(error: float, *names: str, width: float = 1e-3) -> Judged:
+    """An explanation by effects whose magnitudes are known well, or as well as told."""
     effects = tuple(EFFECTS[f"{name}@damper"] for name in names)
     values = tuple((50.0, *[0.1] * (len(e.kind.parameters) - 1)) for e in effects)
     fit = Fit(effects, values, 0.0, (), DAMPER.plant)
-    widths = tuple(tuple(1e-3 for _ in own) for own in values)
+    widths = tuple(tuple(width for _ in own) for own in values)
     return Judged(fit, np.full((2, 40), error**2), widths, 1e-12, 200.0, float(len(effects)))
 
 
@@ -88,8 +90,33 @@ def test_what_few_machines_have_must_account_for_much():
     assert chosen(none, one, explain(0.025, "coulomb", "backlash")) == {"coulomb"}
     rough = explain(0.3, "coulomb")
     assert chosen(none, rough, explain(0.2, "coulomb", "backlash")) == {"coulomb", "backlash"}
+    # What leaves nothing but noise is all there is.
+    third = explain(0.014, "coulomb", "backlash")
+    assert chosen(none, one, third) == {"coulomb"}
+    assert chosen(none, one, replace(third, complete=True)) == {"coulomb", "backlash"}
     # A difference that is no part of the signals to speak of, but leaves a fifth.
     assert chosen(none, one, explain(0.008, "coulomb", "backlash")) == {"coulomb", "backlash"}
+
+
+def test_many_parameters_that_nobody_knows_are_no_rival_of_few():
+    none, two = explain(1.0), explain(0.1, "viscous", "stiffness")
+
+    def margin(width: float) -> float:
+        """Of the stiffness, beside a larger explanation whose magnitudes are known so well."""
+        rival = explain(0.095, "viscous", "coulomb", "offset", width=width)
+        found = conclude([none, two, rival], DAMPER.plant, SelectionRules())
+        assert kinds(found.chosen) == {"viscous", "stiffness"}
+        return found.support(EFFECTS["stiffness@damper"]).margin
+
+    assert margin(1e-3) < 0.1
+    assert margin(20.0) > 1.0
+
+
+def test_much_is_not_given_up_for_a_doubt():
+    none, two = explain(1.0), explain(0.1, "viscous", "stiffness")
+    # Four that do nearly as well without one of them put it in doubt, and are in doubt themselves.
+    larger = explain(0.085, "viscous", "coulomb", "offset", "viscous_asymmetry")
+    assert chosen(none, two, larger) == {"viscous", "stiffness"}
 
 
 def test_recordings_that_nothing_was_fitted_to_count_as_much_as_the_others():

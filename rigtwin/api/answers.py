@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, twin_of
-from rigtwin.description import catalogue
+from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, the_machine, twin_of
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -212,4 +211,4 @@ def _several(given: reader.Recording | Sequence[reader.Recording]) -> Iterator[r
 def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
     if given is None:
         return machine_of(recording)
-    return given if isinstance(given, Machine) else catalogue.find(str(given))
+    return the_machine(given)

@@ -40,6 +40,11 @@ def machine(name: str | Path) -> Machine:
     return catalogue.find(str(name))
 
 
+def the_machine(given: Machine | str | Path) -> Machine:
+    """A machine, or the one of that name or description; raises as `machine` does."""
+    return given if isinstance(given, Machine) else machine(given)
+
+
 def machines() -> dict[str, Path]:
     """The machines that come along: name → description."""
     return catalogue.shipped()
@@ -59,14 +64,14 @@ def machine_of(recording: reader.Recording) -> Machine:
     return catalogue.find(recording.machine)
 
 
-def experiments(of: Machine) -> dict[str, Experiment]:
+def experiments(of: Machine | str | Path) -> dict[str, Experiment]:
     """The experiments that a machine's description names: name → experiment."""
-    return experiments_of(of)
+    return experiments_of(the_machine(of))
 
 
-def effects(of: Machine) -> list[Effect]:
+def effects(of: Machine | str | Path) -> list[Effect]:
     """All effects that a machine can have."""
-    return list(of.effects())
+    return list(the_machine(of).effects())
 
 
 def effect_texts(given: Effects) -> list[str]:

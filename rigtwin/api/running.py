@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rigtwin.api.machines import Effects, Settings, effect_texts
+from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, faced
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
@@ -25,7 +25,7 @@ Demanding = Callable[[Configuration, int], Demands]
 
 
 def run(
-    on: Machine,
+    on: Machine | str | Path,
     experiment: str | Experiment | Demanding,
     *,
     seed: int = 0,
@@ -40,7 +40,8 @@ def run(
     Parameters
     ----------
     on
-        The machine, see `machine`; also a corrected one, `Diagnosis.machine`.
+        The machine, its name or its description's path, see `machine`; also a corrected one,
+        `Diagnosis.machine`.
     experiment
         Its name among `experiments`, an `Experiment`, or a function that gives the demands.
     seed
@@ -65,6 +66,7 @@ def run(
     """
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
+    on = the_machine(on)
     test = _experiment(on, experiment)
     configuration = with_changes(test.configuration, settings)
 

@@ -16,6 +16,7 @@ from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
 from experiments.vehicles import find_vehicle
 from referee import arm, check, wild
+from rigtwin.api.machines import the_machine
 from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import load_posterior
 from rigtwin.errors import RigtwinError
@@ -39,7 +40,7 @@ def _nothing(*_: object) -> None:
     """Tells nobody."""
 
 
-def identifiability(of: Machine) -> Identifiability:
+def identifiability(of: Machine | str | Path) -> Identifiability:
     """What a machine's sensors can never show, whatever it does: before there are any data.
 
     Parameters
@@ -53,7 +54,7 @@ def identifiability(of: Machine) -> Identifiability:
         Effects that leave a trace of their own, those that leave none, and those whose trace others
         can leave as well.
     """
-    return find_identifiable(of)
+    return find_identifiable(the_machine(of))
 
 
 def tune(

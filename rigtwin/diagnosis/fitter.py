@@ -15,8 +15,14 @@ from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
-from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
-from rigtwin.diagnosis.gauss_newton import CLOSELY, ROUGHLY, minimise
+from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values, without_each
+from rigtwin.diagnosis.gauss_newton import (
+    CLOSELY,
+    DAMPING,
+    ROUGHLY,
+    minimise,
+    take_derivatives,
+)
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -400,6 +406,57 @@ class Fitter:
                 for end in (low, high)
             )
         )
+
+    def predict_without(self, fit: Fit) -> list[tuple[float, tuple[Effect, ...], Values]]:
+        """What a fit would leave without each of its effects, the others taken anew, to first
+        order.
+
+        Parameters
+        ----------
+        fit
+            Of two effects or more.
+
+        Returns
+        -------
+        list of tuples
+            Misfit, the other effects and their values, the least misfit first; without those in
+            which an effect lacks what it acts through.
+        """
+        sizes = [len(effect.kind.parameters) for effect in fit.effects]
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        steps = np.concatenate([self.starts(effect).steps for effect in fit.effects])
+        here = np.concatenate([np.asarray(values, float) for values in fit.values])
+        low, high = self.bounds(fit.effects)
+
+        def split(vector: Array) -> Values:
+            return tuple(tuple(part.tolist()) for part in np.split(vector, np.cumsum(sizes)[:-1]))
+
+        def residual(vector: Array) -> Array:
+            return self.evidence.residual(with_values(self.plant, fit.effects, split(vector)))
+
+        left = residual(here)
+        jacobian = take_derivatives(residual, here, left, steps, high)
+        normal, gradient = self.space.normal_equations(jacobian, left)
+        normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
+        found = []
+        for number, (effect, rest, _) in enumerate(without_each(fit)):
+            if not is_possible(rest, self.plant):
+                continue
+            # Of an effect that is not there only the magnitude says so.
+            magnitude = int(np.nonzero(owner == number)[0][0])
+            nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+            move = np.zeros(len(here))
+            move[magnitude] = (nominal - here[magnitude]) / steps[magnitude]
+            others = owner != number
+            move[others] = -np.linalg.solve(
+                normal[np.ix_(others, others)],
+                gradient[others] + normal[others, magnitude] * move[magnitude],
+            )
+            misfit = self.space.misfit(left + jacobian @ move)
+            moved = split(np.clip(here + move * steps, low, high))
+            values = (*moved[:number], *moved[number + 1 :])
+            found.append((misfit, rest, values))
+        return sorted(found, key=lambda each: each[0])
 
     def refine(
         self,

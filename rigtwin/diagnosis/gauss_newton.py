@@ -83,7 +83,7 @@ def minimise(
     normal = np.eye(len(here))
     wide = 1.0
     for _ in range(ITERATIONS):
-        jacobian = _derivatives(residual, here, left, wide * steps, high) / wide
+        jacobian = take_derivatives(residual, here, left, wide * steps, high) / wide
         normal, gradient = space.normal_equations(jacobian, left)
         damped = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
         move = -np.linalg.solve(damped, gradient)
@@ -104,10 +104,25 @@ def minimise(
     return Minimum(here, misfit, widths)
 
 
-def _derivatives(
+def take_derivatives(
     residual: Callable[[Array], Array], here: Array, left: Array, steps: Array, high: Array
 ) -> Array:
-    """What a step of each parameter changes, shape (size, parameters)."""
+    """What a step of each parameter changes.
+
+    Parameters
+    ----------
+    residual
+        Of values, shape (parameters,).
+    here, left
+        Values, and what they leave.
+    steps, high
+        How far each is moved, upwards where that is not beyond its highest value.
+
+    Returns
+    -------
+    array
+        Shape (size, parameters).
+    """
     columns = []
     for number, step in enumerate(steps):
         sign = 1.0 if here[number] + step <= high[number] else -1.0

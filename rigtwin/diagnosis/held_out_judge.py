@@ -44,7 +44,8 @@ class Judged:
     error below which no model is better than another; pieces: independent ones that what is left
     consists of; size: number of parameters, and of bits that say which of the places looked at they
     were found from; cancels: whether two of its effects undo each other, or cannot be told apart;
-    bounded: whether a value stands at the end of the range that it is searched in.
+    bounded: whether a value stands at the end of the range that it is searched in; complete:
+    whether it leaves nothing but noise.
     """
 
     fit: Fit
@@ -55,6 +56,7 @@ class Judged:
     size: float = 0.0
     cancels: bool = False
     bounded: bool = False
+    complete: bool = False
 
     @property
     def errors(self) -> Array:
@@ -182,6 +184,8 @@ class HeldOutJudge:
             size=float(sum(self._size(effect) for effect in fit.effects)),
             cancels=self._are_collinear(fit, jacobian, here, widths) or self._cancels(fit),
             bounded=self.fitter.is_bounded(fit),
+            complete=fit.misfit
+            <= (1.0 + self.rules.complete) * evidence.expected_misfit(fit.plant),
         )
 
     def _size(self, effect: Effect) -> float:

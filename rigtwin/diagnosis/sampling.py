@@ -57,8 +57,10 @@ def properties(signal: Array, predicted: Array, period: float, mains: float) -> 
     difference = signal - predicted
     line = difference - remove_mains(difference, period, mains)
     bit = smallest_step(signal)
+    # What a controller makes of its sensors' noise shakes the machine, and is no noise of theirs.
+    noise = min(white_noise(signal), white_noise(difference))
     # White noise as the bits leave it: a coarse bit adds a variance of its own.
-    white = math.sqrt(max(white_noise(signal) ** 2 - bit**2 / 12.0, 0.0))
+    white = math.sqrt(max(noise**2 - bit**2 / 12.0, 0.0))
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
 
 

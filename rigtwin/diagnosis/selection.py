@@ -59,7 +59,9 @@ class Selection:
             margin=_margin(
                 effect,
                 self.chosen,
-                drop_unlikely(self.pool, self.rules),
+                _list_rivals(
+                    self.chosen, drop_unlikely(self.pool, self.rules), self.nominal, self.rules
+                ),
                 self.price,
                 self.rules,
             ),
@@ -142,24 +144,43 @@ def choose(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Judge
     fair = [
         each
         for each in pool
-        if not each.cancels
-        and not each.bounded
-        and each.is_stable(
-            [e.nominal(plant)[e.kind.parameters[0]] for e in each.fit.effects], rules.steady
-        )
+        if not each.cancels and not each.bounded and _is_steady(each, plant, rules)
     ]
     price = rules.price_of(max(each.pieces for each in fair))
     likely = drop_unlikely(pool, rules)
-    necessary = [
+
+    def least_margin(each: Judged) -> float:
+        """Of its effects; infinite of none."""
+        rivals = _list_rivals(each, likely, plant, rules)
+        margins = (_margin(effect, each, rivals, price, rules) for effect in each.fit.effects)
+        return min(margins, default=math.inf)
+
+    margins = [(each, least_margin(each)) for each in fair if each in likely]
+    necessary = [each for each, margin in margins if margin >= rules.necessary]
+    best = min(necessary, key=lambda each: _cost(each, price))
+    # Nothing is given up for what does far worse, only because one of its effects is in doubt.
+    doubted = [
         each
-        for each in fair
-        if each in likely
-        and all(
-            _margin(effect, each, likely, price, rules) >= rules.necessary
-            for effect in each.fit.effects
-        )
+        for each, margin in margins
+        if margin > 0.0 and _cost(each, price) < _cost(best, price) - rules.least
     ]
-    return min(necessary, key=lambda each: _cost(each, price))
+    return min(doubted, key=lambda each: _cost(each, price), default=best)
+
+
+def _is_steady(each: Judged, plant: Plant, rules: SelectionRules) -> bool:
+    """Whether all magnitudes of an explanation are known."""
+    nominal = [e.nominal(plant)[e.kind.parameters[0]] for e in each.fit.effects]
+    return each.is_stable(nominal, rules.steady)
+
+
+def _list_rivals(
+    explanation: Judged, likely: Sequence[Judged], plant: Plant, rules: SelectionRules
+) -> list[Judged]:
+    """Those that an explanation must do better than: a larger one only if its magnitudes are known,
+    as enough parameters whose values nobody knows do as well as anything."""
+    return [
+        each for each in likely if each.size <= explanation.size or _is_steady(each, plant, rules)
+    ]
 
 
 def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]:
@@ -176,7 +197,7 @@ def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]
     -------
     list of Judged
         Those whose effects do not undo each other or stand at a bound, and in which everything that
-        few machines have accounts for a good share of the signals.
+        few machines have accounts for a good share of the signals, or for all that is left.
     """
     possible = [each for each in pool if not each.cancels and not each.bounded]
 
@@ -188,7 +209,8 @@ def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]
             if all(own in others or not _is_rare(own) for own in other.fit.effects)
         )
         share = math.exp(2.0 * rival) - math.exp(2.0 * each.score)
-        return share >= rules.rarely**2 or rival - each.score >= rules.far
+        far = rules.far_and_complete if each.complete else rules.far
+        return share >= rules.rarely**2 or rival - each.score >= far
 
     return [
         each

@@ -13,7 +13,7 @@ from itertools import product
 
 from rigtwin.components import Effect, Guide
 from rigtwin.description.machine import Structure
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
+from rigtwin.diagnosis.fit import Fit, Values, clashes, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge
 from rigtwin.diagnosis.proposals import propose_additions
@@ -36,8 +36,8 @@ GATEWAY_STARTS = 3
 """Sizes of the gateway that they are fitted together from."""
 GATEWAY = "coulomb"
 """Kind without which others do nothing."""
-DROPPED_AT_ONCE, LEAST_MISSED = 6, 3
-"""Effects beyond which not every one is left out in turn, but those that are missed least."""
+LEAST_MISSED = 2
+"""Effects that are left out in turn of several, those that would be missed least."""
 SECOND_ORDER = ("two_lags", "resonance")
 """Kinds that a lag and a delay may be taken for."""
 BEHIND = ("compliance", "backlash")
@@ -142,14 +142,10 @@ def _fit_regulars(growth: Growth, threads: Threads) -> list[Fit]:
     )
     found = [min(tries, key=growth.cost)]
     while len(found[-1].effects) > 1:
-        fewer = [
-            (rest, values)
-            for _, rest, values in without_each(found[-1])
-            if is_possible(rest, search.plant)
-        ]
-        if len(fewer) > DROPPED_AT_ONCE:
-            fewer = sorted(fewer, key=lambda pair: _misfit_of(search, *pair))[:LEAST_MISSED]
-        found.append(min(threads.map(lambda pair: search.refine(*pair), fewer), key=growth.cost))
+        fewer = search.predict_without(found[-1])[:LEAST_MISSED]
+        found.append(
+            min(threads.map(lambda each: search.refine(*each[1:]), fewer), key=growth.cost)
+        )
     return [fit for fit in found if not within_tolerance(fit, search.evidence, growth.thresholds)]
 
 
@@ -163,12 +159,6 @@ def _choose_regulars(growth: Growth) -> list[Effect]:
             at = effect.group if coupled and effect.of is Guide else ""
             chosen.setdefault((effect.kind, at), effect)
     return list(chosen.values())
-
-
-def _misfit_of(search: Fitter, effects: Sequence[Effect], values: Values) -> float:
-    """Of an explanation with these very values."""
-    plant = with_values(search.plant, tuple(effects), values)
-    return search.space.misfit(search.evidence.residual(plant))
 
 
 def _leaders(level: Sequence[Fit], nothing: float) -> list[Fit]:

@@ -55,6 +55,10 @@ class SelectionRules:
     """and what one of those that few machines have must account for, as a share of the signals,"""
     far: float = 1.4
     """unless it does that much better."""
+    far_and_complete: float = 1.0
+    """The same where it leaves nothing but noise,"""
+    complete: float = 0.05
+    """or by such a share more."""
     calibration: tuple[tuple[float, float], ...] = (
         (0.05, 0.75),
         (0.25, 0.85),

@@ -46,14 +46,16 @@ def _follow_command(
             seen = 0.5 * (earlier + one)
         else:
             one = limited
+        earlier = two
         if shares[1] < 1.0:
             two += shares[1] * (seen - two)
         else:
             two = one
         if second.shape[0]:
+            seen = 0.5 * (earlier + two)
             place, speed = (
-                second[0, 0] * place + second[0, 1] * speed + second[0, 2] * two,
-                second[1, 0] * place + second[1, 1] * speed + second[1, 2] * two,
+                second[0, 0] * place + second[0, 1] * speed + second[0, 2] * seen,
+                second[1, 0] * place + second[1, 1] * speed + second[1, 2] * seen,
             )
             out[step] = place
         else:

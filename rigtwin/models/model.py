@@ -86,6 +86,6 @@ class Model(Protocol[P]):
         ...
 
     def thin(self, longest: float) -> Model[P]:
-        """With ticks left out where nothing is integrated from one to the next: those that stay are
-        at most so many s apart."""
+        """For a search: with ticks left out where nothing is integrated from one to the next, or
+        with longer steps of integration; either at most so many s apart."""
         ...
