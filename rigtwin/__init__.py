@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         write_table,
     )
     from rigtwin.api.faults import Campaign, faults
-    from rigtwin.api.look import look
+    from rigtwin.api.look import look, show_look
     from rigtwin.api.machines import (
         Configuration,
         Effect,
@@ -125,6 +125,7 @@ __all__ = [
     "run_on_twin",
     "run_session",
     "serve_card",
+    "show_look",
     "stability",
     "tune",
     "what_changed",
@@ -167,7 +168,7 @@ _MODULES = {
         "write_table",
     ),
     "faults": ("Campaign", "faults"),
-    "look": ("look",),
+    "look": ("look", "show_look"),
     "session": (
         "DryRun",
         "SessionResult",

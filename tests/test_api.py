@@ -210,6 +210,7 @@ FUNCTIONS = {
     "calibrate": ("calibrate",),
     "compare": ("compare", "compare_recordings"),
     "diagnose": ("diagnose", "Diagnosis.report"),
+    "look": ("look", "show_look"),
     "machines": ("machines",),
     "machine": ("machine",),
     "blindcheck": ("blindcheck", "blindcheck_wild"),

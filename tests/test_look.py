@@ -94,3 +94,24 @@ def test_what_cannot_be_done_is_said_in_one_line(look, call, said):
         call(look)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_recording_of_few_spectral_lines_can_be_looked_at():
+    short = rigtwin.run(
+        rigtwin.machine("double-pendulum"),
+        "swing",
+        seed=1,
+        settings={"timing": {"duration": 4.0}},
+    )
+    assert rigtwin.look(short).nominal.overall < 5.0
+
+
+def test_what_is_measured_between_joints_says_where_the_last_one_is():
+    bench = rigtwin.machine("quarter-car-bench")
+    look = rigtwin.look(rigtwin.run(bench, "bumps", seed=1, settings={"timing": {"duration": 2.0}}))
+    measured, nominal = look.positions(), look.positions(look.nominal)
+    assert set(measured) == {"road", "wheel", "body"}
+    travel = look.measured[look.sensors.index("travel")]
+    assert measured["body"] - measured["wheel"] == pytest.approx(travel, abs=1e-3)
+    assert nominal["body"] == pytest.approx(measured["body"], abs=1e-3)
+    assert np.std(nominal["body"] - measured["body"]) > 0.0

@@ -50,6 +50,7 @@ COMMANDS = (
     "calibrate",
     "compare",
     "diagnose",
+    "look",
     "machines",
     "machine",
     "blindcheck",

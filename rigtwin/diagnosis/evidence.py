@@ -196,7 +196,8 @@ def _model_with_enough_steps(
 
 
 def _smooth(power: Array, lines: int = SMOOTHED) -> Array:
-    """Averaged over neighbouring lines to either side."""
+    """Averaged over neighbouring lines to either side, fewer of a spectrum that has no more."""
+    lines = min(lines, (len(power) - 1) // 2)
     return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,10 @@ from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.render.motions import joint_positions
+
+MOTIONS = ("position", "velocity")
+"""Kinds of signals that say where a joint stands."""
 
 
 class Look:
@@ -59,6 +63,59 @@ class Look:
     def units(self) -> tuple[str, ...]:
         """Of the observed signals."""
         return tuple(row.unit for row in self.machine.rows)
+
+    @property
+    def predicts_motion(self) -> bool:
+        """Whether any of the observed signals is a motion; else what moves the twin is what was
+        measured."""
+        return any(row.kind in MOTIONS for row in self.machine.rows)
+
+    def positions(self, prediction: Prediction | None = None) -> dict[str, Array]:
+        """Where the joints stand.
+
+        Parameters
+        ----------
+        prediction
+            Of the twin that is meant; by default the machine itself, as measured.
+
+        Returns
+        -------
+        dict of Array
+            Joint → position, m or rad, shape (ticks,). Of joints that no signal speaks of, nothing.
+        """
+        every = self._evidence.models[0].every
+        columns = {
+            topic: {name: values[::every] for name, values in names.items()}
+            for topic, names in self.recording.columns.items()
+        }
+        if prediction is not None:
+            for row, signal in zip(self.machine.rows, prediction.signals, strict=True):
+                if row.kind in MOTIONS:
+                    columns[row.channel[0]][row.channel[1]] = signal
+        return joint_positions(self.machine, columns, self._evidence.lines[0].period)
+
+    def clashing(self, name: str, others: Iterable[str]) -> tuple[str, ...]:
+        """Of other effects, those that set a parameter that this one sets too.
+
+        Parameters
+        ----------
+        name
+            Of the one.
+        others
+            Names.
+
+        Returns
+        -------
+        tuple of str
+            Names.
+
+        Raises
+        ------
+        RigtwinError
+            For an unknown effect.
+        """
+        effect = self._find(name)
+        return tuple(each for each in others if clashes(effect, [self._find(each)]))
 
     def _sliders(self, effect: Effect) -> tuple[Slider, ...]:
         low, high = self._fitter.bounds((effect,))

@@ -21,13 +21,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
-from rigtwin.components import PositionActuator, measures
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.render.motions import joint_positions
 from rigtwin.render.plot import ASKED, SENSED, find_stretch
 from rigtwin.simulation.mechanics import SCENE
 from rigtwin.simulation.structure_motion import recorded_wing
@@ -39,8 +38,6 @@ WIDTH, SCENE_HEIGHT, TRACE_HEIGHT = 960, 432, 288
 BEAM_DRAWN = 0.13
 """m; drawn length of a beam."""
 BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
-SMOOTHING = 20.0
-"""Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
 NO_RENDERING = (
     "cannot render without a display; on Debian or Ubuntu: "
     "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
@@ -137,24 +134,9 @@ def film(
 def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
     """Joint → position at every tick, m or rad, from what was recorded alone."""
     if machine.structure is Structure.QUARTER_CAR:
-        structure = _smooth(recording.column("/sensor", "structure_lvdt"), recording.period)
-        travel = _smooth(recording.column("/sensor", "suspension_lvdt"), recording.period)
-        ground = np.zeros_like(structure)
-        if recording.has("/sensor", "ground_lvdt"):
-            ground = _smooth(recording.column("/sensor", "ground_lvdt"), recording.period)
-        return {"ground": ground, "carriage": structure - travel, "structure": structure}
-    found: dict[str, Array] = {}
-    for wanted in ("position", "command", "velocity"):
-        # A position as measured, else as commanded, else as its velocity adds up to.
-        for name, component in machine.components.items():
-            channel = component.channel
-            part = getattr(machine.plant, name)
-            says = "command" if isinstance(part, PositionActuator) else measures(part)
-            fits = says == wanted and component.joint not in found
-            if fits and channel is not None and recording.has(*channel):
-                signal = recording.column(*channel)
-                summed = np.cumsum(signal - np.mean(signal)) * recording.period
-                found[component.joint] = summed if wanted == "velocity" else signal
+        for needed in ("structure_lvdt", "suspension_lvdt"):
+            recording.column("/sensor", needed)
+    found = joint_positions(machine, recording.columns, recording.period)
     if not found:
         raise RigtwinError(
             f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it"
@@ -199,12 +181,6 @@ def _curves(recording: Recording, machine: Machine) -> list[Curve]:
         for axis, label, colour, topic, name, scale in wanted
         if recording.has(topic, name)
     ]
-
-
-def _smooth(signal: Array, period: float) -> Array:
-    if 0.45 / period <= SMOOTHING or len(signal) < 50:
-        return signal
-    return sosfiltfilt(butter(2, SMOOTHING, fs=1.0 / period, output="sos"), signal)
 
 
 def _context() -> Any:

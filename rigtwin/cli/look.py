@@ -1,0 +1,63 @@
+"""`rigtwin look`: a recording and its twin in the browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from rigtwin.cli.options import add_machine, add_settings, settings_of
+from rigtwin.console import apart, writable
+
+SUMMARY = "see a recording beside its twin, and move what may be wrong by hand"
+MORE = """\
+A page for the browsers of this computer, until Ctrl-C: the machine in motion as measured and as
+predicted, the traces, and a slider for each effect, which tells at once how far the twin is off.
+Effects that are ticked can be fitted, and the twin with them written for --config.
+
+examples:
+  rigtwin look rig.mcap
+  rigtwin diagnose rig.mcap --json why.json; rigtwin look rig.mcap --diagnosis why.json"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", type=Path)
+    parser.add_argument(
+        "--diagnosis", type=Path, metavar="F.json", help="begin with what this diagnosis found"
+    )
+    parser.add_argument(
+        "--save-twin",
+        type=Path,
+        metavar="F.toml",
+        help="what the save button writes (default: RECORDING_twin.toml in this folder)",
+    )
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="take this out of the twin first, e.g. coulomb@rail",
+    )
+    parser.add_argument("--port", type=int, default=8080, help="default 8080; 0 takes a free one")
+    add_machine(parser)
+    add_settings(parser)
+
+
+def execute(parsed: argparse.Namespace) -> int:
+    import rigtwin
+
+    out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
+    writable(apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None)))
+    look = rigtwin.look(
+        rigtwin.load(parsed.recording, parsed.machine),
+        settings=settings_of(parsed),
+        without=parsed.without,
+    )
+    page = rigtwin.show_look(look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=out)
+    with page:
+        print(f"{page.url}, until Ctrl-C", flush=True)
+        try:
+            page.wait()
+        except KeyboardInterrupt:
+            # A browser that is open holds connections, which are waited for a few seconds.
+            print("closing", flush=True)
+    return 0

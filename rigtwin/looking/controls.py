@@ -1,0 +1,142 @@
+"""Ticks and sliders of the candidate effects on a page."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+
+import viser
+
+from rigtwin.looking.knob import Knob, knob_of
+from rigtwin.looking.look import Look
+
+FEW = 8
+"""Sliders of a machine up to which all folders are open."""
+
+
+class Controls:
+    """Which effects are in the twin, and their values. Every tab shows the same."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        look: Look,
+        first: Iterable[str],
+        changed: Callable[[], object],
+    ) -> None:
+        """first: effects that come before the others; changed: called when somebody moves one."""
+        self._look, self._changed = look, changed
+        self._lock = threading.RLock()
+        self._ticked: dict[str, None] = {}
+        self._values = {
+            name: [slider.nominal if n == 0 else slider.start for n, slider in enumerate(sliders)]
+            for name, sliders in look.sliders.items()
+        }
+        self._knobs = {
+            name: [knob_of(slider) for slider in sliders] for name, sliders in look.sliders.items()
+        }
+        self._ticks: dict[str, viser.GuiCheckboxHandle] = {}
+        self._handles: dict[str, list[viser.GuiSliderHandle[float]]] = {}
+        for name, knobs in self._knobs.items():
+            self._values[name] = [
+                knob.value(knob.position(value))
+                for knob, value in zip(knobs, self._values[name], strict=True)
+            ]
+        for title, names, opened in self._folders(tuple(first)):
+            with server.gui.add_folder(title, expand_by_default=opened):
+                for name in names:
+                    # In its component's folder an effect's kind says all.
+                    full = title != look.effects[name].component
+                    self._add(server, name, name if full else look.effects[name].kind.name)
+
+    def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
+        """Titles, effects, and whether they are open."""
+        folders = [("found by the diagnosis", list(first), True)] if first else []
+        by_component: dict[str, list[str]] = {}
+        for name, effect in self._look.effects.items():
+            if name not in first:
+                by_component.setdefault(effect.component, []).append(name)
+        few = sum(len(knobs) for knobs in self._knobs.values()) <= FEW
+        return [*folders, *((title, names, few) for title, names in by_component.items())]
+
+    def _add(self, server: viser.ViserServer, name: str, label: str) -> None:
+        effect = self._look.effects[name]
+        tick = server.gui.add_checkbox(label, False, hint=effect.kind.meaning)
+        tick.on_update(lambda event: self._on_tick(name, event))
+        self._ticks[name] = tick
+        self._handles[name] = []
+        for number, knob in enumerate(self._knobs[name]):
+            slider = server.gui.add_slider(
+                knob.label(self._values[name][number]),
+                min=knob.low,
+                max=knob.high,
+                step=knob.step,
+                initial_value=knob.position(self._values[name][number]),
+                marks=((knob.low, knob.ends[0]), (knob.high, knob.ends[1])),
+                hint=f"{effect.kind.meaning}; the twin's own value: {knob.slider.nominal:.4g} "
+                f"{knob.slider.unit}",
+            )
+            slider.on_update(
+                lambda event, number=number, knob=knob: self._on_slider(name, number, knob, event)
+            )
+            self._handles[name].append(slider)
+
+    @property
+    def values(self) -> dict[str, tuple[float, ...]]:
+        """Of the effects that are in the twin."""
+        with self._lock:
+            return {name: tuple(self._values[name]) for name in self._ticked}
+
+    def set(self, values: Mapping[str, Iterable[float]]) -> None:
+        """Takes these effects into the twin, and all others out of it."""
+        with self._lock:
+            for name in [name for name in self._ticked if name not in values]:
+                self._untick(name)
+            for name, numbers in values.items():
+                self._values[name] = list(numbers)
+                self._tick(name)
+                for handle, knob, value in zip(
+                    self._handles[name], self._knobs[name], self._values[name], strict=True
+                ):
+                    handle.value = knob.position(value)
+                    handle.label = knob.label(value)
+
+    def lock(self, locked: bool) -> None:
+        """Lets nobody move anything, or everybody again."""
+        for name, tick in self._ticks.items():
+            tick.disabled = locked
+            for handle in self._handles[name]:
+                handle.disabled = locked
+
+    def _tick(self, name: str) -> None:
+        for other in self._look.clashing(name, [each for each in self._ticked if each != name]):
+            self._untick(other)
+        self._ticked[name] = None
+        self._ticks[name].value = True
+
+    def _untick(self, name: str) -> None:
+        self._ticked.pop(name, None)
+        self._ticks[name].value = False
+
+    def _on_tick(self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
+        if event.client_id is None:
+            return  # set here, not by somebody
+        with self._lock:
+            (self._tick if event.target.value else self._untick)(name)
+        self._changed()
+
+    def _on_slider(
+        self,
+        name: str,
+        number: int,
+        knob: Knob,
+        event: viser.GuiEvent[viser.GuiSliderHandle[float]],
+    ) -> None:
+        if event.client_id is None:
+            return
+        with self._lock:
+            value = knob.value(event.target.value)
+            self._values[name][number] = value
+            event.target.label = knob.label(value)
+            self._tick(name)
+        self._changed()

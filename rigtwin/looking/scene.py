@@ -1,0 +1,91 @@
+"""The machine in three dimensions as measured, and the twin's prediction through it as a ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import viser
+
+from rigtwin.description.machine import Machine
+from rigtwin.looking.shapes import Body, Shape
+from rigtwin.numerics.arrays import Array
+
+GHOST = (235, 110, 20)
+"""Colour of what the twin predicts, red, green, blue."""
+SEEN_THROUGH = 0.4
+"""Opacity of the ghost."""
+
+
+class Scene:
+    """A machine on a page, and its ghost if the twin predicts a motion."""
+
+    def __init__(self, server: viser.ViserServer, machine: Machine, ghost: bool) -> None:
+        self._body = Body(machine)
+        self._server = server
+        shapes = self._body.shapes()
+        place, centre, angle = self._body.camera()
+        server.initial_camera.position = place
+        server.initial_camera.look_at = centre
+        server.initial_camera.fov = angle
+        self._machine = _add(server, "/machine", shapes)
+        moving = [shape for shape in shapes if shape.moves]
+        self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}
+
+    def draw(
+        self,
+        measured: Mapping[str, float],
+        predicted: Mapping[str, float],
+        magnify: float,
+    ) -> None:
+        """Moves both.
+
+        Parameters
+        ----------
+        measured, predicted
+            Joint → position, m or rad.
+        magnify
+            How many times as far from the machine as it is the ghost is drawn.
+        """
+        with self._server.atomic():
+            _place(self._machine, *self._body.poses(measured))
+            if self._ghost:
+                apart = {
+                    joint: position + magnify * (predicted.get(joint, position) - position)
+                    for joint, position in measured.items()
+                }
+                _place(self._ghost, *self._body.poses(apart))
+
+
+def _add(
+    server: viser.ViserServer,
+    name: str,
+    shapes: list[Shape],
+    colour: tuple[int, int, int] | None = None,
+) -> dict[int, viser.FrameHandle]:
+    """Adds the bodies that have shapes; their frames, by the body's number."""
+    frames: dict[int, viser.FrameHandle] = {}
+    for number, shape in enumerate(shapes):
+        if shape.body not in frames:
+            frames[shape.body] = server.scene.add_frame(f"{name}/{shape.body}", show_axes=False)
+        opacity = shape.opacity if colour is None else SEEN_THROUGH
+        server.scene.add_mesh_simple(
+            f"{name}/{shape.body}/{number}",
+            shape.vertices,
+            shape.faces,
+            color=shape.colour if colour is None else colour,
+            opacity=None if opacity >= 1.0 else opacity,
+            flat_shading=shape.edges,
+            cast_shadow=colour is None,
+            position=shape.position,
+            wxyz=shape.turn,
+        )
+    return frames
+
+
+def _place(frames: dict[int, viser.FrameHandle], positions: Array, turns: Array) -> None:
+    for body, frame in frames.items():
+        if not np.array_equal(frame.position, positions[body]):
+            frame.position = positions[body]
+        if not np.array_equal(frame.wxyz, turns[body]):
+            frame.wxyz = turns[body]

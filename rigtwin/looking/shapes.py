@@ -1,0 +1,185 @@
+"""What a machine looks like: the geoms of its MJCF as triangles, and where its bodies are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.errors import RigtwinError
+from rigtwin.looking.skeleton import draw_bones
+from rigtwin.numerics.arrays import Array
+from rigtwin.simulation.mechanics import SCENE
+
+SHOWN_GROUPS = 3
+"""Geoms of groups below this are seen, as in MuJoCo's viewer."""
+PLANE = 4.0
+"""Times the machine's size that a plane without end is drawn."""
+THIN = 1e-3
+"""The same, of its thickness."""
+BONE = (150, 160, 175)
+"""Colour of a body that has no shape, red, green, blue."""
+ASPECT = 16.0 / 9.0
+"""Width over height of the pictures that cameras of an MJCF are set for."""
+BALL = 2
+"""Subdivisions of an icosahedron that is drawn as a ball."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One geom. body: number of the body that it is fixed to; moves: whether that one can;
+    vertices: m, in the geom's own frame, shape (vertices, 3); faces: shape (triangles, 3); colour:
+    red, green, blue, 0 to 255; opacity: 0 to 1; edges: whether its faces are flat; position: m, and
+    turn, a quaternion, in the body."""
+
+    body: int
+    moves: bool
+    vertices: Array
+    faces: NDArray[np.integer]
+    colour: tuple[int, int, int]
+    opacity: float
+    edges: bool
+    position: Array
+    turn: Array
+
+
+class Body:
+    """A machine's mechanics, posed joint by joint."""
+
+    def __init__(self, machine: Machine) -> None:
+        """Raises RigtwinError if its MJCF cannot be compiled."""
+        path = SCENE if machine.structure is Structure.QUARTER_CAR else machine.model
+        try:
+            self._model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            raise RigtwinError(f"{path}: {error}") from None
+        self._data = mujoco.MjData(self._model)
+
+    def shapes(self) -> list[Shape]:
+        """All that is seen of it. Height fields and signed distances are not drawn."""
+        model = self._model
+        found = []
+        for number in range(model.ngeom):
+            mesh = _triangles(model, number)
+            if mesh is None or model.geom_group[number] >= SHOWN_GROUPS:
+                continue
+            material = int(model.geom_matid[number])
+            rgba = model.geom_rgba[number] if material < 0 else model.mat_rgba[material]
+            if rgba[3] <= 0.0:
+                continue
+            kind = model.geom_type[number]
+            red, green, blue = (round(255 * float(each)) for each in rgba[:3])
+            found.append(
+                Shape(
+                    body=int(model.geom_bodyid[number]),
+                    moves=int(model.body_weldid[model.geom_bodyid[number]]) != 0,
+                    vertices=np.asarray(mesh.vertices),
+                    faces=np.asarray(mesh.faces),
+                    colour=(red, green, blue),
+                    opacity=float(rgba[3]),
+                    edges=kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_PLANE),
+                    position=model.geom_pos[number].copy(),
+                    turn=model.geom_quat[number].copy(),
+                )
+            )
+        return [*found, *self._bones({shape.body for shape in found})]
+
+    def _bones(self, shaped: set[int]) -> list[Shape]:
+        """Of all bodies that move, have a mass, and no shape of their own."""
+        found = []
+        for body in range(1, self._model.nbody):
+            moves = int(self._model.body_weldid[body]) != 0
+            if body in shaped or not moves or self._model.body_mass[body] <= 0.0:
+                continue
+            mesh = draw_bones(self._model, body)
+            found.append(
+                Shape(
+                    body=body,
+                    moves=True,
+                    vertices=np.asarray(mesh.vertices),
+                    faces=np.asarray(mesh.faces),
+                    colour=BONE,
+                    opacity=1.0,
+                    edges=False,
+                    position=np.zeros(3),
+                    turn=np.array([1.0, 0.0, 0.0, 0.0]),
+                )
+            )
+        return found
+
+    def poses(self, positions: Mapping[str, float]) -> tuple[Array, Array]:
+        """Where the bodies are.
+
+        Parameters
+        ----------
+        positions
+            Of joints, m or rad; others stay where the MJCF has them.
+
+        Returns
+        -------
+        tuple of Array
+            Positions, m, shape (bodies, 3), and quaternions, shape (bodies, 4).
+        """
+        self._data.qpos[:] = self._model.qpos0
+        for joint, position in positions.items():
+            self._data.qpos[self._model.joint(joint).qposadr[0]] = position
+        mujoco.mj_kinematics(self._model, self._data)
+        return self._data.xpos.copy(), self._data.xquat.copy()
+
+    def camera(self) -> tuple[Array, Array, float]:
+        """Where the machine is looked at from, and to, m, and the upright angle of what is seen,
+        rad: as the first camera of the MJCF has it, or from aside and above."""
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        statistic = self._model.stat
+        centre = np.array(statistic.center)
+        if self._model.ncam:
+            place = self._data.cam_xpos[0].copy()
+            forward = -self._data.cam_xmat[0].reshape(3, 3)[:, 2]
+            ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
+            return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
+        aside = statistic.extent * np.array([0.7, -1.4, 0.7])
+        return centre + aside, centre, _widen(self._model.vis.global_.fovy)
+
+
+def _widen(angle: float) -> float:
+    """The upright angle, rad, of a picture as high as wide, in which is seen what one of `ASPECT`
+    with an upright angle in degrees shows."""
+    return 2.0 * math.atan(ASPECT * math.tan(0.5 * math.radians(angle)))
+
+
+def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
+    """A geom in its own frame; None for one that is not drawn."""
+    size, kind = model.geom_size[number], model.geom_type[number]
+    geom, make = mujoco.mjtGeom, trimesh.creation
+    if kind == geom.mjGEOM_BOX:
+        return make.box(extents=2.0 * size)
+    if kind == geom.mjGEOM_SPHERE:
+        return make.icosphere(subdivisions=BALL, radius=float(size[0]))
+    if kind == geom.mjGEOM_ELLIPSOID:
+        return make.icosphere(subdivisions=BALL).apply_scale(size)
+    if kind == geom.mjGEOM_CYLINDER:
+        return make.cylinder(radius=float(size[0]), height=2.0 * float(size[1]))
+    if kind == geom.mjGEOM_CAPSULE:
+        return make.capsule(radius=float(size[0]), height=2.0 * float(size[1]), count=(12, 12))
+    if kind == geom.mjGEOM_PLANE:
+        extent = float(model.stat.extent)
+        sides = [2.0 * float(side) if side > 0.0 else PLANE * extent for side in size[:2]]
+        return make.box(extents=[*sides, THIN * extent])
+    if kind == geom.mjGEOM_MESH:
+        mesh = int(model.geom_dataid[number])
+        start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        return trimesh.Trimesh(
+            model.mesh_vert[start : start + count],
+            model.mesh_face[first : first + faces],
+            process=False,
+        )
+    return None

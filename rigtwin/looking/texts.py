@@ -1,0 +1,64 @@
+"""What a page says, as HTML."""
+
+from __future__ import annotations
+
+from html import escape
+
+from rigtwin.diagnosis.fit import Fit
+from rigtwin.looking.given import Given
+from rigtwin.looking.look import Look
+from rigtwin.looking.prediction import Prediction
+
+STYLE = "margin:0 0.8em 0.5em;font-size:0.85em;line-height:1.35"
+CELL = "padding:0 0 0 1em;text-align:right;font-variant-numeric:tabular-nums"
+
+
+def note(text: str) -> str:
+    """A line of text."""
+    return f'<p class="note" style="{STYLE}">{escape(text)}</p>'
+
+
+def describe_errors(look: Look, prediction: Prediction) -> str:
+    """How far off the twin is, sensor by sensor, beside the described one."""
+    rows = "".join(
+        f'<tr><td>{escape(sensor)}</td><td style="{CELL}" data-sensor="{escape(sensor)}">'
+        f'{_percent(prediction.percent[sensor])}</td><td style="{CELL}">'
+        f"{_percent(look.nominal.percent[sensor])}</td></tr>"
+        for sensor in look.sensors
+    )
+    return (
+        f'<div style="{STYLE}"><p style="margin:0.3em 0;font-size:1.5em">off by '
+        f'<b id="overall">{_percent(prediction.overall)}</b></p>'
+        f'<table style="border-collapse:collapse"><tr><td></td><td style="{CELL}">this twin</td>'
+        f'<td style="{CELL}">as described</td></tr>{rows}</table>'
+        "<p>rms of measured less predicted, in percent of the signal's standard deviation</p></div>"
+    )
+
+
+def describe_given(given: Given) -> str:
+    """What a diagnosis found."""
+    lines = [f"the diagnosis: {given.sentence}"]
+    lines += [
+        f"{name}: {', '.join(f'{value:.4g}' for value in values)}; confidence "
+        f"{100.0 * given.confidence[name]:.0f} %"
+        for name, values in given.values.items()
+    ]
+    if given.beside:
+        lines.append(f"found too, but no slider moves it: {', '.join(given.beside)}")
+    return "".join(note(line) for line in lines)
+
+
+def describe_fit(fitted: Fit, look: Look, seconds: float) -> str:
+    """Values that were fitted, and how sure they are."""
+    lines = [f"fitted in {seconds:.1f} s; plus or minus one standard deviation:"]
+    for effect, values, widths in zip(fitted.effects, fitted.values, fitted.widths, strict=True):
+        sliders = look.sliders[effect.name]
+        lines += [
+            f"{effect.name}: {slider.parameter} = {value:.5g} ± {width:.2g} {slider.unit}"
+            for slider, value, width in zip(sliders, values, widths, strict=True)
+        ]
+    return "".join(note(line) for line in lines)
+
+
+def _percent(value: float) -> str:
+    return f"{value:.3g} %" if value < 999.5 else "over 999 %"

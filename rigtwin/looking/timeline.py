@@ -1,0 +1,97 @@
+"""The time that is looked at: dragged or running, and one sensor's traces about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import viser
+
+from rigtwin.looking.look import Look
+from rigtwin.looking.plots import STRETCHES, WHOLE, Plots
+from rigtwin.looking.prediction import Prediction
+from rigtwin.looking.texts import note
+
+RATES = {"as it was": 1.0, "a quarter as fast": 0.25, "a tenth as fast": 0.1}
+MAGNIFIED = {"as it is": 1.0, "10 times": 10.0, "100 times": 100.0}
+WIDTH = 560
+"""Pixels of the panel."""
+
+
+class Timeline:
+    """A panel with the time, how it runs, and what is shown of it. now: s."""
+
+    def __init__(self, server: viser.ViserServer, look: Look, refresh: Callable[..., None]) -> None:
+        """refresh: called with what is no longer so, "plots" or "scene"."""
+        self._server, self._look, self._refresh = server, look, refresh
+        self.now = float(look.time[0])
+        self._magnified: viser.GuiDropdownHandle[str] | None = None
+        panel = server.gui.add_panel()
+        with panel.add_tab("time"):
+            self._build()
+        panel.dock_left()
+        panel.set_width(WIDTH)
+
+    def _build(self) -> None:
+        look, gui = self._look, self._server.gui
+        worst = max(look.nominal.percent, key=lambda name: look.nominal.percent[name])
+        start, end = float(look.time[0]), float(look.time[-1])
+        self._scrubber = gui.add_slider(
+            "time, s",
+            min=start,
+            max=end,
+            step=10.0 ** math.floor(math.log10((end - start) / 1000.0)),
+            initial_value=start,
+            marks=((start, f"{start:.4g}"), (end, f"{end:.4g}")),
+        )
+        self._scrubber.on_update(self._on_scrubbed)
+        self._play = gui.add_checkbox("play", False)
+        self._play.on_update(lambda _: self._refresh())
+        self._rate = gui.add_dropdown("how fast", tuple(RATES))
+        self._sensor = gui.add_dropdown("sensor", look.sensors, initial_value=worst)
+        self._stretch = gui.add_dropdown("shown", tuple(STRETCHES), initial_value=WHOLE)
+        for chosen in (self._sensor, self._stretch):
+            chosen.on_update(lambda _: self._refresh("plots"))
+        self._plots = Plots(self._server, look, worst)
+        if not look.predicts_motion:
+            gui.add_html(
+                note("this twin moves as measured: what it predicts are forces, so it has no ghost")
+            )
+            return
+        self._magnified = gui.add_dropdown("gap in the picture", tuple(MAGNIFIED))
+        self._magnified.on_update(lambda _: self._refresh("scene"))
+        gui.add_html(note("solid: the machine as measured; orange: the twin's prediction"))
+
+    def _on_scrubbed(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
+        if event.client_id is not None:  # by somebody, not by time that runs
+            self.now = float(event.target.value)
+            self._refresh("plots", "scene")
+
+    @property
+    def plays(self) -> bool:
+        """Whether time runs: somebody asked for it, and somebody looks."""
+        return self._play.value and bool(self._server.get_clients())
+
+    @property
+    def tick(self) -> int:
+        """The tick of `now`."""
+        time = self._look.time
+        return min(round((self.now - time[0]) / (time[1] - time[0])), len(time) - 1)
+
+    @property
+    def magnify(self) -> float:
+        """How many times as far off the ghost is drawn."""
+        return 1.0 if self._magnified is None else MAGNIFIED[self._magnified.value]
+
+    def advance(self, seconds: float) -> None:
+        """Lets time go on, at the rate that was chosen; from the end it begins again."""
+        start, end = float(self._look.time[0]), float(self._look.time[-1])
+        then = self.now + RATES[self._rate.value] * seconds
+        self.now = then if then <= end else start
+
+    def draw(self, prediction: Prediction) -> None:
+        """Draws the traces of a twin's prediction, and where time is."""
+        self._plots.show(self._sensor.value, self._stretch.value)
+        self._plots.draw(prediction, self.now)
+        if self.plays:
+            self._scrubber.value = self.now
