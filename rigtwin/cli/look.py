@@ -54,8 +54,8 @@ def execute(parsed: argparse.Namespace) -> int:
     )
     page = rigtwin.show_look(look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=out)
     with page:
-        print(f"{page.url}, until Ctrl-C", flush=True)
         try:
+            print(f"{page.url}, until Ctrl-C", flush=True)
             page.wait()
         except KeyboardInterrupt:
             # A browser that is open holds connections, which are waited for a few seconds.

@@ -22,6 +22,9 @@ from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
+NEAREST = 12
+"""Explanations that may remove nearly all of a gap, the likeliest."""
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -196,14 +199,19 @@ def _conclude(
         return max(fit.misfit - expected, 0.0) / expected
 
     pool = sorted([*tried, nothing], key=cost)
-    rough = left_by(pool[0]) > rules.too_much
-    if rough:
-        # What explains nearly all is named though the model is not exact, but nothing beside it.
-        most = min(
-            (len(fit.effects) for fit in pool if explained_by(fit) >= rules.nearly_all),
-            default=None,
-        )
-        pool = [fit for fit in pool if most is None or len(fit.effects) <= most]
+    forbidden = left_by(pool[0]) > rules.too_much
+    if forbidden:
+        # What removes nearly all is named though the model is not exact, but nothing beside it.
+        before = relative_errors(evidence, nothing.plant)
+        removing = [
+            fit
+            for fit in pool[:NEAREST]
+            if np.all(relative_errors(evidence, fit.plant) <= (1.0 - rules.nearly_all) * before)
+        ]
+        if removing:
+            forbidden = False
+            most = min(len(fit.effects) for fit in removing)
+            pool = [fit for fit in pool if len(fit.effects) <= most]
     best = pool[0]
     expected, left, explained = (
         evidence.expected_misfit(best.plant),
@@ -224,8 +232,7 @@ def _conclude(
     if found and len(best.effects) == 1 and within_tolerance(best, evidence, thresholds):
         found = False
     more = left > thresholds.unexplained
-    enough = rules.nearly_all if rough else rules.enough
-    named = ranking[0] if found and not (more and explained < enough) else None
+    named = ranking[0] if found and not (more and (explained < rules.enough or forbidden)) else None
     shares = _shares(named.fit, evidence, explained) if named is not None else {}
     return Attribution(
         nothing=nothing,

@@ -25,7 +25,7 @@ class NamingRules:
     too_much: float
     """χ² per degree of freedom above 1 from which what is left forbids to name anything,"""
     nearly_all: float = 1.0
-    """unless that share of the gap is explained."""
+    """unless that share of what is off, in amplitude, is gone in every recording."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Thresholds:
     member: float = 0.05
     """Probability from which an effect belongs to the class that is reported."""
     known: NamingRules = field(
-        default=NamingRules(most=2, more=0.5, enough=0.97, too_much=0.4, nearly_all=0.995)
+        default=NamingRules(most=2, more=0.5, enough=0.97, too_much=0.4, nearly_all=0.9)
     )
     """Of a machine whose nominal values are well known: what is left is something else."""
     rough: NamingRules = field(
