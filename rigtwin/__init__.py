@@ -76,8 +76,10 @@ if TYPE_CHECKING:
         stability,
         tune,
     )
+    from rigtwin.api.watching import Alarm, Suspect, Watch, watch
 
 __all__ = [
+    "Alarm",
     "Campaign",
     "Changes",
     "Comparison",
@@ -96,8 +98,10 @@ __all__ = [
     "ServedCard",
     "SessionResult",
     "Stability",
+    "Suspect",
     "TableCheck",
     "TuningResult",
+    "Watch",
     "blindcheck",
     "blindcheck_arm",
     "blindcheck_wild",
@@ -128,6 +132,7 @@ __all__ = [
     "show_look",
     "stability",
     "tune",
+    "watch",
     "what_changed",
     "write_table",
 ]
@@ -194,6 +199,7 @@ _MODULES = {
         "stability",
         "tune",
     ),
+    "watching": ("Alarm", "Suspect", "Watch", "watch"),
 }
 _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 

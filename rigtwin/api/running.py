@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -30,6 +31,7 @@ def run(
     *,
     seed: int = 0,
     effects: Effects = (),
+    effects_from: float = 0.0,
     settings: Settings = (),
     controller: TickController | Callable[..., Any] | None = None,
     path: str | Path | None = None,
@@ -48,6 +50,8 @@ def run(
         Of the excitation and of the sensors' noise; the same seed gives the same recording.
     effects
         What the twin has and its operator does not know of.
+    effects_from
+        s of the test from when on it has them; the suspension rig alone.
     settings
         Changes of what the operator knows.
     controller
@@ -67,6 +71,10 @@ def run(
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
     on = the_machine(on)
+    if not 0.0 <= effects_from < math.inf:
+        raise RigtwinError(f"effects from {effects_from:g} s: expected 0 s or more")
+    if effects_from and on.structure is not Structure.QUARTER_CAR:
+        raise RigtwinError("effects from a time on: only of the suspension rig")
     test = _experiment(on, experiment)
     configuration = with_changes(test.configuration, settings)
 
@@ -78,6 +86,7 @@ def run(
             configuration=configuration,
             seed=seed,
             effects=effect_texts(effects),
+            effects_from=effects_from,
             controller=controller,
             progress=progress,
         )
@@ -107,6 +116,7 @@ def _record(
     configuration: Configuration,
     seed: int,
     effects: Sequence[str],
+    effects_from: float,
     controller: TickController | Callable[..., Any] | None,
     progress: Callable[[int], object],
 ) -> None:
@@ -121,6 +131,7 @@ def _record(
             seed,
             progress=progress,
             effects=effects,
+            effects_from=effects_from,
             machine=on.name,
             controller=tick,
         )

@@ -47,6 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where to record; replaced if there (default NAME-SEED.mcap, numbered if there)",
     )
     add_effect(parser, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
+    parser.add_argument(
+        "--effects-from",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="the effects arise at this time of the test, in s (default: they are there)",
+    )
     add_settings(parser)
     add_supervised(parser)
 
@@ -78,6 +85,7 @@ def execute(parsed: argparse.Namespace) -> int:
             experiment,
             seed=parsed.seed,
             effects=parsed.effect,
+            effects_from=parsed.effects_from,
             settings=settings,
             path=path,
             progress=bar.update,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from bisect import bisect_left
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
 from mcap.exceptions import InvalidMagic
-from mcap.records import Channel, Message, Metadata, Schema
+from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from numpy.typing import NDArray
 
 from machines import DEFAULT_MACHINE
@@ -152,95 +153,156 @@ def load(path: Path) -> Recording:
     RigtwinError
         If it is none, is empty, or is of a format this version does not read.
     """
-    metadata: dict[str, dict[str, str]] = {}
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    raw: dict[int, tuple[list[int], list[bytes]]] = {}
-    notes: list[str] = []
-    states: list[Mapping[str, str]] = []
-    lost: list[Lost] = []
-    doubtful: list[str] = []
+    gathered = Gathered()
     try:
         with path.open("rb") as file:
             if not file.read(1):
                 raise RigtwinError(f"{path} is empty; expected an MCAP recording")
             file.seek(0)
             for record in read_records(file):
-                if isinstance(record, Lost):
-                    lost.append(record)
-                elif isinstance(record, Message):
-                    times, data = raw.setdefault(record.channel_id, ([], []))
-                    times.append(record.log_time)
-                    data.append(record.data)
-                elif isinstance(record, Metadata):
-                    values, whole = unseal(record.metadata)
-                    if not whole:
-                        doubtful.append(record.name)
-                    metadata[record.name] = values
-                    if record.name == TRANSITION_RECORD and values not in states:
-                        states.append(values)
-                elif isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    channels[record.id] = record
+                gathered.add(record)
     except (InvalidMagic, struct.error):
         raise RigtwinError(f"{path} is not an MCAP file") from None
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    if lost and not metadata and not channels:
-        raise RigtwinError(f"{path} is not an MCAP file")
+    return gathered.build(path)
 
-    about = metadata.get(RECORD)
-    if about is None:
-        raise RigtwinError(f"{path} is not a rig recording: it has no metadata record {RECORD!r}")
-    period = _period(path, about)
-    # What the controller was told is believed only as it was written.
-    controller = {} if RECORD in doubtful else _controller(path, about)
-    tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
-    for number, (times, data) in raw.items():
-        channel = channels.get(number)
-        if channel is None or channel.topic not in list_topics():
-            continue
-        if channel.topic in tables:
-            raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
-        if max(times) >= 2**63:
+
+class Gathered:
+    """What was read of a file so far."""
+
+    def __init__(self) -> None:
+        self._metadata: dict[str, dict[str, str]] = {}
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._raw: dict[int, tuple[list[int], list[bytes]]] = {}
+        self._states: list[Mapping[str, str]] = []
+        self._lost: list[Lost] = []
+        self._doubtful: list[str] = []
+
+    @property
+    def ended(self) -> bool:
+        """Whether the file says why its test ended."""
+        return END_RECORD in self._metadata
+
+    @property
+    def latest(self) -> float:
+        """Time of the last tick that every topic with ticks has, s; 0 before there is one."""
+        last = [
+            times[-1]
+            for number, (times, _) in self._raw.items()
+            if times and self._channels[number].topic in list_topics()
+        ]
+        return 1e-9 * min(last, default=0)
+
+    def add(self, record: McapRecord | Lost) -> None:
+        """Takes one record, in the order of the file."""
+        if isinstance(record, Lost):
+            self._lost.append(record)
+        elif isinstance(record, Message):
+            times, data = self._raw.setdefault(record.channel_id, ([], []))
+            times.append(record.log_time)
+            data.append(record.data)
+        elif isinstance(record, Metadata):
+            values, whole = unseal(record.metadata)
+            if not whole:
+                self._doubtful.append(record.name)
+            self._metadata[record.name] = values
+            if record.name == TRANSITION_RECORD and values not in self._states:
+                self._states.append(values)
+        elif isinstance(record, Schema):
+            self._schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self._channels[record.id] = record
+
+    def forget(self, before: float) -> None:
+        """Drops the messages of earlier times, s."""
+        for times, data in self._raw.values():
+            first = bisect_left(times, round(before * 1e9))
+            del times[:first], data[:first]
+
+    def build(self, path: Path) -> Recording:
+        """The recording that it makes.
+
+        Parameters
+        ----------
+        path
+            Of the file, for messages.
+
+        Returns
+        -------
+        Recording
+            Of all that was taken and not dropped.
+
+        Raises
+        ------
+        RigtwinError
+            If it is none, holds no ticks, or is of a format this version does not read.
+        """
+        metadata, lost, doubtful = self._metadata, self._lost, self._doubtful
+        if lost and not metadata and not self._channels:
+            raise RigtwinError(f"{path} is not an MCAP file")
+        about = metadata.get(RECORD)
+        if about is None:
             raise RigtwinError(
-                f"{path}: a message on {channel.topic} has time {max(times)} ns; "
-                "expected ns since the start"
+                f"{path} is not a rig recording: it has no metadata record {RECORD!r}"
             )
-        values = _decode(path, channel, schemas.get(channel.schema_id), data)
-        stamps = np.array(times, np.int64)
-        _look_at_order(path, channel.topic, stamps, notes)
-        tables[channel.topic] = (stamps, values)
-    if not tables:
-        said = (
-            f"; it ended: {metadata[END_RECORD].get('reason', '')}"
-            if END_RECORD in metadata
-            else ""
+        period = _period(path, about)
+        # What the controller was told is believed only as it was written.
+        controller = {} if RECORD in doubtful else _controller(path, about)
+        notes: list[str] = []
+        tables = self._tables(path, notes)
+        if not tables:
+            said = (
+                f"; it ended: {metadata[END_RECORD].get('reason', '')}"
+                if END_RECORD in metadata
+                else ""
+            )
+            raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
+        time, columns = _align(tables, notes)
+        notes[:0] = _describe_damage(lost, doubtful, time)
+        if not len(time):
+            raise RigtwinError(
+                f"{path}: {' and '.join(tables)} have no tick in common; "
+                "expected the same times on each"
+            )
+        _look_at_times(path, time, period, notes)
+        return Recording(
+            path=path,
+            machine=printable(about.get("machine", DEFAULT_MACHINE)),
+            experiment=printable(about.get("experiment", "")),
+            period=period,
+            time=time,
+            columns=columns,
+            controller=controller,
+            twin=_printable(metadata.get(TWIN_RECORD, {})),
+            end=printable(metadata.get(END_RECORD, {}).get("reason", "")),
+            notes=tuple(notes),
+            transitions=_sort(self._states),
+            lateness=_printable(metadata.get(LATENESS_RECORD, {})),
         )
-        raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
-    time, columns = _align(tables, notes)
-    notes[:0] = _describe_damage(lost, doubtful, time)
-    if not len(time):
-        raise RigtwinError(
-            f"{path}: {' and '.join(tables)} have no tick in common; "
-            "expected the same times on each"
-        )
-    _look_at_times(path, time, period, notes)
-    return Recording(
-        path=path,
-        machine=printable(about.get("machine", DEFAULT_MACHINE)),
-        experiment=printable(about.get("experiment", "")),
-        period=period,
-        time=time,
-        columns=columns,
-        controller=controller,
-        twin=_printable(metadata.get(TWIN_RECORD, {})),
-        end=printable(metadata.get(END_RECORD, {}).get("reason", "")),
-        notes=tuple(notes),
-        transitions=_sort(states),
-        lateness=_printable(metadata.get(LATENESS_RECORD, {})),
-    )
+
+    def _tables(
+        self, path: Path, notes: list[str]
+    ) -> dict[str, tuple[NDArray[np.int64], dict[str, Array]]]:
+        """Topic → times in ns and columns, as they stand in the file."""
+        tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
+        for number, (times, data) in self._raw.items():
+            channel = self._channels.get(number)
+            if channel is None or channel.topic not in list_topics() or not times:
+                continue
+            if channel.topic in tables:
+                raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
+            if max(times) >= 2**63:
+                raise RigtwinError(
+                    f"{path}: a message on {channel.topic} has time {max(times)} ns; "
+                    "expected ns since the start"
+                )
+            values = _decode(path, channel, self._schemas.get(channel.schema_id), data)
+            stamps = np.array(times, np.int64)
+            _look_at_order(path, channel.topic, stamps, notes)
+            tables[channel.topic] = (stamps, values)
+        return tables
 
 
 def _describe_damage(lost: list[Lost], doubtful: list[str], time: Array) -> list[str]:

@@ -79,7 +79,11 @@ def _encode(record: McapRecord) -> bytes:
 
 
 def twin_values(
-    seed: int, parameters: Mapping[str, object], effects: Sequence[str], version: str
+    seed: int,
+    parameters: Mapping[str, object],
+    effects: Sequence[str],
+    version: str,
+    effects_from: float = 0.0,
 ) -> dict[str, str]:
     """What a recording keeps of a twin that makes it, as metadata TWIN_RECORD."""
     return {
@@ -87,6 +91,7 @@ def twin_values(
         "parameters": json.dumps(parameters),
         "effects": json.dumps(effects),
         "version": version,
+        **({"effects_from": repr(effects_from)} if effects_from else {}),
     }
 
 
@@ -146,10 +151,16 @@ class Writer:
         )
 
     def add_twin(
-        self, seed: int, parameters: Mapping[str, object], effects: tuple[str, ...], version: str
+        self,
+        seed: int,
+        parameters: Mapping[str, object],
+        effects: tuple[str, ...],
+        version: str,
+        effects_from: float = 0.0,
     ) -> None:
         """Says how a twin makes this recording, so that it can be made again."""
-        self.add_metadata(TWIN_RECORD, twin_values(seed, parameters, effects, version))
+        values = twin_values(seed, parameters, effects, version, effects_from)
+        self.add_metadata(TWIN_RECORD, values)
 
     def reserve(self) -> None:
         """Keeps room in the file for what has to be said when the disk is full.

@@ -72,6 +72,10 @@ class Disturbance:
         self._phases = [stream.uniform(0.0, 2 * math.pi) for stream in self._streams]
         self._tick = 0
 
+    def change(self, plant: RigPlant) -> None:
+        """Goes on with another plant's sensors."""
+        self._sensors = sensors(plant)
+
     def take(self, ticks: int) -> Array:
         """The next ticks' disturbances, shape (ticks, 4), in the channels' units."""
         time = np.arange(self._tick, self._tick + ticks)

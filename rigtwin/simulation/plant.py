@@ -209,6 +209,32 @@ class Simulation:
         )
 
 
+def continue_motion(before: Simulation, after: Simulation) -> None:
+    """Puts another plant where one stands: positions, velocities, forces and what the cylinders go
+    through.
+
+    Parameters
+    ----------
+    before : Simulation
+        It stays as it is.
+    after : Simulation
+        Changed in place.
+    """
+    for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
+        getattr(after.data, name)[:] = getattr(before.data, name)
+    here, there = before.state, after.state
+    for old, new in (
+        (here.ground_state, there.ground_state),
+        (here.structure_state, there.structure_state),
+    ):
+        new.filter[:], new.position[:] = old.filter, old.position
+    there.contacts.yielded[:] = here.contacts.yielded
+    mechanics = there.mechanics
+    carriage = mechanics.qpos[mechanics.carriage]
+    there.contacts.rail_gap[:] = gap_at(carriage)
+    there.contacts.motor_gap[:] = gap_at(mechanics.qpos[mechanics.structure] - carriage)
+
+
 @compilable
 def drive(mechanics: Handles, joint: int, here: float, there: float) -> None:
     """Prescribes a joint's motion over the coming timestep, from `here` to `there` in m."""

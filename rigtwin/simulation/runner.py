@@ -97,6 +97,7 @@ def record(
     progress: Callable[[int], object] = lambda _: None,
     effects: Sequence[str] = (),
     *,
+    effects_from: float = 0.0,
     machine: str = DEFAULT_MACHINE,
     controller: Tick | None = None,
 ) -> RunResult:
@@ -120,6 +121,8 @@ def record(
         Called with the ticks done since its last call.
     effects
         As `--effect` takes them; the rig has them, the operator's settings do not know of them.
+    effects_from
+        s, from when on it has them, rounded up to a block of the recording.
     machine
         The machine's name.
     controller
@@ -137,7 +140,8 @@ def record(
         Before anything is written, if the configuration is at fault.
     """
     actual = apply_effects(configuration, list(effects))
-    twin = Twin(actual, float(demands[0, 0]), seed)
+    later = effects_from > 0.0
+    twin = Twin(configuration if later else actual, float(demands[0, 0]), seed)
     settings = flatten(configuration)
     told: dict[str, object] = dict(settings["controller"])
     blocks = run_compiled(twin, actual, demands)
@@ -146,10 +150,13 @@ def record(
         blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
     with Writer(path, experiment, configuration.timing.period, told, machine) as writer:
-        writer.add_twin(seed, settings, tuple(effects), __version__)
+        writer.add_twin(seed, settings, tuple(effects), __version__, effects_from)
         for block in blocks:
             writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
+            if later and ticks * configuration.timing.period >= effects_from - 1e-9:
+                twin.change(actual)
+                later = False
             progress(len(block.commands))
         reason = explain_trip(trip, configuration.safety, column)
         writer.finish(reason)

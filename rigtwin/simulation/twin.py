@@ -11,7 +11,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Disturbance, build_sensing, sample_sensors
-from rigtwin.simulation.plant import PlantState, Simulation, advance, sense
+from rigtwin.simulation.plant import PlantState, Simulation, advance, continue_motion, sense
 
 _advance = kernel(advance)
 
@@ -55,6 +55,28 @@ class Twin:
             float(ground), controller.start, controller.preload, controller.preload / MOTOR_CONSTANT
         )
         self.truth = Measurements(0.0, 0.0, 0.0, 0.0)
+
+    def change(self, configuration: Configuration) -> None:
+        """Goes on as another plant, from where it stands: its motion, and the noise that was drawn,
+        stay; what acts on commands begins as if the present ones had been held for long."""
+        plant, before = configuration.plant, self.simulation
+        self.simulation = Simulation(
+            plant,
+            configuration.timing.timestep,
+            configuration.substeps,
+            ground=self.held.ground,
+            structure=self.held.structure,
+            preload=self.held.voltage * plant.motor.constant,
+        )
+        continue_motion(before, self.simulation)
+        sensing = build_sensing(plant, configuration.timing.period)
+        for here, there in zip(self.sensing.states, sensing.states, strict=True):
+            for old, new in zip(here, there, strict=True):
+                if old.shape == new.shape:
+                    new[:] = old
+        self.sensing = sensing
+        self.disturbance.change(plant)
+        self._share_missed = plant.computer.missed_ticks
 
     def start(self) -> None:
         """Nothing to do: a twin is built at its start."""

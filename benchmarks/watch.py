@@ -1,0 +1,127 @@
+"""How often a watch raises an alarm where nothing is wrong, and how soon where something is.
+
+python -m benchmarks.watch --hours 10            # nominal tests, one seed each
+python -m benchmarks.watch --effects             # each effect from the middle of a test on
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from itertools import count, islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tqdm import tqdm
+
+import rigtwin
+
+TESTS = (
+    "drop",
+    "road1.6",
+    "road10",
+    "passive",
+    "semi-active",
+    "active",
+    "single-mass",
+    "single-mass-road",
+    "friction-road",
+    "imposed",
+    "imposed-fast",
+    "gas-spring",
+)
+LATER = 10.0
+"""s, from when on an effect is there."""
+EFFECTS = {
+    "coulomb@rail": 60.0,
+    "viscous@rail": 150.0,
+    "coulomb@motor": 30.0,
+    "gain@motor": 0.95,
+    "cogging@motor": 15.0,
+    "stiffness@tyre": 55000.0,
+    "delay@structure_cylinder": 0.004,
+    "backlash@structure_cylinder": 4e-4,
+    "deadband@ground_cylinder": 4e-4,
+    "gain@load_cell": 1.03,
+    "offset@structure_lvdt": 5e-4,
+    "gain@suspension_lvdt": 1.02,
+}
+
+
+def watch_nominal(case: tuple[str, int]) -> tuple[str, int, float, float, str]:
+    """One nominal test: name, seed, its length in s, the highest level, the alarm if any."""
+    name, seed = case
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "test.mcap"
+        rigtwin.run("suspension-rig", name, seed=seed, path=path)
+        levels = [0.0]
+        watch = rigtwin.watch(path, told=lambda now: levels.append(now.level), suspects=False)
+        return name, seed, watch.judged, max(levels), str(watch.alarm or "")
+
+
+def watch_effect(case: tuple[str, float, int]) -> tuple[str, str, float]:
+    """One effect: its name, the alarm, and s until the suspects were first known."""
+    name, value, seed = case
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "test.mcap"
+        rigtwin.run(
+            "suspension-rig",
+            "imposed",
+            seed=seed,
+            effects={name: value},
+            effects_from=LATER,
+            path=path,
+        )
+        first: list[float] = []
+        begun: list[float] = []
+
+        def told(now: rigtwin.Watch) -> None:
+            if now.alarm is not None and not begun:
+                begun.append(time.monotonic())
+            if now.alarm is not None and now.alarm.suspects and not first:
+                first.append(time.monotonic() - begun[0])
+
+        watch = rigtwin.watch(path, told=told)
+        return name, str(watch.alarm or "no alarm"), first[0] if first else float("nan")
+
+
+def _nominal_cases(hours: float, seed: int) -> Iterator[tuple[str, int]]:
+    length = {name: 45.0 for name in TESTS}
+    wanted = round(3600.0 * hours / (sum(length.values()) / len(length) * 0.8))
+    return islice(((name, seed + n) for n in count() for name in TESTS), wanted)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--hours", type=float, default=0.0)
+    parser.add_argument("--effects", action="store_true")
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
+    with ProcessPoolExecutor(given.workers) as pool:
+        if given.effects:
+            cases = [(name, value, given.seed) for name, value in EFFECTS.items()]
+            for name, alarm, waited in pool.map(watch_effect, cases):
+                print(f"{name}: {alarm}; suspects {waited:.1f} s of computing later", flush=True)
+        total, alarms, highest = 0.0, 0, 0.0
+        nominal = list(_nominal_cases(given.hours, given.seed))
+        for name, seed, length, level, alarm in tqdm(
+            pool.map(watch_nominal, nominal), total=len(nominal), disable=not nominal or None
+        ):
+            total, highest = total + length, max(highest, level)
+            if alarm:
+                alarms += 1
+                print(f"{name} {seed}: {alarm}", flush=True)
+        if nominal:
+            print(
+                f"{total / 3600.0:.2f} h of {len(nominal)} nominal tests: {alarms} false alarms; "
+                f"the highest CUSUM was {highest:.2f} of its limit"
+            )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

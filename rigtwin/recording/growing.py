@@ -1,0 +1,118 @@
+"""A recording that somebody else is still writing."""
+
+from __future__ import annotations
+
+import io
+import struct
+from pathlib import Path
+
+from mcap.exceptions import InvalidMagic
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import MCAP0_MAGIC
+
+from rigtwin.errors import RigtwinError
+from rigtwin.recording.reader import Gathered, Recording
+from rigtwin.recording.records import DAMAGE, Lost
+
+_PREFIX = struct.Struct("<BQ")
+"""Opcode and length of a record."""
+READ = 2**18
+"""Bytes that are read of a file at a time."""
+
+
+class GrowingRecording:
+    """The last seconds of a file that grows, or of one that is whole already.
+
+    ended: whether the file says that its test is over.
+    """
+
+    def __init__(self, path: Path, window: float) -> None:
+        """window: s, what is kept of it."""
+        self.path = path
+        self._window = window
+        self._gathered = Gathered()
+        self._read, self._rest, self._begun = 0, b"", False
+        self.ended = False
+
+    @property
+    def latest(self) -> float:
+        """Time of the last tick read, s."""
+        return self._gathered.latest
+
+    def read(self, until: float = float("inf")) -> bool:
+        """Takes what was added to the file since the last call.
+
+        Parameters
+        ----------
+        until
+            s; a test that goes on longer is taken up to there or a little later, the rest by the
+            next calls.
+
+        Returns
+        -------
+        bool
+            Whether there were new ticks.
+
+        Raises
+        ------
+        RigtwinError
+            If the file cannot be read, is no recording, or was replaced by a shorter one.
+        """
+        before = self.latest
+        try:
+            with self.path.open("rb") as file:
+                if file.seek(0, io.SEEK_END) < self._read:
+                    raise RigtwinError(f"{self.path} was replaced while it was read")
+                file.seek(self._read)
+                while self.latest < until:
+                    if self._take_one():
+                        continue
+                    added = file.read(READ)
+                    if not added:
+                        break
+                    self._read += len(added)
+                    self._rest += added
+        except OSError as error:
+            raise RigtwinError(f"cannot read {self.path}: {error.strerror}") from None
+        self._gathered.forget(self.latest - self._window)
+        self.ended = self._gathered.ended
+        return self.latest > before
+
+    def recording(self) -> Recording:
+        """What was kept of it. Raises RigtwinError if it is no recording or has no ticks yet."""
+        return self._gathered.build(self.path)
+
+    def _take_one(self) -> bool:
+        """Takes the next record, if all of it was read."""
+        if not self._begun:
+            if not self._rest.startswith(MCAP0_MAGIC[: len(self._rest)]):
+                raise RigtwinError(f"{self.path} is not an MCAP file")
+            if len(self._rest) < len(MCAP0_MAGIC):
+                return False
+            self._begun, self._rest = True, self._rest[len(MCAP0_MAGIC) :]
+        if len(self._rest) < _PREFIX.size or self._rest.startswith(MCAP0_MAGIC):
+            return False
+        end = _PREFIX.size + _PREFIX.unpack_from(self._rest)[1]
+        if end > len(self._rest):
+            return False
+        record, self._rest = self._rest[:end], self._rest[end:]
+        self._add(record)
+        return True
+
+    def _add(self, record: bytes) -> None:
+        if record[0] in (Opcode.FOOTER, Opcode.DATA_END, Opcode.MESSAGE_INDEX):
+            return
+        reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
+        try:
+            for each in reader.records:
+                if not isinstance(each, Chunk):
+                    self._gathered.add(each)
+                    continue
+                for part in breakup_chunk(each, validate_crc=True):
+                    self._gathered.add(part)
+        except InvalidMagic:
+            raise RigtwinError(f"{self.path} is not an MCAP file") from None
+        except DAMAGE:
+            self._gathered.add(Lost())
