@@ -37,7 +37,7 @@ if TYPE_CHECKING:
         write_table,
     )
     from rigtwin.api.faults import Campaign, faults
-    from rigtwin.api.look import look, show_look
+    from rigtwin.api.look import look, show_live, show_look
     from rigtwin.api.machines import (
         Configuration,
         Effect,
@@ -129,6 +129,7 @@ __all__ = [
     "run_on_twin",
     "run_session",
     "serve_card",
+    "show_live",
     "show_look",
     "stability",
     "tune",
@@ -173,7 +174,7 @@ _MODULES = {
         "write_table",
     ),
     "faults": ("Campaign", "faults"),
-    "look": ("look", "show_look"),
+    "look": ("look", "show_live", "show_look"),
     "session": (
         "DryRun",
         "SessionResult",

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.api.answers import described_machine
 from rigtwin.api.machines import Settings, twin_of
+from rigtwin.api.recordings import load
+from rigtwin.api.watching import watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.looking import Look
-from rigtwin.looking.given import read_answer
+from rigtwin.looking.given import read_answer, take_alarm
 from rigtwin.recording import reader
+from rigtwin.watching import Watch
 
 if TYPE_CHECKING:
+    from rigtwin.looking.live import LivePage
     from rigtwin.looking.page import Page
 
 
@@ -83,12 +88,80 @@ def show_look(
     RigtwinError
         If the port is taken, the diagnosis is none of this recording, or viser is missing.
     """
-    try:
+    given = None if diagnosis is None else read_answer(diagnosis, look)
+    with _needs_viser():
+        from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page
+    server = open_server(port, f"{look.machine.title}: {look.recording.path.name}")
+    return Page(server, look, given, _twin_file(look.recording.path, save_twin))
+
+
+def show_live(
+    path: str | Path,
+    *,
+    port: int = 0,
+    machine: Machine | str | Path | None = None,
+    settings: Settings = (),
+    without: Sequence[str] = (),
+    save_twin: str | Path | None = None,
+    said: Callable[[str], object] = lambda _: None,
+) -> LivePage:
+    """A test that is running beside its twin, in the browser: both in motion, the gap as it arises,
+    an alarm when it is more than noise and tolerances explain. When the test is over, the page
+    becomes that of `show_look`.
+
+    Parameters
+    ----------
+    path
+        Of the recording, which another program writes or is about to.
+    port, save_twin
+        As `show_look` takes them.
+    machine, settings, without
+        As `watch` takes them.
+    said
+        Called with what there is to say, a line each: an alarm, its suspects, why the watch ended
+        early.
+
+    Returns
+    -------
+    LivePage
+        Open at its `url` until its `close` is called; `wait` returns then, and raises what went
+        wrong with the recording.
+
+    Raises
+    ------
+    RigtwinError
+        If the port is taken or viser is missing.
+    """
+    with _needs_viser():
+        from rigtwin.looking.live import LivePage
+        from rigtwin.looking.local_server import LocalServer, open_server
+        from rigtwin.looking.page import Page
+
+    def follow(told: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
+        return watch(
+            path, machine=machine, settings=settings, without=without, told=told, stop=stop
+        )
+
+    def look_back(server: LocalServer, watched: Watch) -> Page:
+        whole = look(
+            load(path, machine), machine=watched.machine, settings=settings, without=without
+        )
+        given = None if watched.alarm is None else take_alarm(watched.alarm, whole)
+        return Page(server, whole, given, _twin_file(Path(path), save_twin))
+
+    return LivePage(open_server(port, Path(path).name), follow, look_back, said)
+
+
+@contextmanager
+def _needs_viser() -> Iterator[None]:
+    try:
+        yield
     except ModuleNotFoundError as error:
         if error.name not in ("viser", "trimesh"):
             raise
         raise RigtwinError(f"the page needs {error.name}; pip install 'rigtwin[look]'") from None
-    given = None if diagnosis is None else read_answer(diagnosis, look)
-    out = Path(f"{look.recording.path.stem}_twin.toml") if save_twin is None else Path(save_twin)
-    return Page(look, port, given, out)
+
+
+def _twin_file(recording: Path, named: str | Path | None) -> Path:
+    return Path(f"{recording.stem}_twin.toml") if named is None else Path(named)

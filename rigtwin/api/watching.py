@@ -39,7 +39,7 @@ def watch(
     Parameters
     ----------
     path
-        Of the recording, an MCAP file that another program writes.
+        Of the recording, an MCAP file that another program writes or is about to.
     machine
         That it is of; by default the one that it names.
     settings
@@ -63,14 +63,17 @@ def watch(
     Raises
     ------
     RigtwinError
-        If the file cannot be read, is of another machine, lacks a channel, or nothing was added to
-        it for longer than `patience` before its test ended.
+        If the file cannot be read, is of another machine, lacks a channel, nothing of it could be
+        judged, or nothing was added to it for longer than `patience` before its test ended.
     """
     growing = GrowingRecording(Path(path), WINDOW + STEP)
     watching, looked = None, time.monotonic()
     while not stop():
-        # Where judging takes longer than the test, longer stretches are judged at a time.
         here = time.monotonic()
+        if not growing.path.exists() and here - looked <= patience:
+            time.sleep(LOOK)
+            continue
+        # Where judging takes longer than the test, longer stretches are judged at a time.
         grew = growing.read(growing.latest + max(STEP, here - looked))
         if not grew and not growing.ended:
             if here - looked > patience:
@@ -87,10 +90,11 @@ def watch(
             watching = Watch(found, twin_of(found, settings, without))
         if watching.take(recording, last=growing.ended):
             told(watching)
-        if suspects and watching.investigate(recording):
+        if suspects and watching.investigate(recording, last=growing.ended):
             told(watching)
         if growing.ended:
             break
-    if watching is None:
-        raise RigtwinError(f"{path}: there was nothing to judge before the watch was stopped")
+    if watching is None or watching.gap is None:
+        why = watching.note if watching is not None else ""
+        raise RigtwinError(why or f"{path}: there was nothing to judge")
     return watching

@@ -51,6 +51,7 @@ COMMANDS = (
     "compare",
     "diagnose",
     "look",
+    "watch",
     "machines",
     "machine",
     "blindcheck",
@@ -86,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a
-    test that tripped, 130 interrupted."""
+    test that tripped, 4 done and something is not as it should be, 130 interrupted."""
     try:
         return _main(arguments)
     except KeyboardInterrupt:

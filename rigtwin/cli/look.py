@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigtwin.cli.options import add_machine, add_settings, settings_of
 from rigtwin.console import apart, writable
+from rigtwin.errors import RigtwinError
+
+if TYPE_CHECKING:
+    from rigtwin.looking.live import LivePage
+    from rigtwin.looking.page import Page
 
 SUMMARY = "see a recording beside its twin, and move what may be wrong by hand"
 MORE = """\
@@ -16,13 +23,19 @@ Effects that are ticked can be fitted, and the twin with them written for --conf
 
 examples:
   rigtwin look rig.mcap
-  rigtwin diagnose rig.mcap --json why.json; rigtwin look rig.mcap --diagnosis why.json"""
+  rigtwin diagnose rig.mcap --json why.json; rigtwin look rig.mcap --diagnosis why.json
+  rigtwin look rig.mcap --live                while the test runs (rigtwin watch: without a page)"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path)
     parser.add_argument(
         "--diagnosis", type=Path, metavar="F.json", help="begin with what this diagnosis found"
+    )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="the recording is being written: watch its test, with an alarm; sliders afterwards",
     )
     parser.add_argument(
         "--save-twin",
@@ -43,17 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
-    import rigtwin
 
+    if parsed.live and parsed.diagnosis is not None:
+        raise RigtwinError("--diagnosis is of a recording that is whole; not with --live")
     out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
     writable(apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None)))
-    look = rigtwin.look(
-        rigtwin.load(parsed.recording, parsed.machine),
-        settings=settings_of(parsed),
-        without=parsed.without,
-    )
-    page = rigtwin.show_look(look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=out)
-    with page:
+    with _page(parsed, out) as page:
         try:
             print(f"{page.url}, until Ctrl-C", flush=True)
             page.wait()
@@ -61,3 +69,24 @@ def execute(parsed: argparse.Namespace) -> int:
             # A browser that is open holds connections, which are waited for a few seconds.
             print("closing", flush=True)
     return 0
+
+
+def _page(parsed: argparse.Namespace, out: Path) -> Page | LivePage:
+    import rigtwin
+
+    if parsed.live:
+        return rigtwin.show_live(
+            parsed.recording,
+            port=parsed.port,
+            machine=parsed.machine,
+            settings=settings_of(parsed),
+            without=parsed.without,
+            save_twin=out,
+            said=partial(print, flush=True),
+        )
+    look = rigtwin.look(
+        rigtwin.load(parsed.recording, parsed.machine),
+        settings=settings_of(parsed),
+        without=parsed.without,
+    )
+    return rigtwin.show_look(look, port=parsed.port, diagnosis=parsed.diagnosis, save_twin=out)

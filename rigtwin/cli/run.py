@@ -71,6 +71,8 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
     if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
+        if parsed.effects_from:
+            raise RigtwinError("--effects-from does not go with --target, --card and --real-time")
         return _run_supervised(parsed, machine, path)
     for option in ("dry_run", "arm", "without_dry_run", "stop_file", "live"):
         if getattr(parsed, option):

@@ -10,17 +10,46 @@ from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.look import Look
+from rigtwin.watching import Alarm
 
 
 @dataclass(frozen=True)
 class Given:
-    """A diagnosis' answer. values: of the effects that can be moved, by name; beside: those that
-    were found and cannot be, such as a setting; confidence: of each effect, by name."""
+    """What was found. sentence: as it is told; values: of the effects that can be moved, by name;
+    beside: those that were found and cannot be, such as a setting; confidence: of each effect, by
+    name."""
 
     sentence: str
     values: Mapping[str, tuple[float, ...]]
     beside: tuple[str, ...]
     confidence: Mapping[str, float]
+
+
+def take_alarm(alarm: Alarm, look: Look) -> Given:
+    """What a watch suspects most.
+
+    Parameters
+    ----------
+    alarm
+        Of a test.
+    look
+        Of the test's recording.
+
+    Returns
+    -------
+    Given
+        The likeliest effect; none if there was none.
+    """
+    likeliest = {each.effect: each for each in alarm.suspects[:1] if each.effect in look.effects}
+    return Given(
+        str(alarm),
+        {
+            name: tuple(each.values[key] for key in look.effects[name].kind.parameters)
+            for name, each in likeliest.items()
+        },
+        (),
+        {name: each.probability for name, each in likeliest.items()},
+    )
 
 
 def read_answer(path: str | Path, look: Look) -> Given:
@@ -71,7 +100,7 @@ def read_answer(path: str | Path, look: Look) -> Given:
     }
     look.plant(values)
     return Given(
-        sentence,
+        f"the diagnosis: {sentence}",
         values,
         tuple(effect for effect, _, _ in found if effect not in values),
         {effect: sure for effect, _, sure in found},

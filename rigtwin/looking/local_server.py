@@ -19,6 +19,11 @@ AMBIENT = 0.8
 class LocalServer(viser.ViserServer):
     """A server that cannot be asked to share its page with the world."""
 
+    @property
+    def url(self) -> str:
+        """Where its page is."""
+        return f"http://{HOST}:{self.get_port()}"
+
     def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
         """Nothing: whatever a page asks for stays here."""
         return None
@@ -61,13 +66,24 @@ def open_server(port: int, label: str) -> LocalServer:
     if server.get_port() != free:
         stop_server(server)
         raise RigtwinError(f"no page on port {port}: it was taken just now; 0 takes a free one")
+    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    _light(server)
+    return server
+
+
+def clear(server: LocalServer) -> None:
+    """Takes everything from its page, in all tabs."""
+    server.gui.reset()
+    server.scene.reset()
+    _light(server)
+
+
+def _light(server: LocalServer) -> None:
     # Where there is no graphics card, mirrored surroundings and shadows are most of what a picture
     # costs, and whoever drags a slider waits for pictures.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
-    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-    return server
 
 
 def stop_server(server: LocalServer) -> None:

@@ -18,14 +18,11 @@ from rigtwin.diagnosis.fit import Fit, clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
+from rigtwin.looking.motions import find_positions, predicts_motion
 from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.render.motions import joint_positions
-
-MOTIONS = ("position", "velocity")
-"""Kinds of signals that say where a joint stands."""
 
 
 class Look:
@@ -68,7 +65,7 @@ class Look:
     def predicts_motion(self) -> bool:
         """Whether any of the observed signals is a motion; else what moves the twin is what was
         measured."""
-        return any(row.kind in MOTIONS for row in self.machine.rows)
+        return predicts_motion(self.machine)
 
     def positions(self, prediction: Prediction | None = None) -> dict[str, Array]:
         """Where the joints stand.
@@ -83,16 +80,8 @@ class Look:
         dict of Array
             Joint → position, m or rad, shape (ticks,). Of joints that no signal speaks of, nothing.
         """
-        every = self._evidence.models[0].every
-        columns = {
-            topic: {name: values[::every] for name, values in names.items()}
-            for topic, names in self.recording.columns.items()
-        }
-        if prediction is not None:
-            for row, signal in zip(self.machine.rows, prediction.signals, strict=True):
-                if row.kind in MOTIONS:
-                    columns[row.channel[0]][row.channel[1]] = signal
-        return joint_positions(self.machine, columns, self._evidence.lines[0].period)
+        signals = None if prediction is None else prediction.signals
+        return find_positions(self.machine, self.recording, self._evidence.lines[0].period, signals)
 
     def clashing(self, name: str, others: Iterable[str]) -> tuple[str, ...]:
         """Of other effects, those that set a parameter that this one sets too.

@@ -15,7 +15,7 @@ from types import TracebackType
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.controls import Controls
 from rigtwin.looking.given import Given
-from rigtwin.looking.local_server import HOST, open_server, stop_server
+from rigtwin.looking.local_server import LocalServer, stop_server
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.scene import Scene
@@ -35,11 +35,13 @@ class Page:
     url: where it is; saved_to: what the save button writes.
     """
 
-    def __init__(self, look: Look, port: int, given: Given | None, saved_to: Path) -> None:
-        """Raises RigtwinError if the port is taken."""
+    def __init__(
+        self, server: LocalServer, look: Look, given: Given | None, saved_to: Path
+    ) -> None:
+        """server: with nothing on it yet; the page stops it."""
         self._look, self.saved_to = look, saved_to
-        self._server = open_server(port, f"{look.machine.title}: {look.recording.path.name}")
-        self.url = f"http://{HOST}:{self._server.get_port()}"
+        self._server = server
+        self.url = server.url
         self._wake = threading.Condition()
         self._closed = False
         self._failure: BaseException | None = None
@@ -92,6 +94,10 @@ class Page:
     def prediction(self) -> Prediction:
         """What the page shows of the twin with these effects, or a moment ago with others."""
         return self._prediction
+
+    def add_note(self, text: str) -> None:
+        """Says one thing more about the recording."""
+        self._status.content = note(text) + self._status.content
 
     def wait(self) -> None:
         """Returns when the page is closed. Raises what went wrong in it."""

@@ -8,8 +8,10 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.looking.given import Given
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
+from rigtwin.watching import Suspect, Watch
 
 STYLE = "margin:0 0.8em 0.5em;font-size:0.85em;line-height:1.35"
+CALM, ALARMED = "#1b7f3b", "#b3261e"
 CELL = "padding:0 0 0 1em;text-align:right;font-variant-numeric:tabular-nums"
 
 
@@ -37,7 +39,7 @@ def describe_errors(look: Look, prediction: Prediction) -> str:
 
 def describe_given(given: Given) -> str:
     """What a diagnosis found."""
-    lines = [f"the diagnosis: {given.sentence}"]
+    lines = [given.sentence]
     lines += [
         f"{name}: {', '.join(f'{value:.4g}' for value in values)}; confidence "
         f"{100.0 * given.confidence[name]:.0f} %"
@@ -58,6 +60,48 @@ def describe_fit(fitted: Fit, look: Look, seconds: float) -> str:
             for slider, value, width in zip(sliders, values, widths, strict=True)
         ]
     return "".join(note(line) for line in lines)
+
+
+def describe_watch(watch: Watch) -> str:
+    """How a test goes that is running."""
+    alarm = watch.alarm
+    said, colour = ("no gap", CALM) if alarm is None else ("alarm", ALARMED)
+    head = (
+        f'<div style="{STYLE}"><p role="status" style="margin:0.3em 0;font-size:1.5em;'
+        f'color:{colour}"><b id="watch">{said}</b></p>'
+    )
+    lines = [f"judged up to {watch.judged:.1f} s of the test"]
+    if alarm is not None:
+        lines.insert(0, str(alarm))
+        lines += [_describe_suspect(watch, suspect) for suspect in alarm.suspects]
+    if watch.note:
+        lines.append(f"not judged: {watch.note}")
+    rows = "".join(
+        f'<tr><td>{escape(signal)}</td><td style="{CELL}" data-signal="{escape(signal)}">'
+        f"{'not judged' if ratio == 0.0 else f'{ratio:.2f}'}</td></tr>"
+        for signal, ratio in watch.ratios.items()
+    )
+    return (
+        f"{head}</div>{''.join(note(line) for line in lines)}"
+        f'<div style="{STYLE}"><table style="border-collapse:collapse"><tr><td></td>'
+        f'<td style="{CELL}">gap</td></tr>{rows}</table><p>rms of measured less predicted in the '
+        "last stretch, in units of what noise and tolerances explain; not judged: what stands "
+        "still where dry friction holds it</p>"
+        f'<p>alarm level: <b id="level">{100.0 * min(watch.level, 1.0):.0f} %</b></p></div>'
+    )
+
+
+def _describe_suspect(watch: Watch, suspect: Suspect) -> str:
+    machine = watch.machine
+    quantities = {effect.name: effect.quantities() for effect in machine.effects()}[suspect.effect]
+    values = ", ".join(
+        f"{name} = {value:.4g} {machine.unit(suspect.component, quantities[name])}"
+        for name, value in suspect.values.items()
+    )
+    return (
+        f"{suspect.effect}, {100.0 * suspect.probability:.0f} %: {values}; explains "
+        f"{100.0 * suspect.explained:.0f} % of the gap"
+    )
 
 
 def _percent(value: float) -> str:

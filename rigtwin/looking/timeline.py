@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 import viser
 
 from rigtwin.looking.look import Look
-from rigtwin.looking.plots import STRETCHES, WHOLE, Plots
+from rigtwin.looking.plots import DESCRIBED, TWIN, Plots
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.texts import note
+from rigtwin.numerics.arrays import Array
 
 RATES = {"as it was": 1.0, "a quarter as fast": 0.25, "a tenth as fast": 0.1}
 MAGNIFIED = {"as it is": 1.0, "10 times": 10.0, "100 times": 100.0}
+WHOLE = "whole test"
+STRETCHES = {WHOLE: np.inf, "10 s": 10.0, "2 s": 2.0, "0.5 s": 0.5}
+"""What is shown about the time that is looked at, s."""
 WIDTH = 560
 """Pixels of the panel."""
 
@@ -52,7 +57,7 @@ class Timeline:
         self._stretch = gui.add_dropdown("shown", tuple(STRETCHES), initial_value=WHOLE)
         for chosen in (self._sensor, self._stretch):
             chosen.on_update(lambda _: self._refresh("plots"))
-        self._plots = Plots(self._server, look, worst)
+        self._plots = Plots(self._server, {"described twin": DESCRIBED, "this twin": TWIN})
         if not look.predicts_motion:
             gui.add_html(
                 note("this twin moves as measured: what it predicts are forces, so it has no ghost")
@@ -91,7 +96,26 @@ class Timeline:
 
     def draw(self, prediction: Prediction) -> None:
         """Draws the traces of a twin's prediction, and where time is."""
-        self._plots.show(self._sensor.value, self._stretch.value)
-        self._plots.draw(prediction, self.now)
+        look, sensor = self._look, self._sensor.value
+        row = look.sensors.index(sensor)
+        measured, nominal = look.measured[row], look.nominal.signals[row]
+        self._plots.name(
+            sensor,
+            look.units[row],
+            float(np.max(np.abs(measured))),
+            float(np.max(np.abs(measured - nominal))),
+        )
+        part = _window(look.time, self.now, STRETCHES[self._stretch.value])
+        predicted = [nominal[part], prediction.signals[row][part]]
+        self._plots.draw(look.time[part], measured[part], predicted, self.now)
         if self.plays:
             self._scrubber.value = self.now
+
+
+def _window(time: Array, now: float, length: float) -> slice:
+    """Ticks of a stretch about a time, moved to lie within the test."""
+    if length >= time[-1] - time[0]:
+        return slice(0, len(time))
+    start = min(max(now - 0.5 * length, float(time[0])), float(time[-1]) - length)
+    first, last = np.searchsorted(time, [start, start + length])
+    return slice(int(first), max(int(last), int(first) + 2))

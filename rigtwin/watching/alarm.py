@@ -29,9 +29,9 @@ class Suspect:
 class Alarm:
     """A gap that noise and tolerances do not explain.
 
-    time: s, of the test, when it was certain; since: s, about when it began; signal: that shows it
-    most; band: Hz, in which it does; suspects: the likeliest first, empty before they were looked
-    for.
+    time: s, up to where the test was recorded when it was raised; since: s, about when the gap
+    began; signal: that shows it most; band: Hz, in which it does; suspects: the likeliest first,
+    empty before they were looked for.
     """
 
     time: float

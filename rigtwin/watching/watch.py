@@ -46,6 +46,10 @@ SAME = 0.5
 """Of what a signal is held to, by which such predictions may differ."""
 STEPS = 4
 """Of integration a tick."""
+SEEN = 3.0
+"""s of a gap that must be seen until its suspects are looked for."""
+SETTLED = 1.0
+"""s of a gap that its suspects are not held against: they were not there before it."""
 LOOKED = 1.5
 """Times as long as before a gap must be seen until its suspects are looked for again."""
 
@@ -53,10 +57,10 @@ LOOKED = 1.5
 class Watch:
     """A twin beside a test. It is given what was recorded so far, again and again.
 
-    alarm: the gap that was found, None so far; gap: what was judged last, None before there was
-    enough; ratios: by signal, the difference's rms in the last stretch in units of what noise and
-    tolerances explain; note: why the last stretch could not be judged, empty if it was; judged: s,
-    up to where.
+    alarm: the gap that was found, None so far; gap, recording: what was judged last and what it is
+    of, None before there was enough; ratios: by signal, the difference's rms in the last stretch in
+    units of what noise and tolerances explain; note: why the last stretch could not be judged,
+    empty if it was; judged: s, up to where; highest: the level's maximum so far.
     """
 
     def __init__(self, machine: Machine, base: Configuration | None = None) -> None:
@@ -69,6 +73,8 @@ class Watch:
         self.gap: Gap | None = None
         self.ratios: dict[str, float] = {}
         self.note, self.judged = "", -math.inf
+        self.recording: Recording | None = None
+        self.highest = 0.0
 
     @property
     def level(self) -> float:
@@ -109,7 +115,8 @@ class Watch:
             self.note = str(error)
             return False
         self.note = ""
-        self.gap = gap = find_gap(evidence)
+        self.recording, self.gap = window, find_gap(evidence)
+        gap = self.gap
         held = 0.0 if last or math.isinf(evidence.models[0].band) else HELD_BACK
         first, stop = np.searchsorted(gap.time, [self.judged, end - held])
         new = slice(int(first), max(int(stop), int(first)))
@@ -117,8 +124,9 @@ class Watch:
             return False
         names = evidence.names
         self.ratios = dict(zip(names, ratio(gap, new).tolist(), strict=True))
-        self._judge(gap, new, names)
+        self._judge(gap, new, names, end)
         self.judged = float(gap.time[new.stop - 1]) + evidence.lines[0].period
+        self.highest = max(self.highest, self.level)
         return True
 
     def _evidence(self, window: Recording, since: float = -math.inf) -> Evidence:
@@ -151,7 +159,7 @@ class Watch:
             known &= np.repeat(alike, model.every)[: window.ticks]
         return known
 
-    def _judge(self, gap: Gap, new: slice, names: list[str]) -> None:
+    def _judge(self, gap: Gap, new: slice, names: list[str], end: float) -> None:
         period = float(gap.time[1] - gap.time[0])
         length = max(1, round(BLOCK / period))
         for start in range(new.start, new.stop, length):
@@ -166,20 +174,18 @@ class Watch:
                     power = float(np.sum(gap.power[row, number, block][counts]))
                     if freedom > 0.0:
                         cusum.add(power, freedom, time)
-                    self._note_alarm(cusum, time, name, number)
+                    if self.alarm is None and cusum.value >= LIMIT:
+                        self.alarm = Alarm(end, cusum.since, name, BANDS[number])
 
-    def _note_alarm(self, cusum: Cusum, time: float, signal: str, band: int) -> None:
-        """The first that exceeds its limit is the alarm."""
-        if self.alarm is None and cusum.value >= LIMIT:
-            self.alarm = Alarm(time, cusum.since, signal, BANDS[band])
-
-    def investigate(self, recording: Recording) -> bool:
+    def investigate(self, recording: Recording, *, last: bool = False) -> bool:
         """Looks for what may be behind an alarm: at once, and again as more of the gap was seen.
 
         Parameters
         ----------
         recording
             What `take` judged last.
+        last
+            Whether nothing will follow.
 
         Returns
         -------
@@ -191,11 +197,15 @@ class Watch:
         window = cut(recording, float(recording.time[-1]) - WINDOW)
         since = max(self.alarm.since, float(window.time[0]))
         seen = self.judged - since
-        if seen < LOOKED * self._looked or (self._looked and seen > WINDOW - WARM - STEP):
+        if seen < max(SEEN, LOOKED * self._looked) and not (last and not self._looked):
+            return False
+        if self._looked and seen > WINDOW - WARM - STEP:
             return False
         self._looked = seen
+        part = cut(window, since - WARM)
+        known = since + SETTLED if since > self._start else since
         try:
-            suspects = find_suspects(self._evidence(cut(window, since - WARM), since))
+            suspects = find_suspects(self._evidence(part, known))
         except RigtwinError as error:
             self.note = str(error)
             return False
