@@ -12,12 +12,13 @@ from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.growing import GrowingRecording
 from rigtwin.watching import Alarm, Suspect, Watch
-from rigtwin.watching.watch import STEP, WINDOW
+from rigtwin.watching.watch import SHORTEST, STEP, WINDOW
 
 __all__ = ["Alarm", "Suspect", "Watch", "watch"]
 
-PATIENCE = 10.0
-"""s without anything new after which a recording without an end is given up."""
+PATIENCE = 30.0
+"""s without anything new after which a recording without an end is given up; a session in real time
+takes some to begin."""
 LOOK = 0.05
 """s from one look at the file to the next."""
 
@@ -96,5 +97,5 @@ def watch(
             break
     if watching is None or watching.gap is None:
         why = watching.note if watching is not None else ""
-        raise RigtwinError(why or f"{path}: there was nothing to judge")
+        raise RigtwinError(why or f"{path}: a test is judged from {SHORTEST:g} s on")
     return watching

@@ -32,9 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--patience",
         type=float,
-        default=10.0,
         metavar="S",
-        help="give up when nothing was added for so long, in s (default 10)",
+        help="give up when nothing was added for so long, in s (default 30)",
     )
     add_machine(parser)
     add_settings(parser)
@@ -46,6 +45,8 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     said: list[str] = []
+    if not parsed.recording.exists():
+        print(f"waiting for {parsed.recording}", flush=True)
     with tqdm(unit="s", desc="judged", bar_format="{desc} {n:.1f} s{postfix}", disable=None) as bar:
 
         def tell(now: rigtwin.Watch) -> None:
@@ -60,13 +61,13 @@ def execute(parsed: argparse.Namespace) -> int:
             machine=parsed.machine,
             settings=settings_of(parsed),
             without=parsed.without,
-            patience=parsed.patience,
             told=tell,
+            **({} if parsed.patience is None else {"patience": parsed.patience}),
         )
     if watch.alarm is not None:
         return 4
     print(
-        f"no gap beyond noise and tolerances up to {watch.judged:.1f} s; "
-        f"the alarm level was {100.0 * watch.highest:.0f} % at most"
+        f"no gap beyond noise and tolerances in the {watch.seconds:.1f} s that could be judged of "
+        f"{watch.judged:.1f} s; the alarm level was {100.0 * watch.highest:.0f} % at most"
     )
     return 0

@@ -163,13 +163,14 @@ class LivePage:
 
     def _take(self, watch: Watch) -> None:
         gap, recording = watch.gap, watch.recording
+        if gap is None or recording is None:
+            return
         if self._scene is None:
-            self._build(watch)
-        if gap is not None and recording is not None:
-            period = float(gap.time[1] - gap.time[0])
-            measured = find_positions(watch.machine, recording, period)
-            predicted = find_positions(watch.machine, recording, period, gap.predicted)
-            self._positions = gap.time, measured, predicted
+            self._build(watch, gap.time)
+        period = float(gap.time[1] - gap.time[0])
+        measured = find_positions(watch.machine, recording, period)
+        predicted = find_positions(watch.machine, recording, period, gap.predicted)
+        self._positions = gap.time, measured, predicted
         if watch.alarm is not None and not self._alarmed:
             self._alarmed, self._sensor.value = True, watch.alarm.signal
         self.watch = watch
@@ -178,7 +179,7 @@ class LivePage:
         if watch.alarm is not None:
             self._say(str(watch.alarm))
 
-    def _build(self, watch: Watch) -> None:
+    def _build(self, watch: Watch, times: Array) -> None:
         machine, gui = watch.machine, self._server.gui
         moves = predicts_motion(machine)
         panel = gui.add_panel()
@@ -186,7 +187,7 @@ class LivePage:
         with panel.add_tab("the last seconds"):
             self._sensor = gui.add_dropdown("sensor", names, initial_value=names[-1])
             self._sensor.on_update(lambda _: self._plot(watch))
-            self._plots = Plots(self._server, {"twin": TWIN})
+            self._plots = Plots(self._server, {"twin": TWIN}, float(times[0]), float(times[-1]))
             self._magnified = gui.add_dropdown(
                 "gap in the picture", tuple(MAGNIFIED), visible=moves
             )
@@ -203,7 +204,13 @@ class LivePage:
         if gap is None:
             return
         row = next(n for n, row in enumerate(watch.machine.rows) if row.name == self._sensor.value)
-        measured, predicted = gap.measured[row], gap.predicted[row]
+        # What is not judged yet is bent by the filter's end.
+        known = gap.time < watch.judged
+        time, measured, predicted = (
+            gap.time[known],
+            gap.measured[row][known],
+            gap.predicted[row][known],
+        )
         left = measured - predicted
         self._plots.name(
             self._sensor.value,
@@ -211,7 +218,7 @@ class LivePage:
             float(np.max(np.abs(measured))),
             float(np.max(np.abs(left))),
         )
-        self._plots.draw(gap.time, measured, [predicted], float(gap.time[-1]))
+        self._plots.draw(time, measured, [predicted], float(time[-1]))
 
     def _animate(self) -> None:
         """Moves both machines, a little behind the test."""

@@ -24,23 +24,26 @@ UPRIGHT = uplot.Series(label="now", stroke=NOW, width=1)
 class Plots:
     """Two plots of one sensor, one over the other."""
 
-    def __init__(self, server: viser.ViserServer, twins: Mapping[str, str]) -> None:
-        """twins: what predicts → its colour."""
+    def __init__(
+        self, server: viser.ViserServer, twins: Mapping[str, str], start: float, end: float
+    ) -> None:
+        """twins: what predicts → its colour; start, end: s, what is drawn first, of which a page
+        keeps showing the share that it then showed."""
         nothing, count = np.zeros(2), len(twins)
         predicted = [
             uplot.Series(label=twin, stroke=colour, width=1.2) for twin, colour in twins.items()
         ]
         measured = uplot.Series(label="measured", stroke=MEASURED, width=1.2)
         scales = {"x": uplot.Scale(time=False)}
-        start = np.array([0.0, 1.0])
+        time = np.array([start, end])
         self._traces = server.gui.add_uplot(
-            (start, *[nothing] * (count + 2)),
+            (time, *[nothing] * (count + 2)),
             (TIME, measured, *predicted, UPRIGHT),
             scales=scales,
             height=HEIGHT,
         )
         self._residual = server.gui.add_uplot(
-            (start, *[nothing] * (count + 1)),
+            (time, *[nothing] * (count + 1)),
             (TIME, *predicted, UPRIGHT),
             scales=scales,
             height=HEIGHT,

@@ -57,7 +57,8 @@ class Timeline:
         self._stretch = gui.add_dropdown("shown", tuple(STRETCHES), initial_value=WHOLE)
         for chosen in (self._sensor, self._stretch):
             chosen.on_update(lambda _: self._refresh("plots"))
-        self._plots = Plots(self._server, {"described twin": DESCRIBED, "this twin": TWIN})
+        twins = {"described twin": DESCRIBED, "this twin": TWIN}
+        self._plots = Plots(self._server, twins, start, end)
         if not look.predicts_motion:
             gui.add_html(
                 note("this twin moves as measured: what it predicts are forces, so it has no ghost")

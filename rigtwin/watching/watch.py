@@ -25,8 +25,8 @@ from rigtwin.watching.suspects import find_suspects
 WINDOW = 20.0
 """s of a test that are predicted anew each time."""
 WARM = 4.0
-"""s at a window's beginning that are not judged: a twin that starts in the middle of a test must
-first forget where it started."""
+"""s at a window's beginning that are not judged: a twin must first forget where it started. Of a
+session that has just ramped to its test, nobody knows exactly where dry friction holds the rig."""
 SHORTEST = 2.0
 """s from which a test is judged."""
 STEP = 0.5
@@ -60,7 +60,8 @@ class Watch:
     alarm: the gap that was found, None so far; gap, recording: what was judged last and what it is
     of, None before there was enough; ratios: by signal, the difference's rms in the last stretch in
     units of what noise and tolerances explain; note: why the last stretch could not be judged,
-    empty if it was; judged: s, up to where; highest: the level's maximum so far.
+    empty if it was; judged: s, up to where; seconds: s up to there in which something
+    could be judged; highest: the level's maximum so far.
     """
 
     def __init__(self, machine: Machine, base: Configuration | None = None) -> None:
@@ -74,7 +75,7 @@ class Watch:
         self.ratios: dict[str, float] = {}
         self.note, self.judged = "", -math.inf
         self.recording: Recording | None = None
-        self.highest = 0.0
+        self.highest = self.seconds = 0.0
 
     @property
     def level(self) -> float:
@@ -125,7 +126,10 @@ class Watch:
         names = evidence.names
         self.ratios = dict(zip(names, ratio(gap, new).tolist(), strict=True))
         self._judge(gap, new, names, end)
-        self.judged = float(gap.time[new.stop - 1]) + evidence.lines[0].period
+        seen = float(np.mean(gap.counts[:, new].any(axis=0)))
+        here = float(gap.time[new.stop - 1]) + evidence.lines[0].period
+        self.seconds += seen * (here - self.judged)
+        self.judged = here
         self.highest = max(self.highest, self.level)
         return True
 
@@ -134,7 +138,7 @@ class Watch:
         configuration = self.machine.configuration_of(window, self._base)
         require_fit(self.machine, window, configuration)
         counted = np.ones(window.ticks)
-        if window.time[0] > self._start + 0.5 * window.period:
+        if window.transitions or window.time[0] > self._start + 0.5 * window.period:
             counted[~self._has_forgotten(window, configuration)] = 0.0
         counted[window.time < since] = 0.0
         return Evidence(self.machine, [window], [configuration], [counted])
