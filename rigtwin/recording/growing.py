@@ -106,12 +106,10 @@ class GrowingRecording:
             return
         reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
         try:
-            for each in reader.records:
-                if not isinstance(each, Chunk):
-                    self._gathered.add(each)
-                    continue
-                for part in breakup_chunk(each, validate_crc=True):
-                    self._gathered.add(part)
+            whole = next(reader.records)
+            parts = breakup_chunk(whole, validate_crc=True) if isinstance(whole, Chunk) else [whole]
+            for part in parts:
+                self._gathered.add(part)
         except InvalidMagic:
             raise RigtwinError(f"{self.path} is not an MCAP file") from None
         except DAMAGE:

@@ -14,12 +14,12 @@ from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
-from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise
 from rigtwin.watching.alarm import Alarm
 from rigtwin.watching.cusum import Cusum
 from rigtwin.watching.gap import BANDS, Gap, find_gap, ratio
+from rigtwin.watching.mending import cut, mend
 from rigtwin.watching.suspects import find_suspects
 
 WINDOW = 20.0
@@ -109,9 +109,9 @@ class Watch:
         end = float(recording.time[-1])
         if end - self._start < SHORTEST or (end - self.judged < STEP and not last):
             return False
-        window = cut(recording, end - WINDOW)
+        window, recorded = mend(cut(recording, end - WINDOW))
         try:
-            evidence = self._evidence(window)
+            evidence = self._evidence(window, recorded)
         except RigtwinError as error:
             self.note = str(error)
             return False
@@ -133,14 +133,13 @@ class Watch:
         self.highest = max(self.highest, self.level)
         return True
 
-    def _evidence(self, window: Recording, since: float = -math.inf) -> Evidence:
-        """since: s, before which nothing counts."""
+    def _evidence(self, window: Recording, counts: NDArray[np.bool_]) -> Evidence:
+        """counts: ticks that do, if the twin has forgotten where it started."""
         configuration = self.machine.configuration_of(window, self._base)
         require_fit(self.machine, window, configuration)
-        counted = np.ones(window.ticks)
+        counted = counts.astype(float)
         if window.transitions or window.time[0] > self._start + 0.5 * window.period:
             counted[~self._has_forgotten(window, configuration)] = 0.0
-        counted[window.time < since] = 0.0
         return Evidence(self.machine, [window], [configuration], [counted])
 
     def _has_forgotten(self, window: Recording, configuration: Configuration) -> NDArray[np.bool_]:
@@ -198,7 +197,7 @@ class Watch:
         """
         if self.alarm is None:
             return False
-        window = cut(recording, float(recording.time[-1]) - WINDOW)
+        window, recorded = mend(cut(recording, float(recording.time[-1]) - WINDOW))
         since = max(self.alarm.since, float(window.time[0]))
         seen = self.judged - since
         if seen < max(SEEN, LOOKED * self._looked) and not (last and not self._looked):
@@ -207,33 +206,14 @@ class Watch:
             return False
         self._looked = seen
         part = cut(window, since - WARM)
-        known = since + SETTLED if since > self._start else since
+        from_here = part.time >= (since + SETTLED if since > self._start else since)
         try:
-            suspects = find_suspects(self._evidence(part, known))
+            suspects = find_suspects(self._evidence(part, recorded[-part.ticks :] & from_here))
         except RigtwinError as error:
             self.note = str(error)
             return False
         self.alarm = replace(self.alarm, suspects=suspects)
         return True
-
-
-def cut(recording: Recording, start: float) -> Recording:
-    """The ticks of a recording from a time on, s."""
-    first = int(np.searchsorted(recording.time, start - 0.5 * recording.period))
-    if first == 0:
-        return recording
-
-    def part(values: Array) -> Array:
-        return np.ascontiguousarray(values[first:])
-
-    return replace(
-        recording,
-        time=part(recording.time),
-        columns={
-            topic: {name: part(values) for name, values in names.items()}
-            for topic, names in recording.columns.items()
-        },
-    )
 
 
 def _kick(window: Recording, share: float) -> Recording:
