@@ -12,7 +12,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.growing import GrowingRecording
 from rigtwin.watching import Alarm, Suspect, Watch
-from rigtwin.watching.watch import SHORTEST, STEP, WINDOW
+from rigtwin.watching.watch import SHORTEST, STEP, WARM, WINDOW
 
 __all__ = ["Alarm", "Suspect", "Watch", "watch"]
 
@@ -31,6 +31,7 @@ def watch(
     without: Sequence[str] = (),
     told: Callable[[Watch], object] = lambda _: None,
     suspects: bool = True,
+    step: float = STEP,
     patience: float = PATIENCE,
     stop: Callable[[], bool] = lambda: False,
 ) -> Watch:
@@ -51,6 +52,8 @@ def watch(
         Called whenever there is something new: a stretch that was judged, or suspects.
     suspects
         Whether to look for what may be behind an alarm.
+    step
+        s of the test that are judged at a time, or more where judging takes longer.
     patience
         s without anything new after which the recording is given up.
     stop
@@ -67,7 +70,9 @@ def watch(
         If the file cannot be read, is of another machine, lacks a channel, nothing of it could be
         judged, or nothing was added to it for longer than `patience` before its test ended.
     """
-    growing = GrowingRecording(Path(path), WINDOW + STEP)
+    if not STEP <= step <= WINDOW - WARM:
+        raise RigtwinError(f"steps of {step:g} s; expected {STEP:g} to {WINDOW - WARM:g} s")
+    growing = GrowingRecording(Path(path), WINDOW + step)
     watching, looked = None, time.monotonic()
     while not stop():
         here = time.monotonic()
@@ -75,7 +80,7 @@ def watch(
             time.sleep(LOOK)
             continue
         # Where judging takes longer than the test, longer stretches are judged at a time.
-        grew = growing.read(growing.latest + max(STEP, here - looked))
+        grew = growing.read(growing.latest + max(step, here - looked))
         if not grew and not growing.ended:
             if here - looked > patience:
                 raise RigtwinError(
