@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import rigtwin
+from rigtwin.cli import main
 from rigtwin.recording.growing import GrowingRecording
 from rigtwin.watching.cusum import RATIO, Cusum
 from rigtwin.watching.mending import LONGEST, cut, mend
@@ -303,3 +304,19 @@ def test_a_cusum_says_since_when():
     cusum.add(50.0, 1.0, 10.0)
     assert cusum.value > 0.0
     assert cusum.since == 9.0
+
+
+def test_the_command_says_in_its_exit_code_whether_there_was_an_alarm(nominal, changed, capsys):
+    assert main(["watch", str(nominal)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("no gap beyond noise and tolerances in the ")
+    assert main(["watch", str(changed)]) == 4
+    first, *_, last = capsys.readouterr().out.splitlines()
+    assert first.startswith("alarm at ")
+    assert EFFECT[0] in last
+
+
+def test_effects_from_a_time_on_are_not_of_a_session(capsys):
+    command = ["run", "imposed", "--effect", "coulomb@rail=60", "--effects-from", "3"]
+    assert main([*command, "--real-time"]) == 1
+    assert "--effects-from does not go with" in capsys.readouterr().err

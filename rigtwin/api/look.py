@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rigtwin.api.answers import described_machine
 from rigtwin.api.machines import Settings, twin_of
 from rigtwin.api.recordings import load
-from rigtwin.api.watching import watch
+from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.looking import Look
@@ -103,6 +103,7 @@ def show_live(
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
     without: Sequence[str] = (),
+    patience: float = PATIENCE,
     save_twin: str | Path | None = None,
     said: Callable[[str], object] = lambda _: None,
 ) -> LivePage:
@@ -116,7 +117,7 @@ def show_live(
         Of the recording, which another program writes or is about to.
     port, save_twin
         As `show_look` takes them.
-    machine, settings, without
+    machine, settings, without, patience
         As `watch` takes them.
     said
         Called with what there is to say, a line each: an alarm, its suspects, why the watch ended
@@ -140,7 +141,13 @@ def show_live(
 
     def follow(told: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
         return watch(
-            path, machine=machine, settings=settings, without=without, told=told, stop=stop
+            path,
+            machine=machine,
+            settings=settings,
+            without=without,
+            told=told,
+            patience=patience,
+            stop=stop,
         )
 
     def look_back(server: LocalServer, watched: Watch) -> Page:
