@@ -51,7 +51,7 @@ class Controls:
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
         """Titles, effects, and whether they are open."""
-        folders = [("found by the diagnosis", list(first), True)] if first else []
+        folders = [("found", list(first), True)] if first else []
         by_component: dict[str, list[str]] = {}
         for name, effect in self._look.effects.items():
             if name not in first:

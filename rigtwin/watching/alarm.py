@@ -11,7 +11,7 @@ class Suspect:
 
     effect: its name; values: parameter → value that explains most; explained: share of what is more
     than noise and tolerances explain, 0 to 1; probability: among all effects that were tried, given
-    that it is one of them.
+    that it is one of them, below 1.
     """
 
     effect: str

@@ -55,7 +55,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     weights /= weights.sum()
     gap = max(nothing.misfit - evidence.expected, 1e-300)
     suspects = [
-        _suspect(fit, (nothing.misfit - fit.misfit) / gap, float(weight))
+        _suspect(fit, (nothing.misfit - fit.misfit) / gap, thresholds.sure * float(weight))
         for fit, weight in zip(found, weights, strict=True)
     ]
     suspects.sort(key=lambda each: -each.probability)
