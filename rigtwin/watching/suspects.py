@@ -42,8 +42,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     with Threads() as threads:
         screened = threads.map(fitter.screen, library(evidence))
         screened.sort(key=lambda each: -each.promise)
-        near = thresholds.promising * max(screened[0].promise, least) if screened else least
-        promising = [each for each in screened[:FITTED] if each.promise >= near]
+        promising = [each for each in screened[:FITTED] if each.promise >= least]
         tried = threads.map(fitter.fit_one, promising)
     found = [fit for fit in tried if _cost(fit, thresholds) < nothing.misfit]
     if not found:
