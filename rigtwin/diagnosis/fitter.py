@@ -145,11 +145,12 @@ class Fitter:
         small = self.scale_start(effect, min(start for start, _ in responses), SMALL)
         residual = self.evidence.residual(with_values(self.plant, (effect,), small))
         shapes = [response for _, response in responses] + [self._nominal - residual]
-        apart = self.space.project_out(np.stack(shapes, axis=1).astype(np.float64))
-        power = np.sum(apart**2, axis=0)
-        along = self.space.subtract_tolerances(self._nominal) @ apart
+        # An effect that takes a tolerance's place is not what that tolerance may take up.
+        space = self.space.beside((effect,))
+        power, along = space.strengths(np.stack(shapes, axis=1).astype(np.float64), self._nominal)
         felt = power > NOTHING
-        return float(np.max(along[felt] ** 2 / power[felt], initial=0.0))
+        explained = float(np.max(along[felt] ** 2 / power[felt], initial=0.0))
+        return explained - (space.misfit(self._nominal) - self.nothing.misfit)
 
     def fit_one(self, screened: Screened) -> Fit:
         """The best fit of one effect.

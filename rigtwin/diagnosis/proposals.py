@@ -57,7 +57,8 @@ def propose_additions(
         In the order of the candidates.
     """
     space = Space(fitter.evidence, first.plant)
-    left = space.subtract_tolerances(fitter.residual_at(first))
+    residual = fitter.residual_at(first)
+    taken = space.misfit(residual)
 
     def propose(effect: Effect) -> Proposal | None:
         if clashes(effect, first.effects) or not is_possible(
@@ -65,15 +66,18 @@ def propose_additions(
         ):
             return None
         starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
-        apart = space.project_out(np.stack(responses, axis=1).astype(np.float64))
-        alike, power = apart.T @ left, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+        # An effect that takes a tolerance's place is not what that tolerance may take up.
+        own = space.beside((effect,))
+        power, alike = own.strengths(np.stack(responses, axis=1).astype(np.float64), residual)
+        power = np.maximum(power, 1e-300)
         # A response may be too strong or too weak, but not the other way round.
         share = np.clip(alike / power, 0.0, 3.0)
         gains = 2.0 * share * alike - share**2 * power
         best = int(np.argmax(gains))
-        if gains[best] <= least:
+        gain = float(gains[best]) - (own.misfit(residual) - taken)
+        if gain <= least:
             return None
-        promised = first.misfit - float(gains[best])
+        promised = first.misfit - gain
         start = fitter.scale_start(effect, starts[best], float(share[best]))
         return Proposal(promised, (*first.effects, effect), (*first.values, *start), space)
 

@@ -36,8 +36,8 @@ class Space:
         self._used = np.zeros(self._responses.shape[1]) if used is None else used
         self._fix(effects)
 
-    def _fix(self, effects: Sequence[Effect]) -> None:
-        """Takes out the tolerances that effects take the place of."""
+    def _replaced(self, effects: Sequence[Effect]) -> list[bool]:
+        """Which tolerances effects take the place of."""
         tolerances = self._machine.tolerances
         own = [
             self._machine.tolerance_of(effect.group, parameter)
@@ -46,13 +46,18 @@ class Space:
         ]
         # With a delay to be found, when samples were taken is no question of its own any more.
         timed = any("delay" in effect.kind.parameters for effect in effects)
-        fixed = [tolerance in own or (timed and tolerance.ticks) for tolerance in tolerances]
+        return [tolerance in own or (timed and tolerance.ticks) for tolerance in tolerances]
+
+    def _fix(self, effects: Sequence[Effect]) -> None:
+        fixed = self._replaced(effects)
         self._columns = np.where(fixed, 0.0, self._responses) if any(fixed) else self._responses
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
     def beside(self, effects: Sequence[Effect]) -> Space:
         """The same tolerances, less those that effects take the place of."""
+        if not any(self._replaced(effects)):
+            return self
         like = copy(self)
         like._fix(effects)
         return like
@@ -87,6 +92,16 @@ class Space:
         found = self.estimate_tolerances(residual)
         left = residual + self._columns @ (self._used - found)
         return float(left @ left + PRIOR * found @ found)
+
+    def strengths(self, responses: Array, residual: Array) -> tuple[Array, Array]:
+        """Of each response alone, shape (size, count), the misfit's curvature and slope along it,
+        halved: with all tolerances that are not at their bound free beside it."""
+        found = self.estimate_tolerances(residual)
+        free = np.abs(found) < BEYOND
+        shared = self._columns[:, free].T @ responses
+        taken = np.linalg.solve(self._normal[np.ix_(free, free)], shared)
+        power = np.sum(responses**2, axis=0) - np.sum(shared * taken, axis=0)
+        return power, responses.T @ (residual + self._columns @ (self._used - found))
 
     def normal_equations(self, jacobian: Array, residual: Array) -> tuple[Array, Array]:
         """Normal matrix and gradient of the misfit in parameters whose responses are the jacobian's
