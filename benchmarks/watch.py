@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from itertools import count, islice
@@ -40,6 +39,7 @@ JUDGED = 34.0
 """s of a test that are judged, in the mean of `TESTS`."""
 LATER = 10.0
 """s, from when on an effect is there."""
+MOVING = ("imposed", "road10")
 EFFECTS = {
     "coulomb@rail": 60.0,
     "viscous@rail": 150.0,
@@ -66,30 +66,37 @@ def watch_nominal(case: tuple[str, int]) -> tuple[str, int, float, float, str]:
         return name, seed, watch.seconds, watch.highest, str(watch.alarm or "")
 
 
-def watch_effect(case: tuple[str, float, int]) -> tuple[str, str, float]:
-    """One effect: its name, the alarm, and s until the suspects were first known."""
-    name, value, seed = case
+def watch_effect(case: tuple[str, float, str, int]) -> str:
+    """One effect in a test: a row of the table."""
+    name, value, test, seed = case
     with TemporaryDirectory() as folder:
         path = Path(folder) / "test.mcap"
         rigtwin.run(
             "suspension-rig",
-            "imposed",
+            test,
             seed=seed,
             effects={name: value},
             effects_from=LATER,
             path=path,
         )
-        first: list[float] = []
-        begun: list[float] = []
+        first: list[str] = []
 
         def told(now: rigtwin.Watch) -> None:
-            if now.alarm is not None and not begun:
-                begun.append(time.monotonic())
             if now.alarm is not None and now.alarm.suspects and not first:
-                first.append(time.monotonic() - begun[0])
+                first.append(_describe(now.alarm))
 
-        watch = rigtwin.watch(path, told=told)
-        return name, str(watch.alarm or "no alarm"), first[0] if first else float("nan")
+        alarm = rigtwin.watch(path, told=told).alarm
+        if alarm is None:
+            return f"| {name} = {value:g} | {test} | none | | |"
+        after = f"{alarm.time - LATER:.2f} s"
+        return f"| {name} = {value:g} | {test} | {after} | {''.join(first)} | {_describe(alarm)} |"
+
+
+def _describe(alarm: rigtwin.Alarm) -> str:
+    """The likeliest suspect."""
+    if not alarm.suspects:
+        return "none"
+    return f"{alarm.suspects[0].effect}, {100.0 * alarm.suspects[0].probability:.0f} %"
 
 
 def _nominal_cases(hours: float, seed: int) -> Iterator[tuple[str, int]]:
@@ -106,9 +113,16 @@ def main() -> int:
     given = parser.parse_args()
     with ProcessPoolExecutor(given.workers) as pool:
         if given.effects:
-            cases = [(name, value, given.seed) for name, value in EFFECTS.items()]
-            for name, alarm, waited in pool.map(watch_effect, cases):
-                print(f"{name}: {alarm}; suspects {waited:.1f} s of computing later", flush=True)
+            print(
+                "| effect | test | alarm after | first suspect | at the end |\n|---|---|---|---|---|"
+            )
+            cases = [
+                (name, value, test, given.seed)
+                for test in MOVING
+                for name, value in EFFECTS.items()
+            ]
+            for row in pool.map(watch_effect, cases):
+                print(row, flush=True)
         total, alarms, highest = 0.0, 0, 0.0
         nominal = list(_nominal_cases(given.hours, given.seed))
         for name, seed, length, level, alarm in tqdm(

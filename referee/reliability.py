@@ -46,7 +46,12 @@ def draw_reliability(bins: Sequence[tuple[float, float, int]], path: Path) -> Pa
             capsize=3,
         )
         axes.annotate(
-            f"{count} names", (said, low), xytext=(0, -14), textcoords="offset points", ha="center"
+            f"{count}\nnames",
+            (said, low),
+            xytext=(0, -3),
+            textcoords="offset points",
+            ha="center",
+            va="top",
         )
     axes.set(
         xlim=(0.5, 1.01),
