@@ -128,6 +128,20 @@ def test_a_deviation_within_tolerance_is_no_finding(nominal):
     assert not within_tolerance(fit(34.0 * 1.02), nominal)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("gain@load_cell", 1.03), ("offset@load_cell", 5.0), ("gain@suspension_lvdt", 0.97)],
+)
+def test_an_effect_in_a_tolerances_place_promises_what_it_explains(name, value):
+    rig = rig_effect(name)
+    evidence = evidence_of(recorded("imposed", effects=(f"{name}={value}",)))
+    fitter = Fitter(evidence)
+    promised = fitter.screen(rig).promise
+    made = evidence.residual(with_values(evidence.plant, (rig,), ((value,),)))
+    explained = fitter.nothing.misfit - fitter.space.beside((rig,)).misfit(made)
+    assert 0.8 * explained < promised < 1.2 * explained
+
+
 def test_what_a_fit_leaves_without_an_effect_is_foreseen(nominal):
     fitter = Fitter(evidence_of(recorded("imposed", ("mass@carriage=38", "gain@motor=1.05"))))
     names = ("mass@carriage", "gain@motor", "stiffness@tyre")

@@ -9,7 +9,7 @@ from itertools import product
 
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values, without_each
 from rigtwin.diagnosis.proposals import Proposal, propose_additions, propose_replacements
 from rigtwin.diagnosis.ranking import within_tolerance
 from rigtwin.diagnosis.search import Search
@@ -72,16 +72,30 @@ def fit_pairs(search: Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]:
     foremost = _foremost(pairs)
     settled = search.threads.map(search.fitter.refit_with_tolerances, foremost)
     others = [pair for pair in pairs if all(pair is not each for each in foremost)]
+    parts = _fit_parts(search, settled)
+    first = min([first, *parts], key=lambda fit: fit.misfit)
     least_more = max(
         thresholds.second * search.least,
         thresholds.known.more * _excess(first.misfit, evidence),
     )
-    return [
+    return parts + [
         pair
         for pair in (*settled, *others)
         if first.misfit - pair.misfit > least_more
         and not within_tolerance(pair, evidence, thresholds)
     ]
+
+
+def _fit_parts(search: Search, pairs: Sequence[Fit]) -> list[Fit]:
+    """Each effect of the best pair alone, from its value there: it may explain as much, though it
+    promised little."""
+    if not pairs:
+        return []
+    best = min(pairs, key=search.cost)
+    return search.threads.map(
+        lambda part: search.fitter.refit_with_tolerances(search.coarse.refine(part[1], part[2])),
+        list(without_each(best)),
+    )
 
 
 def _add(
