@@ -113,9 +113,8 @@ def main() -> int:
     given = parser.parse_args()
     with ProcessPoolExecutor(given.workers) as pool:
         if given.effects:
-            print(
-                "| effect | test | alarm after | first suspect | at the end |\n|---|---|---|---|---|"
-            )
+            print("| effect | test | alarm after | first suspect | at the end |")
+            print("|---|---|---|---|---|")
             cases = [
                 (name, value, test, given.seed)
                 for test in MOVING
