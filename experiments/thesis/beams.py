@@ -19,7 +19,8 @@ from experiments.thesis.ride import MEASURED, SHOWN_SEED
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial
 from rigtwin.description.configuration import Configuration
-from rigtwin.render.plot import COLOURS, SENSED
+from rigtwin.render.plot import SENSED
+from rigtwin.render.style import COLOURS
 from rigtwin.simulation.ideal import simulate_ideal
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip

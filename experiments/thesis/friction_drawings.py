@@ -10,7 +10,8 @@ import numpy as np
 from controllers.friction import MOTOR_LAG
 from experiments.thesis.study import Drawing, Result, sheet
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.style import COLOURS
 
 IN_TIME, LATE = 0.9e-3, 15e-3
 """s from the first step to the second: when the error has gone, and when the loop has turned it

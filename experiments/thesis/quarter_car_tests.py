@@ -18,7 +18,8 @@ from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sh
 from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial, vehicle
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.style import COLOURS
 from rigtwin.simulation.ideal import simulate_ideal
 
 IDEAL = COLOURS["other"]

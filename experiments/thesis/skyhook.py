@@ -13,7 +13,8 @@ from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
-from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.style import COLOURS
 
 WITHIN = 1.5
 GAINS = {"active 100": 100.0, "active": 200.0, "active 500": 500.0}

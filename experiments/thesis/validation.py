@@ -12,7 +12,8 @@ from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
 from experiments.thesis.trial import curves, errors, over_seeds, seeded, trial
-from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.style import COLOURS
 
 IDEAL = COLOURS["other"]
 WITHIN = 2.0

@@ -31,7 +31,15 @@ class Recording(reader.Recording):
         """Whether a limit ended the test."""
         return self.end.startswith("trip")
 
-    def plot(self, out: str | Path, start: float = 0.0, until: float | None = None) -> Path:
+    def plot(
+        self,
+        out: str | Path,
+        start: float = 0.0,
+        until: float | None = None,
+        *,
+        style: str = "screen",
+        panels: Sequence[str] = (),
+    ) -> Path:
         """Draws it.
 
         Parameters
@@ -40,15 +48,20 @@ class Recording(reader.Recording):
             A png, svg or pdf file.
         start, until
             s, the stretch that is drawn; until the end by default.
+        style
+            "screen", or "paper" and "paper-wide" for one and two columns of a journal.
+        panels
+            What the titles of those that are drawn begin with; all by default.
 
         Raises
         ------
         RigtwinError
-            For another ending or an empty stretch.
+            For another ending or style, an empty stretch, or a panel that it does not have.
         """
         from rigtwin.render.plot import draw  # Late: matplotlib takes a second.
+        from rigtwin.render.style import find_style
 
-        draw(self, Path(out), start, until)
+        draw(self, Path(out), start, until, find_style(style), panels)
         return Path(out)
 
     def video(self, out: str | Path, **options: Any) -> Path:

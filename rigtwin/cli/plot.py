@@ -9,7 +9,10 @@ from rigtwin.cli.options import add_stretch
 from rigtwin.console import apart
 
 SUMMARY = "draw a recording: motions, force, wheel and voltage over time"
-MORE = ""
+MORE = """\
+examples:
+  rigtwin plot road.mcap -o road.png --from 5 --until 10
+  rigtwin plot road.mcap -o figure.pdf --style paper --panel wheel --panel "suspension force\""""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +24,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="F.png",
         help="png, svg or pdf (default: beside the recording)",
     )
+    parser.add_argument(
+        "--style",
+        default="screen",
+        metavar="STYLE",
+        help="screen, paper (a column of a journal, 3.5 in) or paper-wide (two, 7.16 in)",
+    )
+    parser.add_argument(
+        "--panel",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="draw those alone whose title begins so; several may be given",
+    )
     add_stretch(parser)
 
 
@@ -29,5 +45,6 @@ def execute(parsed: argparse.Namespace) -> int:
 
     recording = rigtwin.load(parsed.recording)
     out = apart(parsed.out or parsed.recording.with_suffix(".png"), parsed.recording)
-    print(f"drawn in {recording.plot(out, parsed.start, parsed.until)}")
+    drawn = recording.plot(out, parsed.start, parsed.until, style=parsed.style, panels=parsed.panel)
+    print(f"drawn in {drawn}")
     return 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -16,8 +16,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import printable, write_whole
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.render.style import COLOURS, STYLES, Style
 
-COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
 RIG_SENSORS = ("structure_lvdt", "load_cell")
 """By which a quarter car's recording is known."""
 MOST_PANELS = 40
@@ -150,7 +150,14 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
     return slice(int(first), int(last))
 
 
-def draw(recording: Recording, out: Path, start: float = 0.0, until: float | None = None) -> None:
+def draw(
+    recording: Recording,
+    out: Path,
+    start: float = 0.0,
+    until: float | None = None,
+    style: Style = STYLES["screen"],
+    panels: Sequence[str] = (),
+) -> None:
     """Draws a recording: what moved, what pushed, what was commanded.
 
     Parameters
@@ -161,16 +168,25 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
         A png, svg or pdf file.
     start, until : float
         s; to the end where `until` is None.
+    style : Style
+        How it looks.
+    panels : sequence of str
+        What their titles begin with, in the order in which they are drawn; all by default.
 
     Raises
     ------
     RigtwinError
-        For another ending or an empty stretch.
+        For another ending, an empty stretch, or a panel that it does not have.
     """
     check_ending(out)
     ticks = find_stretch(recording, start, until)
-    time = recording.time[ticks]
-    panels = (
+    with style.used():
+        save(_figure(recording, ticks, style, panels), out, style.dpi)
+
+
+def _panels(recording: Recording, wanted: Sequence[str]) -> list[tuple[str, list[Trace]]]:
+    """Titles and traces of the panels that it has data for."""
+    every = (
         PANELS
         if all(recording.has("/sensor", name) for name in RIG_SENSORS)
         else _plain_panels(recording)
@@ -184,12 +200,25 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
                 if all(recording.has(*channel) for channel in trace.needs)
             ],
         )
-        for panel in panels
+        for panel in every
     ]
     there = [(title, traces) for title, traces in there if traces]
+    for name in wanted:
+        if not any(title.startswith(name) for title, _ in there):
+            titles = ", ".join(repr(title) for title, _ in there)
+            raise RigtwinError(f"{recording.path}: no panel {name!r}; there are {titles}")
+    if wanted:
+        there = [each for name in wanted for each in there if each[0].startswith(name)]
+    return there
+
+
+def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[str]) -> Figure:
+    time, there = recording.time[ticks], _panels(recording, panels)
     left_out = f" · {MOST_PANELS} of {len(there)} channels" if len(there) > MOST_PANELS else ""
     there = there[:MOST_PANELS]
-    figure = Figure(figsize=(11, 1.9 * len(there) + 0.8), layout="constrained")
+    figure = Figure(
+        figsize=(style.width, style.panel * len(there) + style.rest), layout="constrained"
+    )
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (title, traces) in zip(axes, there, strict=True):
@@ -202,26 +231,30 @@ def draw(recording: Recording, out: Path, start: float = 0.0, until: float | Non
             axis.plot(
                 *_part(time, signal, recording.period),
                 color=trace.colour,
-                linewidth=0.9,
+                linewidth=style.line,
+                linestyle=style.dashed if trace.colour == ASKED else "-",
                 label=trace.label,
             )
-        axis.set_ylabel(title, fontsize=9, parse_math=False)
+        axis.set_ylabel(title, fontsize=style.text, parse_math=False)
         axis.grid(alpha=0.3)
         axis.legend(
             loc="lower right",
             bbox_to_anchor=(1.0, 0.97),
-            fontsize=8,
+            fontsize=style.text - 1.0,
             frameon=False,
             ncols=2,
             borderpad=0.1,
         )
         axis.margins(x=0)
-    axes[-1].set_xlabel("time, s")
+    figure.align_ylabels(axes)
+    axes[-1].set_xlabel("time, s", fontsize=style.text)
+    if not style.titled:
+        return figure
     ending = f" · {recording.end}" if recording.end else ""
     about = f"{recording.path.name} · {recording.experiment}{ending}{left_out}"
     about = printable(about.encode("utf-8", "replace").decode())
     figure.suptitle(about, fontsize=11, parse_math=False)
-    save(figure, out)
+    return figure
 
 
 def _part(time: Array, signal: Array, period: float) -> tuple[Array, Array]:
@@ -236,8 +269,8 @@ def check_ending(out: Path) -> None:
         raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
 
 
-def save(figure: Figure, out: Path) -> None:
+def save(figure: Figure, out: Path, dpi: int = STYLES["screen"].dpi) -> None:
     """Writes a figure. Raises RigtwinError if the file cannot be written."""
     drawn = BytesIO()
-    figure.savefig(drawn, dpi=110, format=out.suffix[1:].lower())
+    figure.savefig(drawn, dpi=dpi, format=out.suffix[1:].lower())
     write_whole(out, drawn.getvalue())

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rigtwin.render.plot import ASKED, COLOURS, SENSED
+from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.style import COLOURS
 from rigtwin.studies.tuning.evaluation import Change
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.result import TuningResult
