@@ -5,7 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import av
 import numba
 import numpy as np
 import pytest
@@ -72,6 +74,38 @@ def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, ma
     assert rigtwin.compare(recording, settings=twin).gap == after.gap
     better = rigtwin.run(answer.machine, experiment, settings=SHORT)
     assert better.video(tmp_path / "better.mp4", until=0.3).stat().st_size > 1000
+
+
+def test_a_film_shows_where_the_twin_is(tmp_path):
+    recording = rigtwin.run(
+        "suspension-rig", "imposed", effects={"coulomb@rail": 70}, settings=SHORT
+    )
+
+    def last_picture(name: str, **options: Any) -> np.ndarray:
+        out = recording.video(tmp_path / name, start=1.6, until=1.7, **options)
+        with av.open(str(out)) as film:
+            return [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)][-1]
+
+    alone = last_picture("alone.mp4").astype(int)
+    beside = last_picture("beside.mp4", ghost=100.0).astype(int)
+    known = last_picture("known.mp4", ghost=100.0, settings={"rail": {"coulomb": 70.0}}).astype(int)
+    changed = np.abs(beside - alone).sum(axis=2) > 60
+    assert changed[:432].mean() > 0.02
+    assert changed[440:].mean() < 0.001
+    assert (np.abs(beside - known).sum(axis=2) > 60)[:432].mean() > 0.005
+
+
+@pytest.mark.parametrize("gap", [-1.0, np.inf])
+def test_a_ghost_has_a_finite_gap(tmp_path, gap):
+    recording = rigtwin.run("suspension-rig", "drop", settings=SHORT)
+    with pytest.raises(rigtwin.RigtwinError, match="times as large; expected 0 or more"):
+        recording.video(tmp_path / "a.mp4", ghost=gap)
+
+
+def test_a_twin_that_moves_as_measured_has_no_ghost(tmp_path):
+    recording = rigtwin.run("tx40", "swing", settings={"timing": {"duration": 3.0}})
+    with pytest.raises(rigtwin.RigtwinError, match="moves as measured and has no ghost"):
+        recording.video(tmp_path / "a.mp4", ghost=1.0)
 
 
 def test_a_run_is_the_same_with_and_without_a_file(tmp_path):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from rigtwin.api.machines import machine, machine_of
+import numpy as np
+
+from rigtwin.api.machines import Settings, machine, machine_of, twin_of
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
 
 
@@ -64,24 +70,42 @@ class Recording(reader.Recording):
         draw(self, Path(out), start, until, find_style(style), panels)
         return Path(out)
 
-    def video(self, out: str | Path, **options: Any) -> Path:
+    def video(
+        self,
+        out: str | Path,
+        *,
+        ghost: float = 0.0,
+        settings: Settings = (),
+        **options: Any,
+    ) -> Path:
         """Films it.
 
         Parameters
         ----------
         out
             An mp4 file.
+        ghost
+            The twin's prediction is drawn through the machine, its gap so many times as large; 0
+            for none.
+        settings
+            Changes of that twin.
         **options
             camera, start and until in s, magnify, progress; see `rigtwin.render.video.film`.
 
         Raises
         ------
         RigtwinError
-            If this computer cannot draw, or the file cannot be written.
+            If this computer cannot draw, the file cannot be written, or there is to be a ghost and
+            the twin cannot be held against it.
         """
         from rigtwin.render.video import film  # Late: so does scipy.signal.
 
-        film(self, Path(out), machine_of(self), **options)
+        machine = machine_of(self)
+        if not 0.0 <= ghost < math.inf:
+            raise RigtwinError(f"a ghost's gap {ghost:g} times as large; expected 0 or more")
+        if ghost:
+            options["ghost"] = _ghost(self, machine, twin_of(machine, settings, ()), ghost)
+        film(self, Path(out), machine, **options)
         return Path(out)
 
     def export(self, out: str | Path) -> Path:
@@ -94,6 +118,23 @@ class Recording(reader.Recording):
         """Channel → unit, of those that the machine's description knows."""
         known = machine_of(self).units
         return {name: known[name] for name in self.channels if name in known}
+
+
+def _ghost(
+    recording: Recording, machine: Machine, twin: Configuration, magnify: float
+) -> dict[str, Array]:
+    """Where a twin's joints stand, the gap drawn larger, at every tick. Raises RigtwinError where
+    there is nothing to be drawn."""
+    from rigtwin.looking import Look
+
+    look = Look(machine, recording, twin)
+    if not look.predicts_motion:
+        raise RigtwinError(f"{machine.name}: its twin moves as measured and has no ghost")
+    measured, predicted = look.positions(), look.positions(look.nominal)
+    return {
+        joint: np.interp(recording.time, look.time, values + magnify * (predicted[joint] - values))
+        for joint, values in measured.items()
+    }
 
 
 def load(path: str | Path, of: Machine | str | Path | None = None) -> Recording:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.cli.options import add_machine, add_stretch
+from rigtwin.cli.options import add_machine, add_settings, add_stretch, settings_of
 from rigtwin.console import apart
 
 SUMMARY = "film a recording: the machine moving, its signals drawn beneath"
@@ -28,7 +28,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="draw motions X times as large (default 1)",
     )
+    parser.add_argument(
+        "--ghost",
+        type=float,
+        nargs="?",
+        const=1.0,
+        default=0.0,
+        metavar="X",
+        help="draw the twin's prediction through it, the gap X times as large (default 1)",
+    )
     add_machine(parser)
+    add_settings(parser)
     add_stretch(parser)
 
 
@@ -51,6 +61,8 @@ def execute(parsed: argparse.Namespace) -> int:
             start=parsed.start,
             until=parsed.until,
             magnify=parsed.magnify,
+            ghost=parsed.ghost,
+            settings=settings_of(parsed),
             progress=progress,
         )
     print(f"filmed in {out}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
@@ -38,6 +38,8 @@ WIDTH, SCENE_HEIGHT, TRACE_HEIGHT = 960, 432, 288
 BEAM_DRAWN = 0.13
 """m; drawn length of a beam."""
 BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
+GHOST_COLOUR = np.array([0.92, 0.43, 0.08, 0.4], np.float32)
+"""Of what the twin predicts, as the page of a look has it."""
 NO_RENDERING = (
     "cannot render without a display; on Debian or Ubuntu: "
     "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
@@ -54,6 +56,8 @@ def film(
     until: float | None = None,
     magnify: float = 1.0,
     progress: Callable[[int, int], object] | None = None,
+    *,
+    ghost: Mapping[str, Array] | None = None,
 ) -> None:
     """Films a stretch of a recording in real time.
 
@@ -73,6 +77,9 @@ def film(
         How many times as large motions are drawn, at most 20.
     progress : callable, optional
         Called with frames done and frames in all.
+    ghost : mapping, optional
+        Joint → position of a twin, m or rad, at every tick of the recording; drawn through the
+        machine.
 
     Raises
     ------
@@ -93,6 +100,7 @@ def film(
     ticks = find_stretch(recording, start, until)
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in motions.items()}
+    apart = {name: magnify * values[ticks] for name, values in (ghost or {}).items()}
     traces = _Traces(_curves(recording, machine), recording.time, ticks)
     beams = _beams(recording, machine)
     bent = None if beams is None else magnify * beams[ticks]
@@ -113,7 +121,8 @@ def film(
             )
             for number, tick in enumerate(frames):
                 at = {name: float(values[tick]) for name, values in motions.items()}
-                scene = render(at, None if bent is None else bent[tick])
+                there = {name: float(values[tick]) for name, values in apart.items()}
+                scene = render(at, None if bent is None else bent[tick], there)
                 picture = np.vstack([scene, traces.at(float(time[tick]))])
                 container.mux(
                     stream.encode(
@@ -202,8 +211,9 @@ def _context() -> Any:
 @contextmanager
 def _renderer(
     machine: Machine, camera: str | None
-) -> Iterator[Callable[[dict[str, float], Array | None], Image]]:
-    """A function from joint positions, and the beams' heights if there are any, to a picture."""
+) -> Iterator[Callable[[dict[str, float], Array | None, dict[str, float]], Image]]:
+    """A function from joint positions, the beams' heights if there are any, and the ghost's joint
+    positions if there is one, to a picture."""
     quarter_car = machine.structure is Structure.QUARTER_CAR
     model = mujoco.MjModel.from_xml_path(str(SCENE if quarter_car else machine.model))
     cameras = [model.camera(number).name for number in range(model.ncam)]
@@ -224,7 +234,7 @@ def _renderer(
     window = mujoco.MjrRect(0, 0, WIDTH, SCENE_HEIGHT)
     picture = np.empty((SCENE_HEIGHT, WIDTH, 3), np.uint8)
 
-    def render(positions: dict[str, float], bent: Array | None) -> Image:
+    def render(positions: dict[str, float], bent: Array | None, ghost: dict[str, float]) -> Image:
         for joint, position in positions.items():
             data.qpos[model.joint(joint).qposadr[0]] = position
         mujoco.mj_kinematics(model, data)
@@ -232,6 +242,11 @@ def _renderer(
         mujoco.mjv_updateScene(model, data, options, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
         if bent is not None:
             _draw_beams(scene, data.body("structure_plate").xpos, bent)
+        if ghost:
+            for joint, position in ghost.items():
+                data.qpos[model.joint(joint).qposadr[0]] = position
+            mujoco.mj_kinematics(model, data)
+            _draw_ghost(scene, model, data, options)
         mujoco.mjr_render(window, scene, drawing)
         mujoco.mjr_readPixels(picture, None, window, drawing)
         return picture[::-1]
@@ -241,6 +256,18 @@ def _renderer(
     finally:
         drawing.free()
         context.free()
+
+
+def _draw_ghost(
+    scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, options: mujoco.MjvOption
+) -> None:
+    """Adds what moves once more to a scene, where a twin has it."""
+    first = scene.ngeom
+    moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+    mujoco.mjv_addGeoms(model, data, options, mujoco.MjvPerturb(), moving, scene)
+    for number in range(first, scene.ngeom):
+        geom = scene.geoms[number]
+        geom.rgba, geom.matid, geom.transparent = GHOST_COLOUR, -1, 1
 
 
 def _draw_beams(scene: mujoco.MjvScene, plate: Array, bent: Array) -> None:
