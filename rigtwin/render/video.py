@@ -104,7 +104,9 @@ def film(
     traces = _Traces(_curves(recording, machine), recording.time, ticks)
     beams = _beams(recording, machine)
     bent = None if beams is None else magnify * beams[ticks]
-    frames = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
+    shown = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
+    # Rounding may place the last of them behind the end.
+    frames = np.minimum(shown, len(time) - 1)
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
         with (
