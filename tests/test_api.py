@@ -239,6 +239,7 @@ FUNCTIONS = {
     "info": ("load", "Recording"),
     "plot": ("Recording.plot",),
     "video": ("Recording.video",),
+    "watch": ("watch",),
     "export": ("Recording.export",),
     "import": ("import_data",),
     "calibrate": ("calibrate",),
