@@ -373,8 +373,11 @@ KINDS = (
         "stiffness at small deflection",
         {
             Tyre: shares_of_nominal((0.7, 0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
+            # Densely: where little damps, only a stiffness near the right one looks any better.
             Guide: around_nominal(
-                lambda s: s.force / s.stroke, (-0.3, -0.05, 0.05, 0.3, 0.9), 0.005
+                lambda s: s.force / s.stroke,
+                (-0.3, -0.05, *np.geomspace(0.02, 0.9, 10).tolist()),
+                0.005,
             ),
         },
     ),
