@@ -14,6 +14,7 @@ import rigtwin
 from rigtwin.components import Guide
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine, Structure
+from rigtwin.diagnosis.stops import find_cut_commands
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.models.coupled import CoupledModel
@@ -182,6 +183,25 @@ def test_a_motor_on_a_tendon_pulls_both_ends(tmp_path: Path) -> None:
     found = coupled(machine, record).predict(machine.plant._replace(spring=Guide()))
     assert found[0, -1] == pytest.approx(-0.25 * TIME[-1] ** 2, rel=3e-3)
     assert found[1, -1] == pytest.approx(0.5 / 3.5 * TIME[-1] ** 2, rel=3e-3)
+
+
+def test_an_actuator_takes_no_command_beyond_its_range_whatever_its_gain(tmp_path: Path) -> None:
+    toml = SLIDES_TOML + FREE
+    model = SLIDES.format(extra="").replace(
+        '<motor name="push" joint="two" gear="2"/>',
+        '<motor name="push" joint="two" gear="2" ctrllimited="true" ctrlrange="-0.5 1"/>',
+    )
+    machine = described(tmp_path, "slides", model, toml)
+    still = np.zeros(1000)
+    for command, force in ((3.0, 2.0), (-3.0, -1.0)):
+        sensors = {"x_one": still, "x_two": still, "apart": still}
+        record = {"/command": {"push": still + command}, "/sensor": sensors}
+        plant = machine.plant._replace(spring=Guide())
+        plant = plant._replace(push=plant.push._replace(gain=0.8))
+        found = coupled(machine, record).predict(plant)
+        assert found[1, -1] == pytest.approx(0.5 * 0.8 * force / 3.5 * TIME[-1] ** 2, rel=3e-3)
+        (said,) = find_cut_commands(machine, [recording(machine, record)])
+        assert "push takes commands from -0.5 to 1, and 100 % of the ticks" in said
 
 
 @pytest.mark.parametrize(

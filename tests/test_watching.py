@@ -17,7 +17,7 @@ import rigtwin
 from rigtwin.cli import main
 from rigtwin.recording.growing import GrowingRecording
 from rigtwin.watching.cusum import RATIO, Cusum
-from rigtwin.watching.mending import LONGEST, cut, mend
+from rigtwin.watching.mending import LONGEST, mend
 from rigtwin.watching.watch import LIMIT, WINDOW
 
 LATER = 6.0
@@ -235,12 +235,12 @@ def test_of_another_machine_nothing_is_judged(nominal):
 
 def test_a_shorter_stretch_is_its_end(nominal):
     whole = rigtwin.load(nominal)
-    part = cut(whole, 7.0)
+    part = whole.between(7.0, math.inf)
     assert part.time[0] == pytest.approx(7.0)
     np.testing.assert_array_equal(
         part.column("/sensor", "load_cell"), whole.column("/sensor", "load_cell")[-part.ticks :]
     )
-    assert cut(whole, -1.0) is whole
+    assert whole.between(-1.0, math.inf) is whole
 
 
 def without(recording: rigtwin.Recording, missing: np.ndarray) -> rigtwin.Recording:

@@ -9,12 +9,18 @@ from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 
 
 class ForceActuator(NamedTuple):
-    """Command to force: delay, deadband, gain, saturation, rate limit, lag, then `constant`, in
-    that order. The gain is larger by the share ½·gain_asymmetry of positive commands, and smaller
-    of negative ones."""
+    """Command to force: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
+    `constant`, then the limit of the force, in that order. The gain is larger by the share
+    ½·gain_asymmetry of positive commands, and smaller of negative ones."""
 
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
+    command_low: Annotated[
+        float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)
+    ] = -UNLIMITED
+    command_high: Annotated[float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)] = (
+        UNLIMITED
+    )
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
     gain_asymmetry: Annotated[float, Quantity("1", -2.0, 2.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
@@ -27,9 +33,12 @@ class ForceActuator(NamedTuple):
 
 
 class PositionActuator(NamedTuple):
-    """Command to position; without any effect it follows at once: delay, deadband (a play), gain
-    and offset, saturation, rate limit, then lag and second lag, or a resonance."""
+    """Command to position; without any effect it follows at once: limits of the command, delay,
+    deadband (a play), gain and offset, saturation, rate limit, then lag and second lag, or a
+    resonance."""
 
+    command_low: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = -UNLIMITED
+    command_high: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = UNLIMITED
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: follows its command at rest")] = 1.0
     offset: Annotated[float, Quantity("m", -100.0, 100.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0

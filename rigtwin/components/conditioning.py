@@ -34,12 +34,14 @@ from rigtwin.numerics.delay import delay_sample, ring
 
 
 class Actuator(NamedTuple):
-    """delay: in timesteps. zero_centred: whether the deadband lies about zero (an amplifier) or
-    about the last position (a valve's overlap). uneven: share of the gain that positive commands
-    have more and negative ones less. rate: greatest change a timestep. share: of the way to its
-    input that the lag goes in a timestep."""
+    """low, high: of the command. delay: in timesteps. zero_centred: whether the deadband lies about
+    zero (an amplifier) or about the last position (a valve's overlap). uneven: share of the gain
+    that positive commands have more and negative ones less. rate: greatest change a timestep.
+    share: of the way to its input that the lag goes in a timestep."""
 
     neutral: bool
+    low: float
+    high: float
     delay: float
     deadband: float
     zero_centred: bool
@@ -74,8 +76,11 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
         0.0,
     )
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
+    limited = isinstance(of, ForceActuator)
     return Actuator(
         neutral=neutral,
+        low=of.command_low if limited else -UNLIMITED,
+        high=of.command_high if limited else UNLIMITED,
         delay=delay / timestep,
         deadband=of.deadband,
         zero_centred=not isinstance(of, Cylinder),
@@ -89,6 +94,7 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
 
 def hold(conditioning: Actuator, command: float) -> ActuatorState:
     """The state in which `command` has been held for long."""
+    command = min(max(command, conditioning.low), conditioning.high)
     state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
     if conditioning.zero_centred:
         state.memory[1] = 0.0
@@ -114,6 +120,7 @@ def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float
 @compilable
 def condition(conditioning: Actuator, state: ActuatorState, command: float) -> float:
     """What acts over the coming timestep. Advances the state by one timestep."""
+    command = min(max(command, conditioning.low), conditioning.high)
     if conditioning.neutral:
         state.memory[3] = command
         return command

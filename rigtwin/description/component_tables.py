@@ -230,6 +230,11 @@ class Components:
                 )
                 return component
             component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
+        if kind in ("force actuator", "position actuator") and element == "actuator":
+            low, high = self._mechanism.command_limits(mjcf)
+            component = component._replace(
+                command_low=max(low, -UNLIMITED), command_high=min(high, UNLIMITED)
+            )
         for key, given in table.items():
             if key in COMPONENT_KEYS:
                 continue

@@ -142,6 +142,14 @@ class Mechanism:
         """Whether an actuator takes a position as its command."""
         return float(self.model.actuator_biasprm[self.number("actuator", name), 1]) != 0.0
 
+    def command_limits(self, name: str) -> tuple[float, float]:
+        """Between which an actuator takes its command (infinite if there are none)."""
+        number = self.number("actuator", name)
+        if not self.model.actuator_ctrllimited[number]:
+            return -np.inf, np.inf
+        low, high = self.model.actuator_ctrlrange[number]
+        return float(low), float(high)
+
     def force_per_command(self, name: str) -> tuple[float, float]:
         """A force actuator's constant and limit, N or Nm (infinite if there is none)."""
         number = self.number("actuator", name)
@@ -150,10 +158,8 @@ class Mechanism:
             float(self.model.actuator_gainprm[number, 0]),
         )
         limit = np.inf
-        if self.model.actuator_ctrllimited[number]:
-            limit = abs(gear * gain) * float(self.model.actuator_ctrlrange[number, 1])
         if self.model.actuator_forcelimited[number]:
-            limit = min(limit, abs(gear) * float(self.model.actuator_forcerange[number, 1]))
+            limit = abs(gear) * float(self.model.actuator_forcerange[number, 1])
         return gear * gain, limit
 
     def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:

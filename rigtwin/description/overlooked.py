@@ -104,3 +104,6 @@ def _actuators(model: mujoco.MjModel) -> Iterator[str]:
             yield f"actuator {name}: it is a muscle"
         elif model.actuator_dyntype[number] != mujoco.mjtDyn.mjDYN_NONE:
             yield f"actuator {name}: its activation dynamics"
+        low, high = model.actuator_forcerange[number]
+        if model.actuator_forcelimited[number] and not np.isclose(low, -high):
+            yield f"actuator {name}: its forcerange's lower end {low:g}; taken as {-high:g}"

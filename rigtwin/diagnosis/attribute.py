@@ -10,13 +10,14 @@ from functools import partial
 import numpy as np
 
 from rigtwin.components import Effect
+from rigtwin.diagnosis.beginnings import fit_beginnings
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.pairs import fit_pairs
 from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
-from rigtwin.diagnosis.search import Search
+from rigtwin.diagnosis.search import Search, detection_limit
 from rigtwin.diagnosis.selection import Selection, select
 from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
 from rigtwin.diagnosis.threads import Threads
@@ -113,6 +114,7 @@ def attribute(
             return _attribute_rough(search, final, nothing, tried, silent)
         if nothing.misfit - search.cost(tried[0]) > least:
             tried += fit_pairs(search, nothing, tried)
+            tried += fit_beginnings(search, tried)
     chain = [fit for fit in drop_needless(tried, least, thresholds) if fit.effects][:1]
     tried = drop_needless(tried, least, thresholds)
     return _conclude(nothing, tried, evidence, silent, thresholds, chain)
@@ -159,24 +161,6 @@ def _settle(selection: Selection, final: Fitter) -> Selection:
             return selection.replace_chosen(settled)
         selection = selection.without(selection.chosen)
     return selection
-
-
-def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
-    """χ² that an effect must explain to be a finding on this evidence.
-
-    Parameters
-    ----------
-    evidence
-        The recordings, about their nominal plant.
-    thresholds
-        What figures are held against.
-
-    Returns
-    -------
-    float
-        The greater of an absolute limit and a share of what noise alone leaves.
-    """
-    return max(thresholds.detected, thresholds.noticeable * evidence.expected)
 
 
 def _conclude(

@@ -47,7 +47,7 @@ from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
-from rigtwin.diagnosis.stops import find_stops
+from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
@@ -164,7 +164,10 @@ def _diagnose(
         if found.best is not None
         else Fit((), (), found.nothing.misfit, (), evidence.plant)
     )
-    stops = find_stops(evidence.machine, evidence.recordings)
+    stops = [
+        *find_stops(evidence.machine, evidence.recordings),
+        *find_cut_commands(evidence.machine, evidence.recordings),
+    ]
     notes = [*_notes(evidence.recordings), *_clipping_notes(evidence), *stops]
     progress("judging on held-out data", 1)
     validation = validate(evidence, best, held_out, thresholds)

@@ -6,14 +6,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigtwin.components import Effect
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.ranking import penalised_cost
 from rigtwin.diagnosis.threads import Threads
-from rigtwin.diagnosis.thresholds import Thresholds
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them."""
+
+
+def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
+    """χ² that an effect must explain to be a finding on this evidence.
+
+    Parameters
+    ----------
+    evidence
+        The recordings, about their nominal plant.
+    thresholds
+        What figures are held against.
+
+    Returns
+    -------
+    float
+        The greater of an absolute limit and a share of what noise alone leaves.
+    """
+    return max(thresholds.detected, thresholds.noticeable * evidence.expected)
 
 
 @dataclass(frozen=True)

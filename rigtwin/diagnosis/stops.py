@@ -1,4 +1,5 @@
-"""Stops at the ends of a joint's range, which models of joints that act on each other lack."""
+"""Limits that a recording reaches: stops at the ends of a joint's range, which models of joints
+that act on each other lack, and commands that an actuator does not take."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigtwin.components import measures
+from rigtwin.components import ForceActuator, PositionActuator, measures
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.recording import Recording
@@ -52,5 +53,41 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
                     f"{recording.path.name}: {name} is at {place[first]:.4g} {component.unit} "
                     f"after {first * recording.period:.3g} s, and joint {joint} ends at {end:.4g}: "
                     "no stop is predicted"
+                )
+    return found
+
+
+def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+    """Which commands go beyond what their actuators take.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    recordings
+        Of it.
+
+    Returns
+    -------
+    list of str
+        A line for each actuator and recording.
+    """
+    found = []
+    for name, component in machine.components.items():
+        actuator = getattr(machine.plant, name)
+        if not isinstance(actuator, ForceActuator | PositionActuator):
+            continue
+        if component.channel is None:
+            continue
+        low, high = actuator.command_low, actuator.command_high
+        for recording in recordings:
+            if not recording.has(*component.channel):
+                continue
+            command = recording.column(*component.channel)
+            beyond = float(np.mean((command < low) | (command > high)))
+            if beyond > 0.0:
+                found.append(
+                    f"{recording.path.name}: {name} takes commands from {low:g} to {high:g}, and "
+                    f"{100.0 * beyond:.3g} % of the ticks are beyond: they are cut off there"
                 )
     return found

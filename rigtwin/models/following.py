@@ -89,7 +89,8 @@ def follow_command(
     count = (ticks - 1) * steps + 1
     time = np.arange(count) * h
     delay = actuator.delay + late + HELD * period
-    wanted = np.interp(time - delay, np.arange(ticks) * period, command)
+    within = np.clip(command, actuator.command_low, actuator.command_high)
+    wanted = np.interp(time - delay, np.arange(ticks) * period, within)
     shares = np.array(
         [
             1.0 if lag <= 0.0 else 1.0 - math.exp(-h / lag)

@@ -10,7 +10,7 @@ import math
 import struct
 from bisect import bisect_left
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +102,17 @@ class Recording:
     def channels(self) -> tuple[str, ...]:
         """All channels, as `/topic.field`."""
         return tuple(f"{topic}.{name}" for topic, names in self.columns.items() for name in names)
+
+    def between(self, start: float, stop: float) -> Recording:
+        """The ticks from a time on and before another, s."""
+        first, last = np.searchsorted(self.time, np.array([start, stop]) - 0.5 * self.period)
+        if first == 0 and last == self.ticks:
+            return self
+        columns = {
+            topic: {n: np.ascontiguousarray(values[first:last]) for n, values in names.items()}
+            for topic, names in self.columns.items()
+        }
+        return replace(self, time=np.ascontiguousarray(self.time[first:last]), columns=columns)
 
     def to_pandas(self) -> pandas.DataFrame:
         """All channels as a table, a column each, by time in s.

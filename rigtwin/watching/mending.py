@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,18 +12,6 @@ from rigtwin.recording import Recording
 
 LONGEST = 0.05
 """s that may be filled in; the machine went on with the commands that it had."""
-
-
-def cut(recording: Recording, start: float) -> Recording:
-    """The ticks of a recording from a time on, s."""
-    first = int(np.searchsorted(recording.time, start - 0.5 * recording.period))
-    if first == 0:
-        return recording
-    columns = {
-        topic: {name: np.ascontiguousarray(values[first:]) for name, values in names.items()}
-        for topic, names in recording.columns.items()
-    }
-    return replace(recording, time=np.ascontiguousarray(recording.time[first:]), columns=columns)
 
 
 def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
@@ -42,7 +31,7 @@ def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
     steps = np.diff(recording.time)
     long = np.flatnonzero(np.abs(steps) > LONGEST)
     if len(long):
-        recording = cut(recording, float(recording.time[long[-1] + 1]))
+        recording = recording.between(float(recording.time[long[-1] + 1]), math.inf)
         steps = np.diff(recording.time)
     places = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / recording.period), 1.0))])
     places = places.astype(int)

@@ -19,7 +19,7 @@ from rigtwin.signals.noise import white_noise
 from rigtwin.watching.alarm import Alarm
 from rigtwin.watching.cusum import Cusum
 from rigtwin.watching.gap import BANDS, Gap, find_gap, ratio
-from rigtwin.watching.mending import cut, mend
+from rigtwin.watching.mending import mend
 from rigtwin.watching.suspects import find_suspects
 
 WINDOW = 20.0
@@ -109,7 +109,7 @@ class Watch:
         end = float(recording.time[-1])
         if end - self._start < SHORTEST or (end - self.judged < STEP and not last):
             return False
-        window, recorded = mend(cut(recording, end - WINDOW))
+        window, recorded = mend(recording.between(end - WINDOW, math.inf))
         try:
             evidence = self._evidence(window, recorded)
         except RigtwinError as error:
@@ -197,7 +197,7 @@ class Watch:
         """
         if self.alarm is None:
             return False
-        window, recorded = mend(cut(recording, float(recording.time[-1]) - WINDOW))
+        window, recorded = mend(recording.between(float(recording.time[-1]) - WINDOW, math.inf))
         since = max(self.alarm.since, float(window.time[0]))
         seen = self.judged - since
         if seen < max(SEEN, LOOKED * self._looked) and not (last and not self._looked):
@@ -205,7 +205,7 @@ class Watch:
         if self._looked and seen > WINDOW - WARM - STEP:
             return False
         self._looked = seen
-        part = cut(window, since - WARM)
+        part = window.between(since - WARM, math.inf)
         from_here = part.time >= (since + SETTLED if since > self._start else since)
         try:
             suspects = find_suspects(self._evidence(part, recorded[-part.ticks :] & from_here))
