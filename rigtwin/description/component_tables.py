@@ -255,6 +255,12 @@ class Components:
                     f"{key} of {element} {mjcf!r} in the MJCF is {value:g}: expected a number "
                     f"from {meaning.low:g} to {meaning.high:g}",
                 )
+        if kind in ("force actuator", "position actuator"):
+            low, high = component.command_low, component.command_high
+            if not low < high:
+                self.mistakes.note(
+                    where, f"command_low {low:g}: expected less than command_high {high:g}"
+                )
         return component
 
     def _value(

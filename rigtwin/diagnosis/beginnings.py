@@ -53,7 +53,8 @@ def fit_beginnings(search: Search, tried: Sequence[Fit]) -> list[Fit]:
             continue
         part = evidence.beginning(share)
         coarse = Fitter(part.halve_steps())
-        here = replace(search, coarse=coarse, fitter=Fitter(part), least=detection_limit(part))
+        least = detection_limit(part, search.thresholds)
+        here = replace(search, coarse=coarse, fitter=Fitter(part), least=least)
         carried = _follow(carried, here)
         if missed < PATIENCE and not (carried and _suffices(carried[0], part, search)):
             carried = _best([*carried, *_look(here)], search)
