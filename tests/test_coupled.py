@@ -226,6 +226,31 @@ def test_a_replay_that_cannot_be_is_refused(tmp_path: Path, replay: str, said: s
         load(tmp_path / "slides.toml")
 
 
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        (
+            "command_low = 3.0, command_high = -3.0",
+            "command_low 3: expected less than command_high",
+        ),
+        ("command_low = nan", "command_low"),
+        ('command_high = "wide"', "command_high"),
+    ],
+)
+def test_limits_of_a_command_that_cannot_be_are_refused(
+    tmp_path: Path, limits: str, said: str
+) -> None:
+    push = f'push = {{ actuator = "push", {limits} }}'
+    toml = "\n".join(
+        push if line.startswith("push = ") else line for line in SLIDES_TOML.splitlines()
+    )
+    assert push in toml
+    (tmp_path / "slides.xml").write_text(SLIDES.format(extra=""))
+    (tmp_path / "slides.toml").write_text(toml + "\n" + FREE)
+    with pytest.raises(RigtwinError, match=said):
+        load(tmp_path / "slides.toml")
+
+
 def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> None:
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
