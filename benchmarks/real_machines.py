@@ -132,8 +132,19 @@ def errors(
     return ", ".join(found)
 
 
-def tell(name: str, case: Case, data: Path) -> None:
-    """Diagnoses a case and prints what came of it."""
+@dataclass(frozen=True)
+class Told:
+    """What came of a case. before, after: errors of the held-out records; seconds: it took."""
+
+    answer: rigtwin.Diagnosis
+    before: str
+    after: str
+    seconds: float
+
+
+def judge(name: str, data: Path) -> Told:
+    """Diagnoses a case whose data are in this folder."""
+    case = CASES[name]
     with tempfile.TemporaryDirectory() as work:
         folder = Path(shutil.copytree(data / case.folder, Path(work) / case.folder))
         for path in (folder, *folder.iterdir()):
@@ -151,9 +162,13 @@ def tell(name: str, case: Case, data: Path) -> None:
         answer = rigtwin.diagnose(fitted, machine=on, settings=case.settings, held_out=held_out)
         seconds = time.perf_counter() - began
         before = errors(on, held_out, nominal, nominal)
-        after = errors(on, held_out, nominal, answer.corrected)
-    print(f"{name}: {answer.verdict}, {before} -> {after} %, {seconds:.0f} s")
-    for effect in answer.effects:
+        return Told(answer, before, errors(on, held_out, nominal, answer.corrected), seconds)
+
+
+def tell(name: str, told: Told) -> None:
+    """Prints what came of a case."""
+    print(f"{name}: {told.answer.verdict}, {told.before} -> {told.after} %, {told.seconds:.0f} s")
+    for effect in told.answer.effects:
         values = ", ".join(f"{each.value:.4g} {each.unit}" for each in effect.parameters.values())
         alike = [str(each) for each in effect.alternatives if str(each) != str(effect.name)]
         other = f", or {', '.join(alike)}" if alike else ""
@@ -172,7 +187,7 @@ def main() -> None:
     for name in parsed.names or CASES:
         if not (parsed.folder / CASES[name].folder).is_dir():
             parser.error(f"{parsed.folder} holds no folder {CASES[name].folder!r}")
-        tell(name, CASES[name], parsed.folder)
+        tell(name, judge(name, parsed.folder))
 
 
 if __name__ == "__main__":

@@ -33,6 +33,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--html", type=Path, metavar="F.html", help="also write a report to look at, one file"
     )
+    for kind in ("pdf", "png"):
+        parser.add_argument(
+            f"--{kind}",
+            type=Path,
+            metavar=f"F.{kind}",
+            help=f"the same report as {kind.upper()}, printed by Chrome, Chromium or Edge",
+        )
     parser.add_argument(
         "--without",
         action="append",
@@ -71,16 +78,24 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
     from rigtwin.errors import RigtwinError
+    from rigtwin.render.browser import find_browser
 
-    outputs = (parsed.json, parsed.html, parsed.save_twin, parsed.save_mjcf)
+    reports = [each for each in (parsed.html, parsed.pdf, parsed.png) if each is not None]
+    outputs = (parsed.json, parsed.save_twin, parsed.save_mjcf, *reports)
     if parsed.changed and (parsed.held_out or any(outputs[1:])):
         raise RigtwinError(
             "--changed compares recordings and writes --json only; "
-            "leave out --held-out, --html, --save-twin and --save-mjcf"
+            "leave out --held-out, --html, --pdf, --png, --save-twin and --save-mjcf"
         )
     for out in outputs:
         if out is not None:
             writable(out)
+    for name, ending in (("pdf", ".pdf"), ("png", ".png")):
+        out = getattr(parsed, name)
+        if out is not None:
+            if out.suffix.lower() != ending:
+                raise RigtwinError(f"--{name} {out}: expected a name that ends in {ending}")
+            find_browser()
     recordings = [rigtwin.load(path, parsed.machine) for path in parsed.recordings]
     held_out = [rigtwin.load(path, parsed.machine) for path in parsed.held_out]
     with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
@@ -112,8 +127,7 @@ def execute(parsed: argparse.Namespace) -> int:
     said = [str(diagnosis)]
     if parsed.json is not None:
         write_json(parsed.json, diagnosis.document())
-    if parsed.html is not None:
-        said.append(f"report in {diagnosis.report(parsed.html)}")
+    said += [f"report in {diagnosis.report(each)}" for each in reports]
     if parsed.save_twin is not None and diagnosis.verdict != "unusable":
         twin = diagnosis.save_twin(parsed.save_twin)
         said.append(f"corrected twin in {twin}; use it with --config")

@@ -9,7 +9,7 @@ from pathlib import Path
 from rigtwin.console import apart
 from rigtwin.errors import RigtwinError
 
-OUTPUTS = ("out", "json", "html", "draw", "save_twin", "save_mjcf")
+OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf")
 """Options that name a file to be written."""
 
 

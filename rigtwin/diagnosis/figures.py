@@ -23,6 +23,7 @@ from markupsafe import Markup
 
 from rigtwin.diagnosis.overlay import Overlay
 from rigtwin.diagnosis.pictures import Curve, Picture
+from rigtwin.diagnosis.units import find_unit, say, spell
 from rigtwin.numerics.arrays import Array
 
 MEASURED, BEFORE, AFTER, SAMPLES = "#1e293b", "#c2410c", "#0f766e", "#94a3b8"
@@ -64,32 +65,6 @@ class Drawings:
     overlays: tuple[Drawn, ...]
     library: Markup
     script: Markup
-
-
-def find_unit(unit: str, largest: float) -> tuple[float, str]:
-    """The unit that engineers write a signal of this size in.
-
-    Parameters
-    ----------
-    unit
-        Of the signal, SI.
-    largest
-        Its greatest magnitude, in that unit.
-
-    Returns
-    -------
-    tuple
-        What its values are multiplied by, and the unit they then have.
-    """
-    base, _, rest = unit.partition("/")
-    rest = f"/{rest}" if rest else ""
-    if base == "rad":
-        return 180.0 / math.pi, f"°{rest}"
-    if base == "m" and largest < 1.0:
-        return 1e3, f"mm{rest}"
-    if base in ("N", "Nm", "Pa") and largest >= 1e4:
-        return 1e-3, f"k{base}{rest}"
-    return 1.0, "" if unit == "1" else unit
 
 
 def thin(time: Array, values: Array, points: int) -> tuple[Array, Array]:
@@ -256,20 +231,14 @@ def _caption(overlay: Overlay, corrected: bool) -> str:
     text = (
         f"The {name} of {where}, {start:.2f} to {end:.2f} s, where the nominal prediction is "
         f"worst: it is off by {say(overlay.before, overlay.unit)} rms "
-        f"({overlay.before_percent:.2g} % of the signal) over the whole recording"
+        f"({spell(overlay.before_percent, 2)} % of the signal) over the whole recording"
     )
     if corrected:
         text += (
             f", the corrected one by {say(overlay.after, overlay.unit)} "
-            f"({overlay.after_percent:.2g} %)"
+            f"({spell(overlay.after_percent, 2)} %)"
         )
     return f"{text}."
-
-
-def say(value: float, unit: str) -> str:
-    """A size with the unit that engineers write it in, three digits."""
-    factor, shown = find_unit(unit, abs(value))
-    return f"{factor * value:.3g} {shown}".rstrip()
 
 
 def _name_steadily(script: str, places: Sequence[str]) -> list[str]:

@@ -12,6 +12,7 @@ from rigtwin.diagnosis.finding import Estimate, Place, Step
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.unknown_input import DisturbanceFit
 from rigtwin.signals.noise import rms
 
@@ -87,7 +88,7 @@ def leftovers(
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]
         share = (levels[name] / noise) ** 2 / total
         words = (
-            f"{levels[name]:.3g} {row.unit} rms, {levels[name] / noise:.3g} "
+            f"{say(levels[name], row.unit)} rms, {spell(levels[name] / noise, 3)} "
             f"times its noise; {goes_with}"
         )
         found.append(locate(evidence, name, share, own, words))

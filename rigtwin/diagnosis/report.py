@@ -1,4 +1,5 @@
-"""The diagnosis as one HTML file to look at: no network, readable on a telephone and on paper."""
+"""The diagnosis as one HTML file to look at: no network, readable on a telephone and on paper; and
+as a browser prints it."""
 
 from __future__ import annotations
 
@@ -11,11 +12,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from rigtwin import __version__
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.finding import Answer
-from rigtwin.diagnosis.text import number
+from rigtwin.diagnosis.text import against_nominal
+from rigtwin.diagnosis.units import say, spell
+from rigtwin.diagnosis.units import write as write_size
 from rigtwin.files import write_whole
+from rigtwin.render.browser import write_pdf, write_png
 
 if TYPE_CHECKING:
     from rigtwin.diagnosis.result import Diagnosis
+
+
+WRITERS = {".pdf": write_pdf, ".png": write_png}
+"""By the ending of the file's name; HTML otherwise."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +81,11 @@ def html(diagnosis: Diagnosis) -> str:
         drawings=drawings,
         overlays=overlays,
         corrected=corrected,
-        say=figures.say,
-        number=number,
+        spell=spell,
+        say=say,
+        against_nominal=against_nominal,
+        write=write_size,
+        recordings=[Path(each).name for each in answer.recordings],
         title=diagnosis.described.title,
         components=list(diagnosis.evidence.machine.components)
         if diagnosis.evidence is not None
@@ -86,5 +97,5 @@ def html(diagnosis: Diagnosis) -> str:
 
 def write(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes the page. Raises RigtwinError if it cannot."""
-    write_whole(path, html(diagnosis))
+    WRITERS.get(path.suffix.lower(), write_whole)(path, html(diagnosis))
     return path

@@ -97,7 +97,23 @@ class Diagnosis:
         return tuple(picture(shown, self.corrected.plant, effect) for effect in self.effects)
 
     def report(self, path: str | Path) -> Path:
-        """Writes the report, one HTML file. Raises RigtwinError if it cannot be written."""
+        """Writes the report, one file.
+
+        Parameters
+        ----------
+        path
+            PDF or PNG if its name ends so, printed by Chrome, Chromium or Edge; HTML otherwise.
+
+        Returns
+        -------
+        Path
+            The same.
+
+        Raises
+        ------
+        RigtwinError
+            If it cannot be written, or no browser is there to print it.
+        """
         return report.write(Path(path), self)
 
     def save_twin(self, path: str | Path) -> Path:

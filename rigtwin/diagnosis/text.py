@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigtwin.diagnosis.finding import Answer, Estimate, Finding, Gap, Place, Verdict
+from rigtwin.diagnosis.units import shorten, spell, write
 
 UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands, and change no replay."""
@@ -22,11 +23,18 @@ def tell_apart(one: float, other: float) -> tuple[str, str]:
 
 def number(estimate: Estimate) -> str:
     """A parameter's value with its interval."""
-    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
-    value, nominal = tell_apart(estimate.value, estimate.nominal)
-    if abs(estimate.nominal) >= 1e9:
-        nominal = "none"
-    return f"{value}{unit} (95 %: {estimate.low:.4g} to {estimate.high:.4g}), nominal {nominal}"
+    value, nominal, factor, unit = against_nominal(estimate)
+    low, high = (spell(factor * end, 4) for end in (estimate.low, estimate.high))
+    return f"{value}{unit} (95 %: {low} to {high}), nominal {nominal}"
+
+
+def against_nominal(estimate: Estimate) -> tuple[str, str, float, str]:
+    """A parameter's value and its nominal one in the same unit, what values in SI are multiplied by
+    for that, and the unit after its space."""
+    none = abs(estimate.nominal) >= 1e9
+    factor, unit = shorten(estimate.unit, estimate.value, 0.0 if none else estimate.nominal)
+    value, nominal = tell_apart(factor * estimate.value, factor * estimate.nominal)
+    return value, "none" if none else nominal, factor, f" {unit}" if unit else ""
 
 
 def describe(diagnosis: Answer) -> str:
@@ -53,7 +61,8 @@ def describe(diagnosis: Answer) -> str:
         lines.append(f"  nearest: {names}, not enough to be named; it leaves {left}")
     for effect in diagnosis.traces:
         values = ", ".join(
-            f"{name} {estimate.value:.4g}" for name, estimate in effect.parameters.items()
+            f"{name} {write(estimate.value, estimate.unit)}"
+            for name, estimate in effect.parameters.items()
         )
         lines.append(
             f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} "
@@ -63,9 +72,11 @@ def describe(diagnosis: Answer) -> str:
         lines.append("  what is left, rms, as effects are found one after another:")
         for step in diagnosis.steps:
             amounts = ", ".join(
-                f"{name} {value:.4g} {diagnosis.units[name]}" for name, value in step.left.items()
+                f"{name} {write(value, diagnosis.units[name])}" for name, value in step.left.items()
             )
-            values = ", ".join(f"{name} {each.value:.4g}" for name, each in step.values.items())
+            values = ", ".join(
+                f"{name} {write(each.value, each.unit)}" for name, each in step.values.items()
+            )
             lines.append(f"    {step.added}{f' ({values})' if values else ''}: {amounts}")
     for place in diagnosis.where:
         low, high = place.band_hz
@@ -116,10 +127,9 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
     parts = []
     for effect in effects:
         name, estimate = next(iter(effect.parameters.items()))
-        unit = "" if estimate.unit == "1" else f" {estimate.unit}"
         likely = f"{100 * effect.confidence:.0f} %"
-        value, nominal = tell_apart(estimate.value, estimate.nominal)
-        was = "none" if abs(estimate.nominal) >= 1e9 else f"{nominal}{unit}"
+        value, nominal, _, unit = against_nominal(estimate)
+        was = nominal if nominal == "none" else f"{nominal}{unit}"
         title = f"setting {name}" if effect.name.kind == "setting" else effect.title
         owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
         article = "an" if title[0] in "aeiou" else "a"
