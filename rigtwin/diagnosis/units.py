@@ -61,5 +61,6 @@ def write(value: float, unit: str) -> str:
 def spell(value: float, digits: int) -> str:
     """A number with so many digits, and no exponent where it would be shorter without: 102, not
     1.0e+02."""
+    value += 0.0  # minus zero is zero
     text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text

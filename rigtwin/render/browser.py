@@ -39,7 +39,8 @@ WIDTH, TALLEST = 1280, 16_384
 """Of a picture, px. Browsers draw none that is higher."""
 A4 = 720
 """Of the window whose page fits on A4, px: figures keep the width that they are drawn with."""
-UNFOLD = """<script>
+HEAD = """<style>@page { size: A4; }</style>
+<script>
 addEventListener('DOMContentLoaded', () => {
   for (const folded of document.querySelectorAll('details')) folded.open = true;
 });
@@ -47,7 +48,7 @@ setInterval(() => {
   document.documentElement.dataset.height = document.documentElement.scrollHeight;
 }, 500);
 </script>"""
-"""On paper nothing can be opened by a click; and how high the page is."""
+"""The paper; on it nothing can be opened by a click; and how high the page is."""
 
 
 def find_browser() -> str:
@@ -124,7 +125,7 @@ def _laid_out(path: Path, page: str) -> tempfile.TemporaryDirectory[str]:
         )
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
-    write_whole(Path(folder.name, "page.html"), page.replace("<head>", "<head>" + UNFOLD, 1))
+    write_whole(Path(folder.name, "page.html"), page.replace("<head>", "<head>" + HEAD, 1))
     return folder
 
 

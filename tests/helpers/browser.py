@@ -11,14 +11,13 @@ from typing import Any
 
 import axe_core_python
 
-BROWSER = next(
-    (
-        found
-        for name in ("chromium", "chromium-browser", "google-chrome")
-        if (found := shutil.which(name))
-    ),
-    None,
-)
+from rigtwin.errors import RigtwinError
+from rigtwin.render.browser import find_browser
+
+try:
+    BROWSER: str | None = find_browser()
+except RigtwinError:
+    BROWSER = None
 AXE = Path(axe_core_python.__file__).parent / "axe.min.js"
 VIEWER = """<!DOCTYPE html><meta charset="utf-8"><body style="margin:0">
 <iframe id="page" src="report.html" style="width:{width}px;height:900px;border:0"></iframe>
