@@ -150,6 +150,21 @@ def test_the_document_keeps_to_its_schema(outcomes, verdict):
         jsonschema.validate(document | {"verdict": "perhaps"}, schema)
 
 
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_no_explanation_is_ranked_twice(outcomes, verdict):
+    names = [frozenset(name.split(" + ")) for name, _ in outcomes[verdict].answer.ranking]
+    assert len(set(names)) == len(names)
+
+
+def test_the_page_says_what_to_do_next_before_any_evidence(outcomes):
+    for outcome in outcomes.values():
+        page = html(outcome)
+        assert page.index("<h1>") < page.index("What to do next") < page.index("What was checked")
+    found = html(outcomes["explained"])
+    assert found.index("What to do next") < found.index("The evidence")
+    assert "<code>--save-twin twin.toml</code>" in found
+
+
 def test_names_from_files_cannot_write_the_page(outcomes):
     outcome = outcomes["no gap"]
     hostile = replace(outcome, answer=replace(outcome.answer, notes=("<script>alert(1)</script>",)))

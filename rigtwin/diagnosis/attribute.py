@@ -16,7 +16,7 @@ from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.pairs import fit_pairs
-from rigtwin.diagnosis.ranking import drop_needless, penalised_cost, within_tolerance
+from rigtwin.diagnosis.ranking import best_of_each, drop_needless, penalised_cost, within_tolerance
 from rigtwin.diagnosis.search import Search, detection_limit
 from rigtwin.diagnosis.selection import Selection, select
 from rigtwin.diagnosis.stepwise import Growth, fit_stepwise
@@ -182,7 +182,7 @@ def _conclude(
         expected = evidence.expected_misfit(fit.plant)
         return max(fit.misfit - expected, 0.0) / expected
 
-    pool = sorted([*tried, nothing], key=cost)
+    pool = best_of_each([*tried, nothing], cost)
     forbidden = left_by(pool[0]) > rules.too_much
     if forbidden:
         # What removes nearly all is named though the model is not exact, but nothing beside it.

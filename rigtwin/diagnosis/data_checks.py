@@ -13,6 +13,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
 from rigtwin.diagnosis.direction import runs_backwards
+from rigtwin.diagnosis.units import spell
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
@@ -342,7 +343,7 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
         yield Fault(
             "unit",
             where,
-            f"{where} is {slope:.3g} times what is predicted{as_if}; expected {row.unit}",
+            f"{where} is {spell(slope, 3)} times what is predicted{as_if}; expected {row.unit}",
         )
 
 

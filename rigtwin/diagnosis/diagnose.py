@@ -51,6 +51,7 @@ from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
+from rigtwin.diagnosis.words import enumerate_words
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
@@ -321,7 +322,7 @@ def _places(
         foremost = disturbed[0]
         share = 1.0 - (found.explained if kept else 0.0)
         words = (
-            "what is left goes with " + ", ".join(foremost.forms)
+            "what is left is best described by " + enumerate_words(foremost.forms)
             if foremost.forms
             else "what is left has no plain form"
         )

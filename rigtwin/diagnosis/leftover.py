@@ -14,6 +14,7 @@ from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.unknown_input import DisturbanceFit
+from rigtwin.diagnosis.words import enumerate_words, name_part
 from rigtwin.signals.noise import rms
 
 
@@ -74,7 +75,8 @@ def leftovers(
     )
     foremost = disturbed[0]
     goes_with = (
-        f"it goes with {', '.join(foremost.forms)} at {foremost.component}"
+        f"best described by {enumerate_words(foremost.forms)} of the "
+        f"{name_part(foremost.component)}"
         if foremost.forms
         else "it has no plain form"
     )

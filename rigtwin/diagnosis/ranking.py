@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
@@ -31,6 +31,15 @@ def penalised_cost(fit: Fit, price: float) -> float:
         What explanations are ranked by, the least first.
     """
     return fit.misfit + price * sum(len(effect.kind.parameters) for effect in fit.effects)
+
+
+def best_of_each(fits: Sequence[Fit], cost: Callable[[Fit], float]) -> list[Fit]:
+    """The cheapest fit of each set of effects, the cheapest first: a search that comes to one
+    explanation by two ways has not found two."""
+    found: dict[frozenset[tuple[str, str]], Fit] = {}
+    for fit in sorted(fits, key=cost):
+        found.setdefault(frozenset((e.kind.name, e.group) for e in fit.effects), fit)
+    return list(found.values())
 
 
 def drop_needless(

@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
 
 from rigtwin import __version__
+from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.attribute import library
-from rigtwin.diagnosis.finding import Answer
+from rigtwin.diagnosis.finding import Answer, Finding
 from rigtwin.diagnosis.text import against_nominal
 from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.units import write as write_size
+from rigtwin.diagnosis.words import name_part
 from rigtwin.files import write_whole
 from rigtwin.render.browser import write_pdf, write_png
 
@@ -64,6 +67,7 @@ def html(diagnosis: Diagnosis) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["code"] = _code
     # Bokeh is slow to import, and a diagnosis without a report does without it.
     from rigtwin.diagnosis import figures
 
@@ -81,6 +85,8 @@ def html(diagnosis: Diagnosis) -> str:
         drawings=drawings,
         overlays=overlays,
         corrected=corrected,
+        advice=advise(answer),
+        title_of=title_of,
         spell=spell,
         say=say,
         against_nominal=against_nominal,
@@ -92,6 +98,19 @@ def html(diagnosis: Diagnosis) -> str:
         else [],
         tried=len(library(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
         version=__version__,
+    )
+
+
+def title_of(effect: Finding) -> str:
+    """An effect in words, with its component."""
+    return f"{effect.title[0].upper()}{effect.title[1:]}, {name_part(effect.name.component)}"
+
+
+def _code(text: str) -> Markup:
+    """Marks what stands between backquotes."""
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if number % 2 else escape(part)
+        for number, part in enumerate(text.split("`"))
     )
 
 

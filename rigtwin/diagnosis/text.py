@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.finding import Answer, Estimate, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.units import shorten, spell, write
+from rigtwin.diagnosis.words import enumerate_words, name_part
 
 UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands, and change no replay."""
+MOST_TOLD = 5
+"""Effects in one sentence."""
 
 
 def tell_apart(one: float, other: float) -> tuple[str, str]:
@@ -102,9 +106,7 @@ def describe(diagnosis: Answer) -> str:
             f"  left over: {place.component}, {place.region}, "
             f"{low:.3g} to {high:.3g} Hz; {place.evidence}"
         )
-    if diagnosis.next_test is not None:
-        between = " from ".join(diagnosis.next_test.between[:2])
-        lines.append(f"  next test: {diagnosis.next_test.command}  (separates {between})")
+    lines += [f"  next: {each.replace('`', '')}" for each in advise(diagnosis)]
     if diagnosis.not_observable:
         names = ", ".join(f"{each.kind}@{each.component}" for each in diagnosis.not_observable)
         lines.append(f"  could not be seen with these data: {names}")
@@ -122,27 +124,43 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         )
     if verdict == "unknown":
         place = where[0] if where else None
-        at = f" at the {place.component.replace('_', ' ')}; {place.evidence}" if place else ""
+        at = f" at the {name_part(place.component)}; {place.evidence}" if place else ""
         return f"Something that this library has no name for acts{at}."
-    parts = []
-    for effect in effects:
-        name, estimate = next(iter(effect.parameters.items()))
-        likely = f"{100 * effect.confidence:.0f} %"
-        value, nominal, _, unit = against_nominal(estimate)
-        was = nominal if nominal == "none" else f"{nominal}{unit}"
-        title = f"setting {name}" if effect.name.kind == "setting" else effect.title
-        owner = effect.name.component.replace("_", " ").replace("lvdt", "LVDT")
-        article = "an" if title[0] in "aeiou" else "a"
-        parts.append(
-            f"the {owner} has {article} {title} of {value}{unit} "
-            f"instead of {was} (confidence {likely})"
-        )
+    shown = list(effects)
+    more = ""
+    if len(effects) > MOST_TOLD:
+        shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_TOLD]
+        more = f"; and {len(effects) - MOST_TOLD} more effects that are smaller"
+    parts: dict[str, list[str]] = {}
+    for effect in shown:
+        parts.setdefault(effect.name.component, []).append(_tell(effect))
+    said = "; ".join(
+        f"{_with_article(component)} has {enumerate_words(told)}"
+        for component, told in parts.items()
+    )
     closes = (
         f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} "
         "% of the gap on data held out of the fit"
     )
     moves = any(effect.name.kind not in UNMOVING for effect in effects)
-    shown = closes if gap.before > 1.05 and moves else ""
-    more = "; something that has no name here is left" if verdict == "partly explained" else ""
-    text = " and ".join(parts) + shown + more + "."
+    closed = closes if gap.before > 1.05 and moves else ""
+    left = "; something that has no name here is left" if verdict == "partly explained" else ""
+    text = said + more + closed + left + "."
     return text[0].upper() + text[1:]
+
+
+def _with_article(component: str) -> str:
+    """joint 2, but the motor."""
+    name = name_part(component)
+    return name if name[-1].isdigit() else f"the {name}"
+
+
+def _tell(effect: Finding) -> str:
+    """An effect with its value."""
+    name, estimate = next(iter(effect.parameters.items()))
+    value, nominal, _, unit = against_nominal(estimate)
+    was = nominal if nominal == "none" else f"{nominal}{unit}"
+    title = f"setting {name}" if effect.name.kind == "setting" else effect.title
+    article = "an" if title[0] in "aeiou" else "a"
+    likely = f"{100 * effect.confidence:.0f} %"
+    return f"{article} {title} of {value}{unit} instead of {was} (confidence {likely})"

@@ -82,7 +82,7 @@ def _distortion(by: Passage) -> NamedSignals:
     time = by.time
     centred = by.signal - np.mean(by.signal)
     rate = np.gradient(centred, by.period)
-    yield "constant", np.ones_like(time)
+    yield "a constant", np.ones_like(time)
     yield "time", time
     yield "time squared", time**2
     yield "its value", centred
@@ -156,7 +156,7 @@ def _guide(by: Passage) -> NamedSignals:
     speed, position = by.speed, by.position - np.mean(by.position)
     sign = np.sign(speed)
     typical = float(np.sqrt(np.mean(speed**2))) or 1.0
-    yield "constant", np.ones_like(speed)
+    yield "a constant", np.ones_like(speed)
     yield "speed", speed
     yield "speed squared", speed * np.abs(speed)
     yield "speed cubed", speed**3

@@ -1,0 +1,81 @@
+"""What to do next, by what was found."""
+
+from __future__ import annotations
+
+from rigtwin.diagnosis.finding import Answer, Finding, Place
+from rigtwin.diagnosis.words import name_part
+
+SURE = 0.9
+"""Confidence from which an effect is corrected without another look."""
+
+
+def advise(answer: Answer) -> tuple[str, ...]:
+    """What an engineer who has this answer does next, the most useful first.
+
+    Parameters
+    ----------
+    answer
+        Of a diagnosis.
+
+    Returns
+    -------
+    tuple of str
+        Sentences. One at least.
+    """
+    if answer.verdict == "unusable":
+        return ("Mend what is said above in the recording, and diagnose it again.",)
+    if answer.verdict == "no gap":
+        missed = len(answer.not_observable)
+        unseen = "; what these data could not have shown is listed below" if missed else ""
+        return (f"Nothing needs to be corrected: use the twin as it is{unseen}.",)
+    said = []
+    if answer.effects:
+        said.append(
+            "Write the corrected twin with `--save-twin twin.toml`, and use it with "
+            "`--config twin.toml`."
+        )
+    said += _tell_apart(answer)
+    if unsure := [each for each in answer.effects if each.confidence < SURE]:
+        names = ", ".join(f"{each.name} ({100 * each.confidence:.0f} %)" for each in unsure)
+        said.append(f"Before you rely on the less sure ones, {names}, look at their evidence.")
+    if answer.verdict != "explained":
+        said += _look_further(answer)
+    elif answer.gap is not None and "held-out" not in answer.gap.held_out:
+        said.append(
+            "Give another recording of the machine with `--held-out` to see whether the correction "
+            "holds there."
+        )
+    return tuple(said)
+
+
+def _tell_apart(answer: Answer) -> list[str]:
+    """How explanations that fit alike would be separated."""
+    if (test := answer.next_test) is not None:
+        between = " from ".join(test.between[:2])
+        return [f"Record `{test.command}`: that test separates {between}."]
+    return [
+        f"Of {' or '.join(str(each) for each in effect.alternatives)} these data cannot say which "
+        "it is, and the correction is as good with either. A look at the part tells, or a test in "
+        "which they differ."
+        for effect in answer.effects
+        if len(effect.alternatives) > 1
+    ]
+
+
+def _look_further(answer: Answer) -> list[str]:
+    """Where to look for what has no name."""
+    named: list[Finding] = list(answer.effects)
+    places: list[Place] = list(answer.leftovers) or [
+        place
+        for place in answer.where
+        if all(place.component != each.name.component for each in named)
+    ]
+    if not places:
+        return [
+            "Something is left that no component explains; see where measured and predicted part."
+        ]
+    place = places[0]
+    return [
+        f"Look at the {name_part(place.component)} for what has no name here: {place.region}; "
+        f"{place.evidence}."
+    ]
