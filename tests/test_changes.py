@@ -68,6 +68,7 @@ def test_a_zero_that_moved_is_no_change(machine: rigtwin.Machine):
     assert second - first == pytest.approx(2e-3, rel=0.02)
 
 
+@pytest.mark.slow
 def test_friction_that_changed_is_named_with_its_values(
     machine: rigtwin.Machine, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

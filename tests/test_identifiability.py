@@ -56,6 +56,7 @@ def test_two_zeros_and_a_gain_that_scales_all_there_is():
     assert {"viscous@damper", "coulomb@damper", "lag@load_cell"} <= set(can.seen)
 
 
+@pytest.mark.slow
 def test_a_mass_and_its_friction_scale_like_the_force_that_moves_them(tmp_path):
     can = rigtwin.identifiability(cart(tmp_path))
     assert set(can.alike["gain@push"]) <= {"mass@cart", "viscous@rail", "coulomb@rail"}

@@ -40,7 +40,7 @@ def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
     for test in ("imposed", "road1.6"):
         law, demands = draw_demands(test, np.random.default_rng(4))
         path = tmp_path / f"{test}.mcap"
-        write(path, law, *run(Truth(), law, demands[:8000], np.random.default_rng(4)))
+        write(path, law, *run(Truth(), law, demands[:4000], np.random.default_rng(4)))
         recording = load(path)
         evidence = evidence_of(recording)
         residual = evidence.residual(evidence.plant)

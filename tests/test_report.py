@@ -28,14 +28,14 @@ VERDICTS = ("explained", "unknown", "no gap", "unusable")
 
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Diagnosis]:
-    """Of a twin with more dry friction than told; of one whose load cell drifts, which is no effect
-    of the library; of one as told; of one with a sensor in mm."""
+    """Of a twin with more dry friction than told; of one with a sensor that drifts, which is no
+    effect of the library; of one as told; of one with a sensor in mm."""
     sound = recorded("imposed", seconds=3.5)
-    load_cell = sound.column("/sensor", "load_cell") + 4.0 * sound.time
+    structure = sound.column("/sensor", "structure_lvdt") + 3e-3 * sound.time
     travel = 1e3 * sound.column("/sensor", "suspension_lvdt")
     return {
         "explained": answer(recorded("imposed", ("coulomb@rail=75",), 3.5)),
-        "unknown": answer(replace_sensors(sound, load_cell=load_cell)),
+        "unknown": answer(replace_sensors(sound, structure_lvdt=structure)),
         "no gap": answer(sound),
         "unusable": answer(replace_sensors(sound, suspension_lvdt=travel)),
     }
@@ -93,7 +93,7 @@ def test_what_has_no_name_is_not_named_but_placed(outcomes):
     assert found.verdict == "unknown"
     assert not found.effects
     place = found.where[0]
-    assert place.component == "load_cell"
+    assert place.component == "structure_lvdt"
     assert place.region == "growing with time"
     assert "time" in place.evidence
 

@@ -306,6 +306,7 @@ def test_a_cusum_says_since_when():
     assert cusum.since == 9.0
 
 
+@pytest.mark.slow
 def test_the_command_says_in_its_exit_code_whether_there_was_an_alarm(nominal, changed, capsys):
     assert main(["watch", str(nominal)]) == 0
     said = capsys.readouterr().out

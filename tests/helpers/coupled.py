@@ -99,6 +99,7 @@ def integrate(
             lambda _, y, push=push: np.concatenate([y[2:], accelerations(y[:2], y[2:], push)]),
             (0.0, PERIOD),
             state,
+            method="DOP853",
             rtol=1e-10,
             atol=1e-12,
         )
