@@ -1,8 +1,9 @@
 """Reports of every sort of answer, opened in a browser:
 `python -m benchmarks.reports OUT [FOLDER]`.
 
-OUT gets each as HTML, PDF and PNG. FOLDER holds the data of real machines, a folder each
-(docs/diagnosis.md says where they are from); without it the twin's own tests are all there is.
+OUT gets each as HTML, PDF and PNG, and a sheet of their first screens (sheet.png). FOLDER holds the
+data of real machines, a folder each (docs/diagnosis.md says where they are from); without it the
+twin's own tests are all there is.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+from PIL import Image
 
 import rigtwin
 from benchmarks.real_machines import judge
@@ -22,6 +25,8 @@ from tests.helpers.recordings import replace_sensors
 
 WIDTHS = (1280, 390)
 """Of the windows, px: a screen and a telephone."""
+COLUMNS = 4
+"""Of the sheet."""
 
 
 def recorded(**effects: float) -> Recording:
@@ -81,6 +86,21 @@ def show(name: str, answer: rigtwin.Diagnosis, out: Path) -> None:
     print(f"{name}: {answer.verdict}, {size:.1f} MB, PDF in {seconds:.1f} s; {'; '.join(said)}")
 
 
+def lay_out(pictures: Sequence[Path], path: Path) -> None:
+    """The first screens of reports side by side."""
+    width, height = 480, 600
+    sheet = Image.new("RGB", (width * COLUMNS, height * -(-len(pictures) // COLUMNS)), "white")
+    for number, each in enumerate(pictures):
+        with Image.open(each) as picture:
+            scale = width / picture.width
+            shown = min(picture.height, round(height / scale))
+            screen = picture.convert("RGB").crop((0, 0, picture.width, shown))
+            size = (width, round(shown * scale))
+            place = (width * (number % COLUMNS), height * (number // COLUMNS))
+            sheet.paste(screen.resize(size, Image.Resampling.LANCZOS), place)
+    sheet.quantize(128, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
+
+
 def main() -> None:
     """Prints a line a report. Fails if the browser's console has an error, or a page asks for
     anything from elsewhere."""
@@ -95,6 +115,8 @@ def main() -> None:
             show(name, rigtwin.diagnose(RIG[name]()), parsed.out)
         elif parsed.folder is not None:
             show(name, REAL[name](parsed.folder), parsed.out)
+    made = [each for name in (*RIG, *REAL) if (each := parsed.out / f"{name}.png").exists()]
+    lay_out(made, parsed.out / "sheet.png")
 
 
 if __name__ == "__main__":
