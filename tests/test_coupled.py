@@ -283,7 +283,8 @@ def test_a_hidden_effect_is_found_at_its_joint(
     tmp_path: Path, effect: str, parameter: str, value: float
 ) -> None:
     machine, path = rigtwin.machine("cart-pole"), tmp_path / "run.mcap"
-    record = rigtwin.run(machine, "pushes", effects=[f"{effect}={value}"], path=path)
+    shorter, hidden = {"timing": {"duration": 6.0}}, [f"{effect}={value}"]
+    record = rigtwin.run(machine, "pushes", settings=shorter, effects=hidden, path=path)
     answer = rigtwin.diagnose(record, machine=machine)
     (found,) = answer.effects
     assert str(found.name) == effect
