@@ -23,10 +23,12 @@ from rigtwin.components.sensors import (
     VelocitySensor,
     measures,
 )
+from rigtwin.components.servo import PUSHERS, Pusher, Servo
 from rigtwin.components.tyre import Tyre
 
 __all__ = [
     "KINDS",
+    "PUSHERS",
     "UNLIMITED",
     "Base",
     "Body",
@@ -48,10 +50,12 @@ __all__ = [
     "Plant",
     "PositionActuator",
     "PositionSensor",
+    "Pusher",
     "Rail",
     "RigPlant",
     "Rotor",
     "Scales",
+    "Servo",
     "Starts",
     "Swing",
     "Tyre",

@@ -28,6 +28,7 @@ from rigtwin.components.sensors import (
     PositionSensor,
     VelocitySensor,
 )
+from rigtwin.components.servo import PUSHERS, Pusher, Servo
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring
@@ -60,13 +61,16 @@ class ActuatorState(NamedTuple):
     memory: Array
 
 
-def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep: float) -> Actuator:
-    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's
-    command."""
+def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float) -> Actuator:
+    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's or servo's
+    command. A servo's deadband is of its error, not of its command."""
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
     uneven = 0.5 * of.gain_asymmetry if isinstance(of, ForceActuator) else 0.0
-    neutral = (delay, of.deadband, of.gain, uneven, of.saturation, rate, of.lag) == (
+    deadband, saturation = (
+        (0.0, UNLIMITED) if isinstance(of, Servo) else (of.deadband, of.saturation)
+    )
+    neutral = (delay, deadband, of.gain, uneven, saturation, rate, of.lag) == (
         0.0,
         0.0,
         1.0,
@@ -76,17 +80,16 @@ def actuator(of: Motor | Cylinder | ForceActuator, computer: Computer, timestep:
         0.0,
     )
     share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
-    limited = isinstance(of, ForceActuator)
     return Actuator(
         neutral=neutral,
-        low=of.command_low if limited else -UNLIMITED,
-        high=of.command_high if limited else UNLIMITED,
+        low=of.command_low if isinstance(of, PUSHERS) else -UNLIMITED,
+        high=of.command_high if isinstance(of, PUSHERS) else UNLIMITED,
         delay=delay / timestep,
-        deadband=of.deadband,
-        zero_centred=not isinstance(of, Cylinder),
+        deadband=deadband,
+        zero_centred=not isinstance(of, Cylinder | Servo),
         gain=of.gain,
         uneven=uneven,
-        saturation=of.saturation,
+        saturation=saturation,
         rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
         share=share,
     )
@@ -154,7 +157,8 @@ def _speed_limit(at: Context) -> Starts:
 
 
 def _deadband(at: Context) -> Starts:
-    size = at.scales.stroke if at.effect.of is PositionActuator else max(at.swing.largest[0], 1e-12)
+    placed = at.effect.of in (PositionActuator, Servo)
+    size = at.scales.stroke if placed else max(at.swing.largest[0], 1e-12)
     return Starts.single([share * size for share in (0.003, 0.01, 0.03, 0.1, 0.3)], 0.001 * size)
 
 
@@ -186,7 +190,8 @@ def _each(guess: Guess | None, *types: type) -> dict[type, Guess | None]:
 
 
 RIG = (Motor, Cylinder, *DECLARED)
-DESCRIBED_ACTUATORS = (ForceActuator, PositionActuator)
+LIMITED_COMMANDS = (ForceActuator, PositionActuator)
+DESCRIBED_ACTUATORS = (*LIMITED_COMMANDS, Servo)
 DESCRIBED_SENSORS = (PositionSensor, VelocitySensor, ForceSensor)
 DESCRIBED = (*DESCRIBED_ACTUATORS, *DESCRIBED_SENSORS)
 KINDS = (
@@ -226,7 +231,7 @@ KINDS = (
         ("saturation",),
         "command limited to this magnitude",
         _each(lambda at: at_limits(at.swing.largest, 1e-6), Motor, Cylinder)
-        | _each(lambda at: at_limits(at.swing.largest, 1e-9), *DESCRIBED_ACTUATORS),
+        | _each(lambda at: at_limits(at.swing.largest, 1e-9), *LIMITED_COMMANDS),
     ),
     Kind(
         "deadband",

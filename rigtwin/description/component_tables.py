@@ -24,6 +24,7 @@ TYPES: dict[str, type] = {
     "guide": components.Guide,
     "rotor": components.Rotor,
     "force actuator": components.ForceActuator,
+    "servo": components.Servo,
     "position actuator": components.PositionActuator,
     "position sensor": components.PositionSensor,
     "velocity sensor": components.VelocitySensor,
@@ -44,7 +45,9 @@ SENSED = {name: MEASURES[of] for name, of in TYPES.items() if of in MEASURES}
 """Type of sensor → what it measures."""
 WHOLE = ("body", "base")
 """Types that have no coordinate of their own."""
-MOVING = ("force actuator", "position actuator", "motor", "cylinder")
+PUSHING = ("force actuator", "servo")
+"""Types that push a joint; where it goes follows from that."""
+MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
 """What is measured → its unit where the joint slides, and where it turns."""
@@ -137,7 +140,7 @@ class Components:
                 )
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
-            if kind in ("position actuator", "cylinder"):
+            if kind in ("position actuator", "servo", "cylinder"):
                 unit = UNITS["position"][turns]
         for key, fits in (("channel", kind in SENSED), ("command", kind in MOVING)):
             if key in table and not fits:
@@ -230,7 +233,9 @@ class Components:
                 )
                 return component
             component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
-        if kind in ("force actuator", "position actuator") and element == "actuator":
+        elif kind == "servo" and element == "actuator":
+            component = component._replace(**self._servo(where, mjcf))
+        if kind in (*PUSHING, "position actuator") and element == "actuator":
             low, high = self._mechanism.command_limits(mjcf)
             component = component._replace(
                 command_low=max(low, -UNLIMITED), command_high=min(high, UNLIMITED)
@@ -255,13 +260,25 @@ class Components:
                     f"{key} of {element} {mjcf!r} in the MJCF is {value:g}: expected a number "
                     f"from {meaning.low:g} to {meaning.high:g}",
                 )
-        if kind in ("force actuator", "position actuator"):
+        if kind in (*PUSHING, "position actuator"):
             low, high = component.command_low, component.command_high
             if not low < high:
                 self.mistakes.note(
                     where, f"command_low {low:g}: expected less than command_high {high:g}"
                 )
         return component
+
+    def _servo(self, where: str, mjcf: str) -> dict[str, float]:
+        """Values of the MJCF's servo."""
+        found = self._mechanism.servo(mjcf)
+        if found is None:
+            self.mistakes.note(
+                where,
+                f"actuator {mjcf!r} is no servo; expected a position actuator of MuJoCo's, with "
+                "gear 1",
+            )
+            return {}
+        return found
 
     def _value(
         self, name: str, where: str, component: Any, key: str, given: object, meaning: Quantity

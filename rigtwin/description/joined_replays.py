@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rigtwin.description.component_tables import SENSED, Components
+from rigtwin.description.component_tables import PUSHING, SENSED, Components
 from rigtwin.description.machine import ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.errors import RigtwinError
 
-MOVERS = ("force actuator", "position actuator", "position sensor")
+MOVERS = (*PUSHING, "position actuator", "position sensor")
 """Types of component that move a machine some of whose joints are free."""
 
 
@@ -73,11 +73,11 @@ class JoinedReplays:
                 self._mistakes.note(
                     where,
                     f"moved_by {mover}, which is a {types[mover]}; where joints are free, expected "
-                    "force actuators, position actuators or position sensors",
+                    "force actuators, servos, position actuators or position sensors",
                 )
             elif not found[mover].acts_on:
                 self._mistakes.note(where, f"moved_by {mover}: it acts on no joint")
-            elif types[mover] != "force actuator":
+            elif types[mover] not in PUSHING:
                 joint = found[mover].joint
                 if not joint or joint in free or joint in held:
                     said = "is of no single joint" if not joint else f"prescribes joint {joint}"

@@ -162,6 +162,20 @@ class Mechanism:
             limit = abs(gear) * float(self.model.actuator_forcerange[number, 1])
         return gear * gain, limit
 
+    def servo(self, name: str) -> dict[str, float] | None:
+        """A position actuator's gains and its force's limit, by the parameters of a Servo; None if
+        it is none, or acts through a gear."""
+        model, number = self.model, self.number("actuator", name)
+        gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
+        affine = int(model.actuator_biastype[number]) == mujoco.mjtBias.mjBIAS_AFFINE
+        same = np.isclose(bias[1], -gain) and float(bias[0]) == 0.0
+        if not affine or not same or float(model.actuator_gear[number, 0]) != 1.0:
+            return None
+        found = {"position_gain": gain, "damping_gain": max(-float(bias[2]), 0.0)}
+        if model.actuator_forcelimited[number]:
+            found["force_limit"] = float(model.actuator_forcerange[number, 1])
+        return found
+
     def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:
         """Joints that a force along an element's own coordinate acts on, and how far that goes for
         each unit of theirs: a fixed tendon has several; none where there is no such coordinate."""

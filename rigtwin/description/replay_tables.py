@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rigtwin.description.component_tables import MOVING, SENSED, WHOLE, Components
+from rigtwin.description.component_tables import MOVING, PUSHING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.joined_replays import JoinedReplays
 from rigtwin.description.machine import Joint, ReplayOf, Row, Structure
@@ -138,13 +138,13 @@ class Replays:
                         f"{movers[0]} moves {joint_name}",
                     )
         closed = self._closes(movers[0])
-        if self._components.types[movers[0]] == "force actuator" and not at["mass"]:
+        if self._components.types[movers[0]] in PUSHING and not at["mass"]:
             self._mistakes.note(
                 where,
                 f"{movers[0]} pushes joint {joint_name}, whose mass "
                 "is no component; add one of type mass",
             )
-        if self._components.types[movers[0]] == "force actuator" and not at["guide"]:
+        if self._components.types[movers[0]] in PUSHING and not at["guide"]:
             self._mistakes.note(
                 where,
                 f"{movers[0]} pushes joint {joint_name}, which "

@@ -8,7 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
-from rigtwin.components import ForceActuator
+from rigtwin.components import PUSHERS
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
@@ -217,7 +217,7 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
         first, length = longest_run(signal, np.ones(len(signal), bool))
         if length == len(signal):
             # A constant force is a test: what it acts on may be let go.
-            pushes = isinstance(getattr(machine.plant, name), ForceActuator)
+            pushes = isinstance(getattr(machine.plant, name), PUSHERS)
             if name not in still and (
                 component.element == "sensor" or (machine.rough and not pushes)
             ):

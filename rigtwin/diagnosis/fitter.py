@@ -39,7 +39,7 @@ REFINED = 3
 """Starts that are followed to their end at most."""
 WORTH = 0.5
 """Share of the best start's gain that another may lack and still be followed."""
-LIMITS = ("saturation", "rate_limit", "resonance")
+LIMITS = ("saturation", "rate_limit", "resonance", "force_limit")
 """Kinds whose magnitude is no measure of what they do."""
 KEPT = 64
 """Responses beside a fit that are kept."""

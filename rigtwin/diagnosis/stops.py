@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigtwin.components import ForceActuator, PositionActuator, measures
+from rigtwin.components import PUSHERS, PositionActuator, measures
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.recording import Recording
@@ -75,7 +75,7 @@ def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list
     found = []
     for name, component in machine.components.items():
         actuator = getattr(machine.plant, name)
-        if not isinstance(actuator, ForceActuator | PositionActuator):
+        if not isinstance(actuator, (*PUSHERS, PositionActuator)):
             continue
         if component.channel is None:
             continue

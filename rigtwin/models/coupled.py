@@ -23,6 +23,7 @@ from rigtwin.components import (
     Guide,
     PositionActuator,
     Rotor,
+    Servo,
     measures,
 )
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
@@ -31,10 +32,11 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
+from rigtwin.components.servo import push, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.coupled_motion import Contacts, Inputs, State, advance
+from rigtwin.models.coupled_motion import Contacts, Inputs, Servos, State, advance
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
@@ -90,7 +92,8 @@ class CoupledModel:
         components = machine.components
         plant = configuration.plant
         self._pushers = [n for n in replay.moved_by if isinstance(getattr(plant, n), ForceActuator)]
-        self._leaders = [n for n in replay.moved_by if n not in self._pushers]
+        self._servos = [n for n in replay.moved_by if isinstance(getattr(plant, n), Servo)]
+        self._leaders = [n for n in replay.moved_by if n not in (*self._pushers, *self._servos)]
         joints = [*replay.free, *(components[name].joint for name in self._leaders)]
         at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
         for component in components.values():
@@ -228,12 +231,12 @@ class CoupledModel:
             found[place] = position if self._steps == 1 else CubicSpline(time, position)(fine)
         return found
 
-    def _push(self, plant: Plant) -> Array:
-        """Forces of the actuators at the steps, shape (actuators, steps)."""
-        found = np.zeros((len(self._pushers), self._ticks * self._steps))
-        for number, name in enumerate(self._pushers):
-            mover: ForceActuator = getattr(plant, name)
+    def _condition(self, plant: Plant, names: Sequence[str]) -> Array:
+        """Commands of actuators as conditioned, at the steps, shape (actuators, steps)."""
+        found = np.zeros((len(names), self._ticks * self._steps))
+        for number, name in enumerate(names):
             command = np.ascontiguousarray(self._column(name))
+            mover = getattr(plant, name)
             conditioning = actuator(mover, plant.computer, self._period / self._steps)
             condition_all(
                 conditioning,
@@ -242,9 +245,28 @@ class CoupledModel:
                 self._steps,
                 found[number],
             )
+        return found
+
+    def _push(self, plant: Plant) -> Array:
+        """Forces of the force actuators at the steps, shape (actuators, steps)."""
+        found = self._condition(plant, self._pushers)
+        for number, name in enumerate(self._pushers):
+            mover: ForceActuator = getattr(plant, name)
             limit = min(mover.force_limit, UNLIMITED)
             found[number] = np.clip(mover.constant * found[number], -limit, limit)
         return found
+
+    def _serve(self, plant: Plant) -> Servos:
+        """The servos, with their commands."""
+        size, names = self._bodies.coordinates, self._servos
+        laws = [push_law(getattr(plant, name)) for name in names]
+        return Servos(
+            laws=np.array(laws, float).reshape(len(names), -1),
+            levers=np.array([self._along[name] for name in names]).reshape(-1, size),
+            zero=np.array([self._zero[name] for name in names]),
+            inertia=np.array([self._felt(self._along[name]) for name in names]),
+            commands=self._condition(plant, names),
+        )
 
     def _contacts(self, plant: Plant, forces: Array) -> Contacts:
         """forces: of the actuators, by which a spring that nobody describes is stiff enough."""
@@ -396,7 +418,7 @@ class CoupledModel:
         """The motion as a function of the start, of other forces on coordinates and on guides, and
         of ticks."""
         multibody, turning = self._bodies_of(plant), self._turning(plant)
-        pushes = self._push(plant)
+        pushes, servos = self._push(plant), self._serve(plant)
         contacts, prescribed = self._contacts(plant, pushes), self._prescribe(plant, shifts)
         size = multibody.coordinates
         levers = np.array([self._along[name] for name in self._pushers]).reshape(-1, size)
@@ -406,7 +428,7 @@ class CoupledModel:
             bodies = multibody.bodies(data, turning)
             state = begin(contacts, start, prescribed, self._held, self._period / self._steps)
             out = np.zeros((3, size, ticks))
-            inputs = Inputs(prescribed, pushes, levers, besides, on)
+            inputs = Inputs(prescribed, pushes, levers, besides, on, servos)
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -530,6 +552,12 @@ class CoupledModel:
             # Forces of all actuators together are what pushes its joints, too.
             pushed = self._push(plant)[self._pushers.index(component), :: self._steps]
             return position, speed, pushed
+        if component in self._servos:
+            law = push_law(getattr(plant, component))
+            command = self._condition(plant, [component])[0, :: self._steps]
+            at = position + self._zero[component]
+            passed = [push(law, *each) for each in zip(command, at, speed, strict=True)]
+            return position, speed, np.array(passed)
         force = along @ moved[2] / float(along @ along)
         if not force.any():
             # It swings freely: what acts on it is what its inertia shows.
@@ -549,7 +577,7 @@ class CoupledModel:
         signal, role = force, "guide"
         if component in names:
             signal, role = self.predict(plant)[names.index(component)], "sensor"
-        elif component in self._pushers:
+        elif component in (*self._pushers, *self._servos):
             role = "force"
         elif component in self._leaders:
             signal, role = position, "position"

@@ -19,6 +19,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from rigtwin.components import Guide
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
 from rigtwin.components.mount import give_way
+from rigtwin.components.servo import Push, pull, push
 from rigtwin.models.guided import SHORTEST
 from rigtwin.models.multibody import Bodies, find_terms
 from rigtwin.numerics.arrays import Array
@@ -28,6 +29,7 @@ TURNS, SAME = 200, 1e-10
 """Times that coordinates take turns at most, and share of the largest dry force by which none may
 change any more."""
 GUIDE, NUMBERS = len(Guide._fields), len(Friction._fields) - 1
+LAW = len(Push._fields)
 BACKLASH = Guide._fields.index("backlash")
 
 
@@ -63,17 +65,31 @@ class State(NamedTuple):
     within: Array
 
 
+class Servos(NamedTuple):
+    """laws: of each servo, shape (servos, 5), the fields of a Push; levers: how they act, shape
+    (servos, coordinates), from `zero`; inertia: that each feels, kg; commands: as conditioned, at
+    the steps, shape (servos, steps)."""
+
+    laws: Array
+    levers: Array
+    zero: Array
+    inertia: Array
+    commands: Array
+
+
 class Inputs(NamedTuple):
     """prescribed: positions of the coordinates at the steps, shape (coordinates, steps + 1), of
     those that are; pushes, levers: of the actuators: N at the steps, shape (actuators, steps), and
     how they act, shape (actuators, coordinates); besides: another force on each coordinate, N,
-    shape (coordinates, ticks); on: another force on each guide, shape (guides, ticks)."""
+    shape (coordinates, ticks); on: another force on each guide, shape (guides, ticks); servos: what
+    pushes by where it is."""
 
     prescribed: Array
     pushes: Array
     levers: Array
     besides: Array
     on: Array
+    servos: Servos
 
 
 @kernel
@@ -86,6 +102,12 @@ def guide_of(values: Array) -> Guide:
 def friction_of(values: Array) -> Friction:
     """Dry friction by its values, shape (parameters,)."""
     return Friction(values[0] > 0.0, *to_fixed_tuple(values[1:], NUMBERS))  # type: ignore[call-arg]
+
+
+@kernel
+def law_of(values: Array) -> Push:
+    """A servo's law by its values, shape (5,)."""
+    return Push(*to_fixed_tuple(values, LAW))  # type: ignore[call-arg]
 
 
 @kernel
@@ -192,26 +214,55 @@ def advance(
     whole, right = np.zeros((loose, loose)), np.zeros(loose)
     column = np.zeros(loose)
     here, ahead_speed = np.zeros(size), np.zeros(size)
-    push, was = np.zeros(size), np.zeros(size)
+    pushed, was = np.zeros(size), np.zeros(size)
     own, damped, implicit = np.zeros(guides), np.zeros(guides), np.zeros(guides)
     place, rate = np.zeros(guides), np.zeros(guides)
     forward, backward, dry = np.zeros(guides), np.zeros(guides), np.zeros(guides)
     without, mounted = np.zeros(guides), np.zeros(guides, np.bool_)
     shares = np.zeros((guides, guides))
+    servos = len(inputs.servos.laws)
+    held_by, weights = np.zeros(servos), np.zeros(servos)
     answers = np.zeros((guides, loose))
     for tick in range(first, last):
         for step in range(steps):
             number = tick * steps + step
             for i in range(size):
                 here[i] = state.speed[i] + 0.5 * (state.speed[i] - state.before[i])
-                push[i] = was[i] = 0.0
+                pushed[i] = was[i] = 0.0
             find_terms(bodies, state.place, here, inertia, bias)
             for a in range(len(inputs.levers)):
                 earlier = inputs.pushes[a, max(number - 1, 0)]
                 now = 0.5 * (earlier + inputs.pushes[a, number])
                 for i in range(size):
-                    push[i] += inputs.levers[a, i] * now
+                    pushed[i] += inputs.levers[a, i] * now
                     was[i] += inputs.levers[a, i] * earlier
+            for a in range(servos):
+                law, at, going, gone = (
+                    law_of(inputs.servos.laws[a]),
+                    inputs.servos.zero[a],
+                    0.0,
+                    0.0,
+                )
+                for i in range(size):
+                    at += inputs.servos.levers[a, i] * state.place[i]
+                    going += inputs.servos.levers[a, i] * here[i]
+                    gone += inputs.servos.levers[a, i] * state.speed[i]
+                earlier = inputs.servos.commands[a, max(number - 1, 0)]
+                now = 0.5 * (earlier + inputs.servos.commands[a, number])
+                force, held_by[a] = pull(law, now, at), law.damping_gain
+                if abs(force - held_by[a] * gone) > law.limit:
+                    # At its limit a servo damps nothing.
+                    force = math.copysign(law.limit, force - held_by[a] * gone)
+                    held_by[a] = 0.0
+                weights[a] = 0.5
+                if held_by[a] > 0.0:
+                    mass = inputs.servos.inertia[a] / h
+                    weights[a] = max(0.5, 1.0 - mass / held_by[a])
+                force -= (1.0 - weights[a]) * held_by[a] * gone
+                before = push(law, earlier, at, going)
+                for i in range(size):
+                    pushed[i] += inputs.servos.levers[a, i] * force
+                    was[i] += inputs.servos.levers[a, i] * before
             if step == 0:
                 for i in range(size):
                     out[0, i, tick], out[1, i, tick] = state.place[i], state.speed[i]
@@ -234,7 +285,7 @@ def advance(
                     along = contacts.along[g, i]
                     place[g] += along * state.place[i]
                     rate[g] += along * state.speed[i]
-                    load += along * push[i]
+                    load += along * pushed[i]
                     among += along * along
                 load /= among
                 share = h / (guide.relaxation + h)
@@ -268,7 +319,7 @@ def advance(
             # (inertia + h Σ implicit damping) v = right
             for a in range(loose):
                 i = free[a]
-                right[a] = h * (push[i] + inputs.besides[i, tick] - bias[i])
+                right[a] = h * (pushed[i] + inputs.besides[i, tick] - bias[i])
                 for b in range(loose):
                     whole[a, b] = inertia[i, free[b]]
                     right[a] += inertia[i, free[b]] * state.speed[free[b]]
@@ -288,6 +339,15 @@ def advance(
                     for b in range(loose):
                         whole[a, b] += h * weight * along * contacts.along[g, free[b]]
                 without[g] = prescribed
+            for g in range(servos):
+                weight, prescribed = weights[g] * held_by[g], 0.0
+                for k in range(len(held)):
+                    prescribed += inputs.servos.levers[g, held[k]] * ahead_speed[held[k]]
+                for a in range(loose):
+                    along = inputs.servos.levers[g, free[a]]
+                    right[a] -= h * along * weight * prescribed
+                    for b in range(loose):
+                        whole[a, b] += h * weight * along * inputs.servos.levers[g, free[b]]
             factor(whole, loose)
             solve(whole, loose, right)
             # Dry friction: what each bears at the speed that the others leave it.
@@ -364,7 +424,12 @@ def advance(
                         force += inertia[i, j] * (ahead_speed[j] - state.speed[j]) / h
                     for g in range(guides):
                         force -= contacts.along[g, i] * own[g]
-                    out[2, i, tick] = force - push[i]
+                    for g in range(servos):
+                        ahead = 0.0
+                        for j in range(size):
+                            ahead += inputs.servos.levers[g, j] * ahead_speed[j]
+                        force += inputs.servos.levers[g, i] * weights[g] * held_by[g] * ahead
+                    out[2, i, tick] = force - pushed[i]
             for i in range(size):
                 state.before[i] = state.speed[i]
                 state.speed[i] = ahead_speed[i]

@@ -22,6 +22,7 @@ from rigtwin.components.conditioning import Actuator, ActuatorState, condition
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
 from rigtwin.components.mount import give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
+from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
@@ -218,8 +219,7 @@ def integrate_pushed(
     inertia: Inertia,
     spring: float,
     start: tuple[float, float],
-    constant: float,
-    limit: float,
+    law: Push,
     drive: Actuator,
     held: ActuatorState,
     sensors: tuple[Transducer, ...],
@@ -232,7 +232,7 @@ def integrate_pushed(
     steps: int,
     out: Array,
 ) -> None:
-    """The joint under its force actuator.
+    """The joint under its force actuator or servo.
 
     Parameters
     ----------
@@ -242,8 +242,8 @@ def integrate_pushed(
         In series with the dry friction, N/m.
     start
         Position m and velocity m/s.
-    constant, limit
-        Of the actuator: N per unit of its command, and N.
+    law
+        Of what pushes it.
     drive, held
         Conditioning of its command, and its state.
     sensors, states, kinds
@@ -264,13 +264,15 @@ def integrate_pushed(
     h = period / steps
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0
+    follows, wanted, held_by = law.position_gain > 0.0, held.memory[3], 0.0
     half = 0.5 * guide.backlash
     neutral = np.array([sensor.neutral for sensor in sensors])
     share = h / (guide.relaxation + h)
     yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
     inner, speed = x, 0.0
     for tick in range(len(command)):
-        out[0, tick], out[1, tick], out[2, tick] = x, v, force
+        out[0, tick], out[1, tick] = x, v
+        out[2, tick] = push(law, wanted, x, v) if follows else force
         if loop.closed:
             for number in range(len(loop.sensor)):
                 which = loop.sensor[number]
@@ -284,10 +286,17 @@ def integrate_pushed(
                     loop.registers[number] = sensed + loop.noise[tick, number]
             command[tick] = run(loop.program, loop.registers, loop.memory, period)
         for _ in range(steps):
-            earlier = force
-            force = min(max(constant * condition(drive, held, command[tick]), -limit), limit)
-            if yields:
+            if follows:
+                before, wanted = wanted, condition(drive, held, command[tick])
+                pushed, held_by = pull(law, 0.5 * (before + wanted), x), law.damping_gain
+                if abs(pushed - held_by * v) > law.limit:
+                    # At its limit a servo damps nothing.
+                    pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
+            else:
+                earlier = force
+                force = push(law, condition(drive, held, command[tick]), x, v)
                 pushed = 0.5 * (earlier + force)
+            if yields:
                 place, slider, viscous, held_back = give_way(
                     guide=guide,
                     dry_friction=dry_friction,
@@ -304,23 +313,23 @@ def integrate_pushed(
                 )
                 speed, inner = (place - inner) / h, place
                 load = pushed + besides[tick] - gravity(inertia, x) - held_back
-                v += h * load / inertia.mass
+                v = (v + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
                 x += h * v
                 continue
             coefficient = damping(guide, v)
             # About this position half a step passes under the old force and half under the new one.
             load = (
-                0.5 * (earlier + force)
+                pushed
                 + besides[tick]
                 - gravity(inertia, x)
                 - position_force(guide, x, inertia.rest)
                 - (1.0 - share) * viscous
             )
-            damped = h * (share * coefficient + guide.drag * abs(v))
+            damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
             ahead = max(0.5, 1.0 - inertia.mass / damped) if damped > 0.0 else 0.5
             total = inertia.mass + ahead * damped
             rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
-            forward, backward = dry_limits(dry_friction, v, 0.5 * (earlier + force))
+            forward, backward = dry_limits(dry_friction, v, pushed)
             velocity = rhs / total
             apart = x + h * velocity - slider
             if apart > half or apart < -half:

@@ -10,11 +10,11 @@ import numpy as np
 
 from controllers.formula import formula
 from rigtwin.components import (
-    UNLIMITED,
-    ForceActuator,
+    PUSHERS,
     Guide,
     PositionActuator,
     PositionSensor,
+    Pusher,
     measures,
 )
 from rigtwin.components.conditioning import actuator, hold
@@ -22,6 +22,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import Sensor, apply_sensor, start_transducer, transducer
+from rigtwin.components.servo import push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
@@ -275,7 +276,7 @@ class JointModel:
         if force is None and shift is None and key in self._last:
             return self._last[key]
         mover = getattr(plant, self._mover.name)
-        if isinstance(mover, ForceActuator):
+        if isinstance(mover, PUSHERS):
             out = self._integrate_pushed(
                 plant, mover, np.zeros(len(self._command)) if force is None else force
             )
@@ -338,14 +339,14 @@ class JointModel:
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _integrate_pushed(
-        self, plant: Plant, mover: ForceActuator, besides: Array, noise: Array | None = None
+        self, plant: Plant, mover: Pusher, besides: Array, noise: Array | None = None
     ) -> Array:
-        """The joint under its force actuator, from where it starts. besides: another force on it,
+        """The joint under its actuator, from where it starts. besides: another force on it,
         N, shape (ticks,); noise: of what a controller reads, shape (ticks, inputs)."""
         return self._prepare_pushed(plant, mover, noise)(self._start_of(plant), besides)
 
     def _prepare_pushed(
-        self, plant: Plant, mover: ForceActuator, noise: Array | None = None
+        self, plant: Plant, mover: Pusher, noise: Array | None = None
     ) -> Callable[[Start, Array], Array]:
         """The same from any start, as a function of it and the other force."""
         guide, inertia = self._parts(plant)
@@ -366,8 +367,7 @@ class JointModel:
                 inertia=inertia,
                 spring=spring,
                 start=start,
-                constant=mover.constant,
-                limit=min(mover.force_limit, UNLIMITED),
+                law=push_law(mover),
                 drive=conditioning,
                 held=hold(conditioning, float(self._command[0])),
                 sensors=models,
@@ -461,7 +461,7 @@ class JointModel:
 
     @property
     def _free(self) -> bool:
-        return isinstance(getattr(self._machine.plant, self._mover.name), ForceActuator)
+        return isinstance(getattr(self._machine.plant, self._mover.name), PUSHERS)
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
         moved = self.move(plant)

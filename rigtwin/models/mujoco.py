@@ -14,12 +14,13 @@ import mujoco
 import numpy as np
 
 from controllers.formula import run as run_formula
-from rigtwin.components import UNLIMITED, ForceActuator, Guide, measures
+from rigtwin.components import Guide, Pusher, measures
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
 from rigtwin.components.mount import give_way
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import start_transducer, transduce, transducer
+from rigtwin.components.servo import pull, push, push_law
 from rigtwin.models.guided import Inertia
 from rigtwin.models.joint import JointModel
 from rigtwin.models.start import Start
@@ -135,12 +136,12 @@ class MujocoModel(JointModel):
     def _integrate_pushed(
         self,
         plant: Plant,
-        mover: ForceActuator,
+        mover: Pusher,
         besides: Array,
         noise: Array | None = None,
         start: Start | None = None,
     ) -> Array:
-        """The joint under its force actuator."""
+        """The joint under its force actuator or servo."""
         h = self._period / self._steps
         model, data, place, at = self._mechanics(plant, h)
         guide, inertia = self._parts(plant)
@@ -148,19 +149,27 @@ class MujocoModel(JointModel):
         passive = _Passive(guide, h, inertia, float(data.qpos[place]))
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))
-        limit = min(mover.force_limit, UNLIMITED)
+        law, wanted = push_law(mover), float(held.memory[3])
+        follows = law.position_gain > 0.0
         out, force = np.zeros((4, len(besides))), 0.0
         loop = self._reader(plant)
         for tick in range(len(besides)):
-            out[0, tick], out[1, tick], out[2, tick] = data.qpos[place], data.qvel[at], force
-            command = loop(tick, float(data.qpos[place]), float(data.qvel[at]))
+            x, v = float(data.qpos[place]), float(data.qvel[at])
+            out[0, tick], out[1, tick] = x, v
+            out[2, tick] = push(law, wanted, x, v) if follows else force
+            command = loop(tick, x, v)
             out[3, tick] = command
             for _ in range(self._steps):
-                pushed = mover.constant * condition(drive, held, command)
-                force = min(max(pushed, -limit), limit)
-                load = force + float(besides[tick])
-                passive.act(model, data, at, float(data.qpos[place]), float(data.qvel[at]), force)
-                data.qfrc_applied[at] += load
+                x, v = float(data.qpos[place]), float(data.qvel[at])
+                wanted, held_by = condition(drive, held, command), 0.0
+                force = push(law, wanted, x, v)
+                if follows and abs(force) < law.limit:
+                    force, held_by = pull(law, wanted, x), law.damping_gain
+                model.dof_damping[at] = 0.0
+                passive.act(model, data, at, x, v, force)
+                # MuJoCo's own damping is implicit.
+                model.dof_damping[at] += held_by
+                data.qfrc_applied[at] += force + float(besides[tick])
                 mujoco.mj_step(model, data)
         return out
 

@@ -1,0 +1,209 @@
+"""Servos: their law beside MuJoCo's own position actuators, alone and where joints act on each
+other; what is other about one is found in data of plain MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import rigtwin
+from rigtwin.components import Servo
+from rigtwin.components.servo import push, push_law
+from rigtwin.errors import RigtwinError
+from rigtwin.models.choose import model_of
+from rigtwin.models.mujoco import MujocoModel
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+
+ARM = """
+<mujoco>
+  <option gravity="0 0 -9.81" timestep="1.25e-4" integrator="implicitfast"/>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 1 0" damping="0.05"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.6"/>
+      {forearm}
+    </body>
+  </worldbody>
+  <actuator>
+    <position name="shoulder_servo" joint="shoulder" kp="{kp}" kv="{kv}" {limit}/>
+    {elbow}
+  </actuator>
+  <sensor><jointpos name="shoulder_angle" joint="shoulder"/>{elbow_sensor}</sensor>
+</mujoco>
+"""
+FOREARM = """<body name="lower" pos="0 0 -0.3">
+  <joint name="elbow" axis="0 1 0" damping="0.03"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.25" size="0.02" mass="0.3"/>
+</body>"""
+ELBOW = '<position name="elbow_servo" joint="elbow" kp="6" kv="0.4"/>'
+ELBOW_SENSOR = '<jointpos name="elbow_angle" joint="elbow"/>'
+ONE = """
+[machine]
+name = "servo-arm"
+title = "an arm on a servo"
+model = "arm.xml"
+nominal = "known"
+[components]
+arm = { body = "upper", effects = [] }
+bearing = { joint = "shoulder", effects = ["coulomb", "viscous"] }
+servo = { actuator = "shoulder_servo", type = "servo", command = "shoulder" }
+encoder = { sensor = "shoulder_angle", channel = "shoulder", white = 1e-4, effects = [] }
+[[replays]]
+name = "held"
+moved_by = "servo"
+observe = ["encoder"]
+"""
+TWO = """
+[machine]
+name = "servo-arm"
+title = "an arm on two servos"
+model = "arm.xml"
+nominal = "known"
+[components]
+shoulder = { joint = "shoulder", effects = ["coulomb"] }
+elbow = { joint = "elbow", effects = [] }
+shoulder_servo = { actuator = "shoulder_servo", type = "servo", command = "shoulder", effects = ["position_gain", "damping_gain", "delay"] }
+elbow_servo = { actuator = "elbow_servo", type = "servo", command = "elbow", effects = ["position_gain"] }
+shoulder_encoder = { sensor = "shoulder_angle", channel = "shoulder", white = 1e-4, effects = [] }
+elbow_encoder = { sensor = "elbow_angle", channel = "elbow", white = 1e-4, effects = [] }
+[[replays]]
+free = ["shoulder", "elbow"]
+moved_by = ["shoulder_servo", "elbow_servo"]
+observe = ["shoulder_encoder", "elbow_encoder"]
+"""
+PERIOD, DURATION = 2e-3, 8.0
+
+
+def model_text(two: bool, kp: float = 20.0, kv: float = 1.0, limit: float = 0.0) -> str:
+    return ARM.format(
+        kp=kp,
+        kv=kv,
+        limit=f'forcerange="-{limit} {limit}"' if limit else "",
+        forearm=FOREARM if two else "",
+        elbow=ELBOW if two else "",
+        elbow_sensor=ELBOW_SENSOR if two else "",
+    )
+
+
+def machine_in(folder: Path, toml: str, text: str) -> rigtwin.Machine:
+    (folder / "arm.xml").write_text(text)
+    (folder / "arm.toml").write_text(toml)
+    return rigtwin.machine(folder / "arm.toml")
+
+
+def commanded(time: Array) -> dict[str, Array]:
+    return {
+        "shoulder": 0.5 * np.sin(2.1 * time) + 0.2 * np.sign(np.sin(3.7 * time)),
+        "elbow": 0.6 * np.sin(1.7 * time + 0.4) + 0.1 * np.sign(np.sin(2.9 * time)),
+    }
+
+
+def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
+    """What MuJoCo's own actuators do."""
+    model = mujoco.MjModel.from_xml_string(text)
+    data, joints = mujoco.MjData(model), ("shoulder", "elbow")[: model.nu]
+    time = np.arange(round(DURATION / PERIOD)) * PERIOD
+    commands = {name: commanded(time)[name] for name in joints}
+    places = np.zeros((len(joints), len(time)))
+    fine = round(PERIOD / model.opt.timestep)
+    for tick in range(len(time)):
+        places[:, tick] = data.qpos
+        data.ctrl[:] = [commands[name][tick] for name in joints]
+        mujoco.mj_step(model, data, fine)
+    random = np.random.default_rng(seed)
+    places += noise * random.standard_normal(places.shape)
+    sensors = dict(zip(joints, places, strict=True))
+    return Recording(
+        path=Path("arm.mcap"),
+        machine="servo-arm",
+        experiment="steps and sines",
+        period=PERIOD,
+        time=time,
+        columns={"/command": commands, "/sensor": sensors},
+        controller={},
+    )
+
+
+def predict(machine: rigtwin.Machine, recording: Recording) -> dict[str, Array]:
+    configuration = machine.configuration_of(recording)
+    model = model_of(machine, recording, configuration, 16)
+    rows = model.predict(machine.plant)
+    return {row.channel[1]: each for row, each in zip(model.rows, rows, strict=True)}
+
+
+def test_a_servo_pushes_by_its_error_less_its_damping_up_to_its_limit() -> None:
+    law = push_law(Servo(position_gain=100.0, damping_gain=2.0, force_limit=5.0, deadband=0.01))
+    assert push(law, 0.03, 0.0, 0.5) == pytest.approx(100.0 * (0.03 - 0.01) - 1.0)
+    assert push(law, 0.005, 0.0, 0.0) == 0.0
+    assert push(law, 1.0, 0.0, 0.0) == 5.0
+    assert push(law, -1.0, 0.0, 0.0) == -5.0
+
+
+@pytest.mark.parametrize("limit", [0.0, 2.0])
+@pytest.mark.parametrize("two", [False, True], ids=["alone", "coupled"])
+def test_prediction_is_that_of_mujocos_own_position_actuators(
+    tmp_path: Path, two: bool, limit: float
+) -> None:
+    text = model_text(two, limit=limit)
+    recording = recorded(text, noise=0.0)
+    machine = machine_in(tmp_path, TWO if two else ONE, text)
+    for name, found in predict(machine, recording).items():
+        true = recording["/sensor." + name]
+        assert np.sqrt(np.mean((found - true) ** 2)) < 0.002 * np.std(true)
+
+
+def test_the_joint_alone_goes_as_in_mujoco_and_so_does_its_twin(tmp_path: Path) -> None:
+    text = model_text(two=False, limit=2.0)
+    recording = recorded(text, noise=0.0)
+    machine = machine_in(tmp_path, ONE, text)
+    (replay,) = machine.replays
+    reference = MujocoModel(machine, replay, recording, machine.configuration, 16)
+    found = reference.predict(machine.plant)[0]
+    assert np.std(found - recording["/sensor.shoulder"]) < 0.002 * np.std(found)
+    demanded = {"shoulder": commanded(recording.time)["shoulder"]}
+    twin = rigtwin.run(machine, lambda *_: demanded, settings={"timing": {"period": PERIOD}})
+    assert np.std(twin["/sensor.shoulder"] - found) < 0.002 * np.std(found) + 2e-4
+
+
+CHANGED: Mapping[str, tuple[Callable[[], str], str, float]] = {
+    "position_gain": (lambda: model_text(two=False, kp=15.0), "position_gain", 15.0),
+    "damping_gain": (lambda: model_text(two=False, kv=1.4), "damping_gain", 1.4),
+    "force_limit": (lambda: model_text(two=False, limit=3.0), "force_limit", 3.0),
+}
+
+
+@pytest.mark.parametrize("kind", list(CHANGED))
+def test_what_is_other_about_a_servo_is_found(tmp_path: Path, kind: str) -> None:
+    changed, parameter, value = CHANGED[kind]
+    # A bearing that may be anything takes the place of damping in the servo.
+    toml = ONE.replace('["coulomb", "viscous"]', '["coulomb"]')
+    machine = machine_in(tmp_path, toml, model_text(two=False))
+    answer = rigtwin.diagnose(recorded(changed()), machine=machine)
+    (found,) = answer.effects
+    assert str(found.name) == f"{kind}@servo"
+    assert found.parameters[parameter].value == pytest.approx(value, rel=0.02)
+
+
+def test_a_servo_as_told_leaves_no_gap(tmp_path: Path) -> None:
+    machine = machine_in(tmp_path, ONE, model_text(two=False))
+    assert rigtwin.diagnose(recorded(model_text(two=False)), machine=machine).verdict == "no gap"
+
+
+@pytest.mark.slow
+def test_the_gain_of_one_of_two_servos_is_found(tmp_path: Path) -> None:
+    machine = machine_in(tmp_path, TWO, model_text(two=True))
+    answer = rigtwin.diagnose(recorded(model_text(two=True, kp=15.0)), machine=machine)
+    (found,) = answer.effects
+    assert str(found.name) == "position_gain@shoulder_servo"
+    assert found.parameters["position_gain"].value == pytest.approx(15.0, rel=0.02)
+
+
+def test_an_actuator_that_is_no_servo_is_refused(tmp_path: Path) -> None:
+    text = model_text(two=False).replace('kp="20.0" kv="1.0"', 'kp="20" gear="2"')
+    with pytest.raises(RigtwinError, match="is no servo; expected a position actuator"):
+        machine_in(tmp_path, ONE, text)
