@@ -138,6 +138,15 @@ def _finite(value: float) -> float:
     return number
 
 
+def _number_of(node: ast.expr) -> float | None:
+    """The value of a number in a formula, with its sign; None of anything else."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        inner = _number_of(node.operand)
+        return None if inner is None else -inner
+    plain = isinstance(node, ast.Constant) and isinstance(node.value, int | float)
+    return float(node.value) if plain else None  # type: ignore[union-attr]
+
+
 class _Builder:
     """Registers of results are counted −1, −2, …, since how many numbers there are is known only at
     the end."""
@@ -198,6 +207,14 @@ class _Builder:
                     f"1 to {LONGEST}, not {ast.unparse(last)}"
                 )
             memory = whole + 2
+        numbers = [_number_of(each) for each in given]
+        if name == "low_pass" and numbers[1] is not None and not numbers[1] > 0.0:
+            raise ValueError(f"low_pass: expected a time constant above 0 s, not {numbers[1]:g}")
+        if name == "limit" and None not in numbers[1:] and not numbers[1] <= numbers[2]:  # type: ignore[operator]
+            raise ValueError(
+                f"limit: expected a lower limit below the upper one, not {numbers[1]:g} and "
+                f"{numbers[2]:g}"
+            )
         used = [self.result(each) for each in given]
         return self.operation(code, *used, *([0] * (3 - len(used))), memory=memory)
 

@@ -62,17 +62,17 @@ def check(
         assert referee.stdin is not None
         assert referee.stdout is not None
         commitment = ""
-        for line in referee.stdout:
-            word, _, rest = line.partition(" ")
-            if word == "case":
-                progress(1)
-            elif word == "commitment":
-                commitment = rest.strip()
-                break
-        if not commitment:
-            raise RigtwinError("the referee ended before it committed itself to a key")
-        (recordings / "commitment.txt").write_text(commitment + "\n")
         try:
+            for line in referee.stdout:
+                word, _, rest = line.partition(" ")
+                if word == "case":
+                    progress(1)
+                elif word == "commitment":
+                    commitment = rest.strip()
+                    break
+            if not commitment:
+                raise RigtwinError("the referee ended before it committed itself to a key")
+            (recordings / "commitment.txt").write_text(commitment + "\n")
             given = _diagnose_all(recordings, cases, workers, progress)
             settled = _run_next_tests(recordings, given, referee.stdin, referee.stdout, workers)
             crude = _crude(recordings, cases, workers) if baselines else {}

@@ -33,16 +33,11 @@ def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
     return list(parse_assignments(texts))
 
 
-def apart(out: Path, *inputs: Path) -> Path:
-    """The output's path. Raises RigtwinError if it is one of the inputs, which would be lost."""
-    if out.exists() and any(path.exists() and out.samefile(path) for path in inputs):
-        raise RigtwinError(f"{out} is the input; name another output")
-    return out
-
-
 def writable(out: Path) -> None:
     """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is
     done."""
+    if not out.name:
+        raise RigtwinError("an output without a name; expected a file")
     if out.is_dir():
         raise RigtwinError(f"cannot write {out}: it is a folder")
     if not out.parent.is_dir():

@@ -53,6 +53,32 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
 
 
+def keep_apart(out: str | Path, *inputs: Path) -> Path:
+    """A file to be written that is none of those that are read.
+
+    Parameters
+    ----------
+    out
+        Where to.
+    inputs
+        What the work is made of; what is not there counts for nothing.
+
+    Returns
+    -------
+    Path
+        The output's.
+
+    Raises
+    ------
+    RigtwinError
+        If it is one of the inputs, which would be lost.
+    """
+    path = Path(out)
+    if path.exists() and any(each.exists() and path.samefile(each) for each in inputs):
+        raise RigtwinError(f"{path} is the input; name another output")
+    return path
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """The tables of a TOML. Raises ValueError if it is none; integers have 64 bits there, and
     Python cannot even print those of thousands of digits."""

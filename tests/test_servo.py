@@ -67,10 +67,18 @@ nominal = "known"
 [components]
 shoulder = { joint = "shoulder", effects = ["coulomb"] }
 elbow = { joint = "elbow", effects = [] }
-shoulder_servo = { actuator = "shoulder_servo", type = "servo", command = "shoulder", effects = ["position_gain", "damping_gain", "delay"] }
-elbow_servo = { actuator = "elbow_servo", type = "servo", command = "elbow", effects = ["position_gain"] }
 shoulder_encoder = { sensor = "shoulder_angle", channel = "shoulder", white = 1e-4, effects = [] }
 elbow_encoder = { sensor = "elbow_angle", channel = "elbow", white = 1e-4, effects = [] }
+[components.shoulder_servo]
+actuator = "shoulder_servo"
+type = "servo"
+command = "shoulder"
+effects = ["position_gain", "damping_gain", "delay"]
+[components.elbow_servo]
+actuator = "elbow_servo"
+type = "servo"
+command = "elbow"
+effects = ["position_gain"]
 [[replays]]
 free = ["shoulder", "elbow"]
 moved_by = ["shoulder_servo", "elbow_servo"]

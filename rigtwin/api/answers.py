@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, the_machine, twin_of
+from rigtwin.api.recordings import the_recording
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -21,12 +22,15 @@ from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
+Given = reader.Recording | str | Path
+"""A recording, or the path of one."""
+
 
 def diagnose(
-    recordings: reader.Recording | Sequence[reader.Recording],
+    recordings: Given | Sequence[Given],
     *,
     machine: Machine | str | Path | None = None,
-    held_out: reader.Recording | Sequence[reader.Recording] = (),
+    held_out: Given | Sequence[Given] = (),
     settings: Settings = (),
     without: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
@@ -36,7 +40,7 @@ def diagnose(
     Parameters
     ----------
     recordings
-        One, or several that are explained together.
+        One, or several that are explained together; or their paths.
     machine
         That they are of; by default the one that they name.
     held_out
@@ -74,7 +78,7 @@ def diagnose(
 
 
 def what_changed(
-    recordings: Sequence[reader.Recording],
+    recordings: Sequence[Given],
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
@@ -116,7 +120,7 @@ def what_changed(
 
 
 def compare(
-    recording: reader.Recording,
+    recording: Given,
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
@@ -144,14 +148,13 @@ def compare(
     RigtwinError
         Naming every fault of the data that makes a comparison meaningless.
     """
+    recording = the_recording(recording)
     found = described_machine(recording, machine)
     base = twin_of(found, settings, (), effect_texts(effects))
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 
 
-def compare_recordings(
-    first: reader.Recording, second: reader.Recording
-) -> tuple[dict[str, Residual], tuple[str, ...]]:
+def compare_recordings(first: Given, second: Given) -> tuple[dict[str, Residual], tuple[str, ...]]:
     """Two recordings of one test, sensor by sensor.
 
     Parameters
@@ -168,10 +171,11 @@ def compare_recordings(
     RigtwinError
         If their periods differ or they share no sensor.
     """
+    first, second = the_recording(first), the_recording(second)
     return find_differences(machine_of(first), first, second), differences(first, second)
 
 
-def calibrate(recording: reader.Recording) -> Calibration:
+def calibrate(recording: Given) -> Calibration:
     """The friction compensator's settings that a recording of the suspension rig asks for.
 
     Parameters
@@ -184,6 +188,7 @@ def calibrate(recording: reader.Recording) -> Calibration:
     RigtwinError
         If the data are unfit, or a compensator found from them would do harm.
     """
+    recording = the_recording(recording)
     of = machine_of(recording)
     if of.structure is not Structure.QUARTER_CAR:
         raise RigtwinError(
@@ -201,11 +206,10 @@ def calibrate(recording: reader.Recording) -> Calibration:
     return found
 
 
-def _several(given: reader.Recording | Sequence[reader.Recording]) -> Iterator[reader.Recording]:
-    if isinstance(given, reader.Recording):
-        yield given
-    else:
-        yield from given
+def _several(given: Given | Sequence[Given]) -> Iterator[reader.Recording]:
+    several = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    for each in several:
+        yield the_recording(each)
 
 
 def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rigtwin.api.answers import described_machine
 from rigtwin.api.machines import Settings, twin_of
-from rigtwin.api.recordings import load
+from rigtwin.api.recordings import load, the_recording
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def look(
-    recording: reader.Recording,
+    recording: reader.Recording | str | Path,
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
@@ -53,6 +53,7 @@ def look(
     RigtwinError
         Naming every fault of the data that makes a comparison meaningless.
     """
+    recording = the_recording(recording)
     found = described_machine(recording, machine)
     return Look(found, recording, twin_of(found, settings, without))
 

@@ -42,7 +42,11 @@ def machine(name: str | Path) -> Machine:
 
 def the_machine(given: Machine | str | Path) -> Machine:
     """A machine, or the one of that name or description; raises as `machine` does."""
-    return given if isinstance(given, Machine) else machine(given)
+    if isinstance(given, Machine):
+        return given
+    if isinstance(given, str | Path):
+        return machine(given)
+    raise RigtwinError(f"{given!r:.60}: expected a machine, its name, or its description's path")
 
 
 def machines() -> dict[str, Path]:
@@ -76,9 +80,17 @@ def effects(of: Machine | str | Path) -> list[Effect]:
 
 def effect_texts(given: Effects) -> list[str]:
     """Effects as `--effect` takes them: `coulomb@rail=80`."""
-    if not isinstance(given, Mapping):
-        return list(given)
-    return [f"{name}={_values(value)}" for name, value in given.items()]
+    try:
+        if isinstance(given, Mapping):
+            return [f"{name}={_values(value)}" for name, value in given.items()]
+        texts = [given] if isinstance(given, str) else list(given)
+        if all(isinstance(each, str) for each in texts):
+            return texts
+    except (TypeError, ValueError):
+        pass
+    raise RigtwinError(
+        f"effects {given!r:.60}: expected {{'coulomb@rail': 80}}, or texts as 'coulomb@rail=80'"
+    )
 
 
 def _values(value: float | Mapping[str, float]) -> str:

@@ -14,6 +14,7 @@ from rigtwin.api.machines import Settings, machine, machine_of, twin_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 from rigtwin.importing.convert import convert
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
@@ -67,7 +68,7 @@ class Recording(reader.Recording):
         from rigtwin.render.plot import draw  # Late: matplotlib takes a second.
         from rigtwin.render.style import find_style
 
-        draw(self, Path(out), start, until, find_style(style), panels)
+        draw(self, keep_apart(out, self.path), start, until, find_style(style), panels)
         return Path(out)
 
     def video(
@@ -105,12 +106,12 @@ class Recording(reader.Recording):
             raise RigtwinError(f"a ghost's gap {ghost:g} times as large; expected 0 or more")
         if ghost:
             options["ghost"] = _ghost(self, machine, twin_of(machine, settings, ()), ghost)
-        film(self, Path(out), machine, **options)
+        film(self, keep_apart(out, self.path, *machine.files), machine, **options)
         return Path(out)
 
     def export(self, out: str | Path) -> Path:
         """Writes it as csv or mat, by the name's ending. Raises RigtwinError for any other."""
-        export.export(self, Path(out))
+        export.export(self, keep_apart(out, self.path))
         return Path(out)
 
     @property
@@ -152,7 +153,18 @@ def load(path: str | Path, of: Machine | str | Path | None = None) -> Recording:
     RigtwinError
         If it is no recording, is empty, or is of a format that this version does not read.
     """
+    if not isinstance(path, str | Path):
+        raise RigtwinError(f"{path!r:.60}: expected the path of a recording")
     return faced(reader.load(Path(path)), machine(of) if isinstance(of, str | Path) else of)
+
+
+def the_recording(given: reader.Recording | str | Path) -> reader.Recording:
+    """A recording, or the one of that path. Raises RigtwinError for anything else."""
+    if isinstance(given, reader.Recording):
+        return given
+    if isinstance(given, str | Path):
+        return load(given)
+    raise RigtwinError(f"{given!r:.60}: expected a recording, or the path of one")
 
 
 def faced(plain: reader.Recording, described: Machine | None) -> Recording:

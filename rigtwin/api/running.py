@@ -15,6 +15,7 @@ from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 from rigtwin.models.machine_twin import run_machine
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import Demands, Experiment, find_experiment
@@ -68,15 +69,24 @@ def run(
     RigtwinError
         If anything asked for is not known or not allowed, before the test starts.
     """
-    if seed < 0:
-        raise RigtwinError(f"seed {seed}: expected 0 or more")
+    if not isinstance(seed, int) or seed < 0:
+        raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
+    if controller is not None and not callable(getattr(controller, "tick", controller)):
+        raise RigtwinError(f"controller {controller!r:.60}: expected a function, or a method tick")
     on = the_machine(on)
     if not 0.0 <= effects_from < math.inf:
         raise RigtwinError(f"effects from {effects_from:g} s: expected 0 s or more")
     if effects_from and on.structure is not Structure.QUARTER_CAR:
         raise RigtwinError("effects from a time on: only of the suspension rig")
+    if effects_from and not effects:
+        raise RigtwinError(f"effects from {effects_from:g} s on: expected an effect besides")
     test = _experiment(on, experiment)
     configuration = with_changes(test.configuration, settings)
+    if effects_from and effects_from >= configuration.timing.duration:
+        raise RigtwinError(
+            f"effects from {effects_from:g} s on: the test is over at "
+            f"{configuration.timing.duration:g} s"
+        )
 
     def work(kept: Path) -> None:
         _record(
@@ -92,7 +102,7 @@ def run(
         )
 
     if path is not None:
-        work(Path(path))
+        work(keep_apart(path, *on.files))
         return faced(reader.load(Path(path)), on)
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         kept = Path(folder) / f"{test.name}-{seed}.mcap"
@@ -105,6 +115,8 @@ def _experiment(of: Machine, experiment: str | Experiment | Demanding) -> Experi
         return find_experiment(of, experiment)
     if isinstance(experiment, Experiment):
         return experiment
+    if not callable(experiment):
+        raise RigtwinError(f"experiment {experiment!r:.60}: expected a name, or a function")
     name = getattr(experiment, "__name__", "own")
     return Experiment(name, "", "", of.configuration, experiment)
 

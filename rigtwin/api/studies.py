@@ -149,6 +149,11 @@ def stability(
         For an unknown name, or a figure that no pole can be worked out for.
     """
     car = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    if not isinstance(car, QuarterCar):
+        raise RigtwinError(f"vehicle {car!r:.60}: expected a name, or a QuarterCar")
+    for name, value in {**(changes or {}), "tau": tau}.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise RigtwinError(f"{name} = {value!r:.60}: expected a number")
     for name in changes or {}:
         if name not in QuarterCar._fields:
             known = ", ".join(QuarterCar._fields)
@@ -227,7 +232,10 @@ def rths(
         For an unknown case, earthquake or compensator, or a number of plants that makes no sense.
     """
     building, law = find_case(case), find_compensator(compensator)
-    if not 1 <= plants <= MOST_PLANTS or seed < 0:
+    whole = all(isinstance(each, int) and not isinstance(each, bool) for each in (plants, seed))
+    if not isinstance(noise, Noise):
+        raise RigtwinError(f"noise {noise!r:.60}: expected a Noise of position and force, V")
+    if not whole or not 1 <= plants <= MOST_PLANTS or seed < 0:
         raise RigtwinError(
             f"--plants {plants} --seed {seed}: expected 1 to {MOST_PLANTS}, 0 or more"
         )

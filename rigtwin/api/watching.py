@@ -72,6 +72,8 @@ def watch(
     """
     if not STEP <= step <= WINDOW - WARM:
         raise RigtwinError(f"steps of {step:g} s; expected {STEP:g} to {WINDOW - WARM:g} s")
+    if not patience > 0.0:
+        raise RigtwinError(f"a patience of {patience:g} s; expected more than 0 s")
     growing = GrowingRecording(Path(path), WINDOW + step)
     watching, looked = None, time.monotonic()
     while not stop():

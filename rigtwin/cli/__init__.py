@@ -94,6 +94,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Also while packages are imported.
         _say("interrupted")
         return 130
+    except ImportError as error:
+        # Compiled packages make another error of it.
+        if not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise
+        _say("interrupted")
+        return 130
 
 
 def _main(arguments: Sequence[str] | None) -> int:

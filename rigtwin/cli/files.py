@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
-from rigtwin.console import apart
 from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 
 OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf")
 """Options that name a file to be written."""
@@ -16,17 +17,29 @@ OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf"
 def check_files(parsed: argparse.Namespace) -> None:
     """Raises RigtwinError if writing one of a command's files would lose another."""
     given = vars(parsed)
-    outputs = {
-        name: path for name in OUTPUTS if isinstance(path := given.get(name), Path) and path.name
-    }
+    outputs = {name: path for name in OUTPUTS if isinstance(path := given.get(name), Path)}
     read = [value for name, value in given.items() if name not in outputs]
     inputs = [path for value in read for path in _files(value)]
+    if any(path.exists() for path in outputs.values()):
+        inputs += _machine_files(given.get("machine"))
     seen: dict[Path, str] = {}
     for name, path in outputs.items():
         option = f"--{name.replace('_', '-')}"
-        apart(path, *inputs)
+        keep_apart(path, *inputs)
         if (other := seen.setdefault(path.resolve(), option)) != option:
             raise RigtwinError(f"{other} and {option} are both {path}; one would be lost")
+
+
+def _machine_files(name: object) -> tuple[Path, ...]:
+    """What a machine is read from, so far as it can be read: who works with it says what is
+    wrong."""
+    if not isinstance(name, str):
+        return ()
+    from rigtwin.description import catalogue  # Late: MuJoCo takes a second.
+
+    with suppress(RigtwinError):
+        return catalogue.find(name).files
+    return ()
 
 
 def _files(value: object) -> Iterator[Path]:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.cli.options import add_machine, add_settings, settings_of
-from rigtwin.console import apart, writable
+from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 
 if TYPE_CHECKING:
     from rigtwin.looking.live import LivePage
@@ -60,7 +61,9 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.live and parsed.diagnosis is not None:
         raise RigtwinError("--diagnosis is of a recording that is whole; not with --live")
     out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
-    writable(apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None)))
+    writable(
+        keep_apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None))
+    )
     with _page(parsed, out) as page:
         try:
             print(f"{page.url}, until Ctrl-C", flush=True)

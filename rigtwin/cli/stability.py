@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 RIG_LAG = 0.01
 """s, of the four filters (thesis §6.2)."""
 TABLE_6_2 = "quarter-car"
+DRAWN = "rig"
+"""Model whose map is drawn, unless another is named."""
 SUMMARY = "say whether a vehicle is stable on the rig with its delays, and how much delay it bears"
 MORE = "example:\n  rigtwin stability --vehicle car --tau 0.01"
 
@@ -51,9 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--model",
-        default="rig",
         metavar="NAME",
-        help="of the map: one of those in the table (default rig)",
+        help=f"of the map: one of those in the table (default {DRAWN})",
     )
     parser.add_argument(
         "--out",
@@ -84,11 +85,14 @@ def execute(parsed: argparse.Namespace) -> int:
     out = parsed.out or Path("stability.png")
     if parsed.out is not None and parsed.map is None:
         raise RigtwinError(f"-o {parsed.out}: expected --map X Y, the parameters to draw it over")
+    if parsed.model is not None and parsed.map is None:
+        raise RigtwinError(f"--model {parsed.model}: expected --map X Y, which it is drawn over")
+    model = parsed.model or DRAWN
     for path in filter(None, (out if parsed.map else None, parsed.json)):
         writable(path)
     if parsed.map:
         checked_ending(out)
-        checked_model(parsed.model)
+        checked_model(model)
         if parsed.delay:
             raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
         if parsed.map[0] == parsed.map[1]:
@@ -105,7 +109,7 @@ def execute(parsed: argparse.Namespace) -> int:
         f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
     )
     if parsed.map:
-        draw(stability_map(parsed.model, car, tau, axes[0], axes[1]), out)
+        draw(stability_map(model, car, tau, axes[0], axes[1]), out)
         print(f"drawn in {out}")
     if parsed.json is not None:
         write_json(

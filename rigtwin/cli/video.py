@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_machine, add_settings, add_stretch, settings_of
-from rigtwin.console import apart
+from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 
 SUMMARY = "film a recording: the machine moving, its signals drawn beneath"
 MORE = ""
@@ -47,8 +48,10 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
 
+    if not parsed.ghost and (parsed.set or parsed.config):
+        raise RigtwinError("--set and --config are of the twin that --ghost draws; add --ghost")
     recording = rigtwin.load(parsed.recording, parsed.machine)
-    out = apart(parsed.out or parsed.recording.with_suffix(".mp4"), parsed.recording)
+    out = keep_apart(parsed.out or parsed.recording.with_suffix(".mp4"), parsed.recording)
     with tqdm(unit="frame", disable=None, desc="filming", leave=False) as bar:
 
         def progress(done: int, total: int) -> None:

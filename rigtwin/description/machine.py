@@ -15,6 +15,7 @@ from rigtwin.components.quantity import Quantity
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
+from rigtwin.description.model_checks import list_files
 from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
@@ -141,6 +142,11 @@ class Machine:
     experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
     next_tests: tuple[str, ...] = ()
     overlooked: tuple[str, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What it was read from: the description, the model and what that includes."""
+        return (self.path, *list_files(self.model))
 
     @property
     def configuration(self) -> Configuration:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from xml.parsers import expat
 
@@ -33,6 +34,11 @@ NOT_NEGATIVE = {
 }
 """Array of a model → its attribute in MJCF; MuJoCo takes them negative, and then energy comes from
 nowhere."""
+RANGES = (
+    ("actuator_ctrllimited", "actuator_ctrlrange", "ctrlrange"),
+    ("actuator_forcelimited", "actuator_forcerange", "forcerange"),
+)
+"""Arrays of a model that say whether there is a limit, and both ends of it; its attribute."""
 OWNERS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "jnt": mujoco.mjtObj.mjOBJ_JOINT,
@@ -46,6 +52,21 @@ OWNERS = {
 """How the names of a model's arrays begin → what they are of."""
 
 
+def list_files(path: Path, depth: int = DEEPEST) -> tuple[Path, ...]:
+    """An MJCF and the files that it includes, those that are there."""
+    found, parser = [path], expat.ParserCreate()
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        if tag == "include" and "file" in attributes and depth > 0:
+            found.extend(list_files(path.parent / attributes["file"], depth - 1))
+
+    parser.StartElementHandler = begin
+    # Who reads it for what is in it says what is wrong.
+    with suppress(OSError, expat.ExpatError):
+        parser.Parse(path.read_bytes() if path.is_file() else b"<none/>", True)
+    return tuple(each for each in found if each.is_file())
+
+
 def check_text(path: Path) -> None:
     """Raises RigtwinError for an MJCF that asks for more than any machine needs: compiling it would
     take for ever or all memory."""
@@ -53,6 +74,8 @@ def check_text(path: Path) -> None:
 
 
 def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
+    if path.exists() and not path.is_file():
+        raise RigtwinError(f"model {root}: it includes {path}; expected a file")
     try:
         text = path.read_bytes()
     except OSError:
@@ -131,6 +154,15 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
             raise RigtwinError(
                 f"model {path}: {_owner(model, name, place)} is {values[place]}; "
                 "expected a finite number"
+            )
+    for limited, limits, attribute in RANGES:
+        pairs = getattr(model, limits)
+        wrong = np.flatnonzero(getattr(model, limited).astype(bool) & ~(pairs[:, 0] < pairs[:, 1]))
+        if len(wrong):
+            low, high = pairs[wrong[0]]
+            raise RigtwinError(
+                f"model {path}: {attribute} of {_element(model, limits, int(wrong[0]))} is "
+                f"{low:g} {high:g}; expected the lower end first"
             )
     for name, attribute in NOT_NEGATIVE.items():
         values = np.atleast_1d(getattr(model, name))

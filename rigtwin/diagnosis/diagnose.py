@@ -160,11 +160,7 @@ def _diagnose(
     found = attribute(evidence, lambda steps: progress("fitting effects", steps), thresholds)
     if held_out is not None:
         found = prefer_held_out(found, evidence, held_out, thresholds)
-    best = (
-        found.best.fit
-        if found.best is not None
-        else Fit((), (), found.nothing.misfit, (), evidence.plant)
-    )
+    best = found.best.fit if found.best is not None else _nothing(found, evidence)
     stops = [
         *find_stops(evidence.machine, evidence.recordings),
         *find_cut_commands(evidence.machine, evidence.recordings),
@@ -180,12 +176,20 @@ def _diagnose(
     plant = with_effects(evidence.plant, best, validation.kept)
     progress("looking where", 1)
     disturbed = locate_disturbance(evidence, plant, validation.kept, follow=found.unknown)
-    left = best.misfit if validation.kept == best.effects else found.nothing.misfit
     something = (
         found.unknown
         or bool(validation.rejected)
-        or (left - disturbed[0].misfit) > thresholds.something * found.expected
+        or disturbed[0].gained > thresholds.something * found.expected
     )
+    most = (1.0 + thresholds.unexplained) * found.expected
+    if something and (instead := _find_instead(evidence, validation.kept, most)):
+        names = " and ".join(effect.name for effect in validation.kept)
+        notes.append(
+            f"{names} not named: something without a name at {instead[0].component} explains "
+            "these data without it"
+        )
+        best, plant, disturbed = _nothing(found, evidence), evidence.plant, instead
+        validation = validate(evidence, best, held_out, thresholds)
     deviations = _deviations(evidence)
     slight = [
         each
@@ -263,6 +267,24 @@ def _diagnose(
         _alternatives(found, validation.kept, thresholds.possible),
         held_out,
     )
+
+
+def _nothing(found: Attribution, evidence: Evidence) -> Fit:
+    """That nothing is named."""
+    return Fit((), (), found.nothing.misfit, (), evidence.plant)
+
+
+def _find_instead(
+    evidence: Evidence, kept: Sequence[Effect], most: float
+) -> tuple[DisturbanceFit, ...] | None:
+    """What explains a known machine without the effects that would be named beside something else:
+    something at the component of one of them alone, up to a χ² of `most`. Then they only have a
+    part of its form, as an offset has of a drift. None if nothing does."""
+    if not kept or evidence.machine.rough:
+        return None
+    alone = locate_disturbance(evidence, evidence.plant)
+    at_one = alone[0].component in {effect.component for effect in kept}
+    return alone if at_one and alone[0].misfit < most else None
 
 
 def _alternatives(

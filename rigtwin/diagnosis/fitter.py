@@ -408,6 +408,21 @@ class Fitter:
             )
         )
 
+    def has_shape_at_end(self, fit: Fit) -> bool:
+        """Whether a parameter other than an effect's magnitude stands at the end of the range that
+        it is searched in: then the effect only resembles what is there. A phase has no end."""
+        low, high = self.bounds(fit.effects)
+        names = [(n, name) for e in fit.effects for n, name in enumerate(e.kind.parameters)]
+        values = np.concatenate([np.asarray(each) for each in fit.values])
+        return any(
+            place > 0
+            and not name.endswith("phase")
+            and np.any((ends != 0.0) & (np.abs(value - ends) <= AT_BOUND * np.abs(ends)))
+            for (place, name), value, ends in zip(
+                names, values, np.stack([low, high], axis=1), strict=True
+            )
+        )
+
     def predict_without(self, fit: Fit) -> list[tuple[float, tuple[Effect, ...], Values]]:
         """What a fit would leave without each of its effects, the others taken anew, to first
         order.

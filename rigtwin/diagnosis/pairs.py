@@ -83,6 +83,7 @@ def fit_pairs(search: Search, nothing: Fit, tried: Sequence[Fit]) -> list[Fit]:
         for pair in (*settled, *others)
         if first.misfit - pair.misfit > least_more
         and not within_tolerance(pair, evidence, thresholds)
+        and not search.fitter.has_shape_at_end(pair)
     ]
 
 

@@ -24,17 +24,22 @@ PRICE = 20.0
 """Of each disturbance, in χ²."""
 ROUNDS = 4
 """Times that a disturbance is fitted anew at what was found."""
+SETTLING, UNMOVED = 2, 0.05
+"""Times that the tolerances are taken anew, and half widths by which none may have moved for it to
+end."""
 FOLLOWED = 6
 """Components that are fitted so; those that come last at first stay there."""
 
 
 @dataclass(frozen=True)
 class DisturbanceFit:
-    """How well a component, disturbed freely, explains the evidence. misfit: χ²; forms: what the
-    disturbance goes with, the strongest first."""
+    """How well a component, disturbed freely, explains the evidence. misfit: χ²; gained: by how
+    much that is less than without, at a price for each form; forms: what the disturbance goes with,
+    the strongest first."""
 
     component: str
     misfit: float
+    gained: float
     forms: tuple[str, ...]
 
 
@@ -69,12 +74,14 @@ class _Disturbance:
             for each, forms in zip(self._evidence.models, self._forms, strict=True)
         ]
 
-    def fit(self, space: Space, rounds: int) -> tuple[float, Array, Array]:
-        """Gauss-Newton: misfit, strengths, and what would be missing without each form."""
+    def fit(self, space: Space, rounds: int) -> tuple[float, float, Array]:
+        """Gauss-Newton: misfit without it and with it, and what would be missing without each
+        form."""
         here = np.zeros(len(self.names))
         predicted = self.predict(here)
         residual = self._evidence.residual_of(predicted)
-        misfit, worth = space.misfit(residual), np.zeros_like(here)
+        without = misfit = space.misfit(residual)
+        worth = np.zeros_like(here)
         for _ in range(rounds):
             columns = []
             for number in range(len(here)):
@@ -99,16 +106,31 @@ class _Disturbance:
             worth = here**2 / np.diag(np.linalg.inv(normal))
             if gained < 0.02 * misfit:
                 break
-        return misfit, here, worth
+        return without, misfit, worth
 
 
 def locate_disturbance(
     evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True
 ) -> tuple[DisturbanceFit, ...]:
-    """Every component disturbed freely, the one that explains most first. plant: with the effects
-    that are known already; follow: fit the foremost anew at what was found, as large disturbances
-    need."""
-    space = Space(evidence, plant, None, effects)
+    """Every component disturbed freely.
+
+    Parameters
+    ----------
+    evidence
+        The recordings.
+    plant
+        With the effects that are known already.
+    effects
+        These effects.
+    follow
+        Whether to fit the foremost anew at what was found, as large disturbances need.
+
+    Returns
+    -------
+    tuple of DisturbanceFit
+        The one that explains most first.
+    """
+    plant, space = _use_tolerances(evidence, plant, effects)
     disturbances = [
         _Disturbance(component, evidence, plant) for component in evidence.models[0].components()
     ]
@@ -126,10 +148,28 @@ def locate_disturbance(
     return tuple(found)
 
 
+def _use_tolerances(
+    evidence: Evidence, plant: Plant, effects: Sequence[Effect]
+) -> tuple[Plant, Space]:
+    """The plant that uses its mechanical tolerances, and the tolerances about it: what they do is
+    not linear, and the rest of it would be taken for a disturbance, or hide one."""
+    mechanical = np.array([each.mechanical for each in evidence.machine.tolerances], bool)
+    used, space = np.zeros(len(mechanical)), Space(evidence, plant, None, effects)
+    found = plant
+    for _ in range(SETTLING):
+        wanted = np.where(mechanical, space.estimate_tolerances(evidence.residual(found)), 0.0)
+        if np.max(np.abs(wanted - used), initial=0.0) < UNMOVED:
+            break
+        used, found = wanted, evidence.shift(plant, wanted.tolist())
+        space = Space(evidence, found, used, effects)
+    return found, space
+
+
 def _fit_component(disturbance: _Disturbance, space: Space, rounds: int) -> DisturbanceFit:
-    misfit, _, worth = disturbance.fit(space, rounds)
+    without, misfit, worth = disturbance.fit(space, rounds)
     order = np.argsort(-worth)
     forms = tuple(
         dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE)
     )
-    return DisturbanceFit(disturbance.component, misfit + PRICE * len(disturbance.names), forms)
+    priced = misfit + PRICE * len(disturbance.names)
+    return DisturbanceFit(disturbance.component, priced, without - priced, forms)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
@@ -29,6 +30,8 @@ from rigtwin.recording import Writer
 
 BLOCK = 10_000
 """Ticks written at a time."""
+LARGEST = 1e15
+"""What no channel reaches, in SI units."""
 Channels = Mapping[tuple[str, str], Array]
 """(Topic, field) → shape (ticks,)."""
 
@@ -55,6 +58,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     RigtwinError
         Before anything is written.
     """
+    keep_apart(out, *data, map_path)
     wanted = load(map_path)
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one, they are told by it")
@@ -216,12 +220,18 @@ def _values(name: str, source: Source, signals: Signals, time: Array, period: fl
     """A channel, shape (ticks,)."""
     if source.constant is not None:
         return np.full(len(time), source.constant)
-    if source.formula is None:
-        return source.sign * source.scale * signals[name] + source.offset
-    values = evaluate(source.formula, signals, period)
-    if not np.isfinite(values).all():
-        when = time[int(np.argmax(~np.isfinite(values)))] - time[0]
-        raise RigtwinError(f"{name} = {source.formula.text} is not a number at {when:g} s")
+    with np.errstate(over="ignore"):
+        if source.formula is None:
+            values = source.sign * source.scale * signals[name] + source.offset
+        else:
+            values = evaluate(source.formula, signals, period)
+    if (beyond := ~(np.abs(values) < LARGEST)).any():
+        when = time[int(np.argmax(beyond))] - time[0]
+        text = f" = {source.formula.text}" if source.formula is not None else ""
+        raise RigtwinError(
+            f"{name}{text} is {values[beyond][0]:g} at {when:g} s; expected numbers below "
+            f"{LARGEST:g}"
+        )
     return values
 
 

@@ -185,6 +185,8 @@ def _time_columns(given: object) -> tuple[str, ...]:
     if isinstance(given, str):
         return (given,)
     if isinstance(given, list) and given and all(isinstance(each, str) for each in given):
+        if len(set(given)) < len(given):
+            raise RigtwinError(f"[time] column = {given}: one stands there twice")
         return tuple(given)
     raise RigtwinError(f"[time] column = {given}: expected a name, or a date's and a time's")
 

@@ -23,9 +23,10 @@ def read_json(path: Path) -> Columns:
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     try:
         if path.suffix.lower() == ".json":
-            content = json.loads(text)
+            content = json.loads(text, object_pairs_hook=_once)
         else:
-            content = [json.loads(line) for line in text.splitlines() if line.strip()]
+            lines = [line for line in text.splitlines() if line.strip()]
+            content = [json.loads(line, object_pairs_hook=_once) for line in lines]
     except (ValueError, RecursionError) as error:
         raise RigtwinError(f"{path} is not valid JSON: {error}") from None
     records = _find_records(content)
@@ -42,6 +43,16 @@ def read_json(path: Path) -> Columns:
         columns = {name: value for name, value in lists.items() if len(value) == longest}
         return _of_cells(columns, "JSON, a list a column", ())
     raise RigtwinError(f"{path}: expected records or lists of numbers; it holds neither")
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose keys are all different. Raises ValueError for another, of which JSON does not
+    say what it means."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r} stands there twice")
+    return found
 
 
 def _find_records(content: Any) -> Sequence[Mapping[str, Any]] | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rigtwin.diagnosis.finding import VERDICTS
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.look import Look
 from rigtwin.watching import Alarm
@@ -76,12 +77,14 @@ def read_answer(path: str | Path, look: Look) -> Given:
         document = json.loads(Path(path).read_text())
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
     try:
         machine, recordings = str(document["machine"]), [str(r) for r in document["recordings"]]
         sentence = str(document["sentence"])
         found = [_finding(each) for each in document["effects"]]
+        if document["verdict"] not in VERDICTS:
+            raise ValueError
     except (KeyError, TypeError, ValueError, AttributeError):
         raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
     if machine != look.machine.name:
@@ -93,6 +96,10 @@ def read_answer(path: str | Path, look: Look) -> Given:
         raise RigtwinError(
             f"{path} is a diagnosis of {', '.join(recordings) or 'no recording'}; expected {name}"
         )
+    possible = {each.name for each in look.machine.effects()}
+    for effect, _, _ in found:
+        if effect not in possible and not effect.endswith("@controller"):
+            raise RigtwinError(f"{path}: {machine} can have no {effect}")
     values = {
         effect: tuple(of[each] for each in look.effects[effect].kind.parameters)
         for effect, of, _ in found

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import io
 import socket
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from http import HTTPStatus
+from typing import Any
 
 import viser
+import websockets.asyncio.server as sockets
 
 from rigtwin.errors import RigtwinError
 
@@ -61,7 +65,7 @@ def open_server(port: int, label: str) -> LocalServer:
                 f"no page on port {port}: {error.strerror}; 0 takes a free one"
             ) from None
         free = int(probe.getsockname()[1])
-    with redirect_stdout(io.StringIO()):
+    with redirect_stdout(io.StringIO()), _for_its_own_pages():
         server = LocalServer(host=HOST, port=free, label=label, verbose=False)
     if server.get_port() != free:
         stop_server(server)
@@ -69,6 +73,33 @@ def open_server(port: int, label: str) -> LocalServer:
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     _light(server)
     return server
+
+
+@contextmanager
+def _for_its_own_pages() -> Iterator[None]:
+    """A server that is started meanwhile answers its own pages alone. Another page of the same
+    browser could otherwise read the recording and press buttons; viser has no option for that."""
+    plain = sockets.serve
+
+    def serve(
+        handler: Any, host: str, port: int, *, process_request: Callable[..., Any], **options: Any
+    ) -> Any:
+        hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
+        origins = {f"http://{each}" for each in hosts}
+
+        def answer(connection: Any, request: Any) -> Any:
+            asked, by = request.headers.get_all("Host"), request.headers.get_all("Origin")
+            if not set(asked) <= hosts or not set(by) <= origins:
+                return connection.respond(HTTPStatus.FORBIDDEN, "for pages of this server alone\n")
+            return process_request(connection, request)
+
+        return plain(handler, host, port, process_request=answer, **options)
+
+    sockets.serve = serve
+    try:
+        yield
+    finally:
+        sockets.serve = plain
 
 
 def clear(server: LocalServer) -> None:
