@@ -28,16 +28,18 @@ def advise(answer: Answer) -> tuple[str, ...]:
         missed = len(answer.not_observable)
         unseen = "; what these data could not have shown is listed below" if missed else ""
         return (f"Nothing needs to be corrected: use the twin as it is{unseen}.",)
-    said = []
-    if answer.effects:
-        said.append(
-            "Write the corrected twin with `--save-twin twin.toml`, and use it with "
-            "`--config twin.toml`."
-        )
+    keep = (
+        "Write the corrected twin with `rigtwin diagnose ... --save-twin twin.toml`, and use it "
+        "with `--config twin.toml`."
+    )
+    said = [keep] if answer.verdict == "explained" else []
     said += _tell_apart(answer)
     if unsure := [each for each in answer.effects if each.confidence < SURE]:
         names = ", ".join(f"{each.name} ({100 * each.confidence:.0f} %)" for each in unsure)
-        said.append(f"Before you rely on the less sure ones, {names}, look at their evidence.")
+        said.append(
+            f"Do not rely on the less sure ones, {names}, where the caption of their evidence says "
+            "that the data ask for much more or less than was found."
+        )
     if answer.verdict != "explained":
         said += _look_further(answer)
     elif answer.gap is not None and "held-out" not in answer.gap.held_out:
@@ -45,6 +47,8 @@ def advise(answer: Answer) -> tuple[str, ...]:
             "Give another recording of the machine with `--held-out` to see whether the correction "
             "holds there."
         )
+    if answer.verdict == "partly explained":
+        said.append(f"{keep} What is left, it leaves too.")
     return tuple(said)
 
 
@@ -53,12 +57,16 @@ def _tell_apart(answer: Answer) -> list[str]:
     if (test := answer.next_test) is not None:
         between = " from ".join(test.between[:2])
         return [f"Record `{test.command}`: that test separates {between}."]
-    return [
-        f"Of {' or '.join(str(each) for each in effect.alternatives)} these data cannot say which "
-        "it is, and the correction is as good with either. A look at the part tells, or a test in "
-        "which they differ."
+    alike = [
+        " from ".join(str(each) for each in effect.alternatives)
         for effect in answer.effects
         if len(effect.alternatives) > 1
+    ]
+    if not alike:
+        return []
+    return [
+        f"These data cannot tell {', nor '.join(alike)}; the twin is as good with either. A look at "
+        "the part tells, or a test in which they differ."
     ]
 
 
@@ -76,6 +84,6 @@ def _look_further(answer: Answer) -> list[str]:
         ]
     place = places[0]
     return [
-        f"Look at the {name_part(place.component)} for what has no name here: {place.region}; "
+        f"What has no name here shows at the {name_part(place.component)}, {place.region}: "
         f"{place.evidence}."
     ]

@@ -12,7 +12,7 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.beginnings import fit_beginnings
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.fit import Fit, is_possible, with_values, without_each
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
 from rigtwin.diagnosis.pairs import fit_pairs
@@ -149,7 +149,29 @@ def _attribute_rough(
     )
     selection = _settle(selection, final)
     chain = _nest(search.fitter, selection)
+    silent = _still_silent(search, silent, selection)
     return _conclude_rough(final, search.least, thresholds, selection, chain, silent)
+
+
+def _still_silent(
+    search: Search, silent: Sequence[Effect], selection: Selection
+) -> tuple[Effect, ...]:
+    """Of effects that do nothing at the nominal plant those that do nothing beside what was found
+    either, as a refinement of friction does where there is none."""
+    chosen = selection.chosen.fit
+    tried = {effect for each in selection.pool for effect in each.fit.effects}
+
+    def shows(effect: Effect) -> bool:
+        if effect in tried or clashes(effect, chosen.effects):
+            return True
+        if not is_possible((*chosen.effects, effect), search.coarse.plant):
+            return False
+        found = search.coarse.responses_beside(effect, chosen)
+        space = search.coarse.space
+        most = max(space.misfit(response.astype(np.float64)) for _, response in found)
+        return most >= search.thresholds.detected
+
+    return tuple(effect for effect in silent if not shows(effect))
 
 
 def _settle(selection: Selection, final: Fitter) -> Selection:

@@ -344,7 +344,7 @@ def _places(
         foremost = disturbed[0]
         share = 1.0 - (found.explained if kept else 0.0)
         words = (
-            "what is left is best described by " + enumerate_words(foremost.forms)
+            "what is left goes with " + enumerate_words(foremost.forms)
             if foremost.forms
             else "what is left has no plain form"
         )

@@ -75,8 +75,7 @@ def leftovers(
     )
     foremost = disturbed[0]
     goes_with = (
-        f"best described by {enumerate_words(foremost.forms)} of the "
-        f"{name_part(foremost.component)}"
+        f"at the {name_part(foremost.component)} it goes with {enumerate_words(foremost.forms)}"
         if foremost.forms
         else "it has no plain form"
     )

@@ -27,6 +27,10 @@ BINS = 30
 """Of what a residual is drawn against."""
 FEWEST = 12
 """Ticks that a bin must hold to be drawn."""
+AGREES = 0.1
+"""Share by which what the data ask for may differ from what was found and agree with it."""
+LONGEST_CYCLE = 10.0
+"""s of a loop that is drawn."""
 POINTS = 1500
 """Of a cloud."""
 EXTREME = 0.004
@@ -101,6 +105,40 @@ class View:
         return self.sensor.replace("_", " ")
 
 
+def _weigh(view: View) -> str:
+    """How much of the effect the data of this picture ask for."""
+    there = view.counts > COUNTS
+    step = (view.after - view.before)[there]
+    power = float(step @ step)
+    if power <= 0.0:
+        return ""
+    share = float(step @ (view.measured - view.before)[there]) / power
+    said = (
+        "as much as was found" if abs(share - 1.0) < AGREES else f"{share:.2f} times what was found"
+    )
+    return f" This recording asks for {said}."
+
+
+def _stretch(view: View, weight: Array, seconds: float) -> slice:
+    """Ticks of the stretch of that length over which a weight, shape (ticks,), is greatest."""
+    ticks = min(max(round(seconds / view.period), 2), len(view.time))
+    sums = np.concatenate([[0.0], np.cumsum(weight)])
+    start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
+    return slice(start, start + ticks)
+
+
+def _cycle(view: View) -> float:
+    """s, of one motion to and fro, from 1 to 10; of what hardly reverses 1."""
+    speed = view.motion.speed
+    turns = np.flatnonzero(np.diff(np.sign(speed - np.mean(speed))) != 0)
+    if len(turns) < 3:
+        return LOOKED_AT
+    apart = np.diff(turns) * view.period
+    # Noise about standstill reverses too; the strokes are what takes most of the time.
+    typical = float(np.sum(apart**2) / np.sum(apart))
+    return min(max(2.2 * typical, LOOKED_AT), LONGEST_CYCLE)
+
+
 def _picture(
     view: View,
     form: str,
@@ -149,7 +187,7 @@ def _against(view: View, along: Array, form: str, name: str, unit: str) -> Pictu
     caption = (
         f"What the {view.sensor_name} measured beyond the prediction without {view.effect.name}, "
         f"against the {name} of the {view.part}: the dots (averages of the data) should lie on "
-        "the solid line, which is what the effect predicts, and not on zero."
+        f"the solid line, which is what the effect predicts, and not on zero.{_weigh(view)}"
     )
     return _picture(
         view, form, (f"{name}", unit), (f"{view.sensor_name}, residual", view.unit), curves, caption
@@ -173,12 +211,9 @@ def _by_acceleration(view: View) -> Picture:
 
 
 def _loop(view: View) -> Picture:
-    """Force against displacement in the second that the effect changes most."""
-    ticks = min(max(round(LOOKED_AT / view.period), 2), len(view.time))
+    """Force against displacement in the stroke to and fro that the effect changes most."""
     change = (view.counts > COUNTS) * (view.after - view.before) ** 2
-    sums = np.concatenate([[0.0], np.cumsum(change)])
-    start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
-    part = slice(start, start + ticks)
+    part = _stretch(view, change, _cycle(view))
     signals = {"measured": view.measured, "before": view.before, "after": view.after}
     length = "rad" if view.angular else "m"
     if view.kind == "force":
@@ -194,9 +229,9 @@ def _loop(view: View) -> Picture:
             Curve(role, signal[part], view.motion.force[part]) for role, signal in signals.items()
         ]
     caption = (
-        f"Force against displacement, {view.time[start]:.2f} to {view.time[part][-1]:.2f} s: the "
+        f"Force against displacement, {view.time[part][0]:.2f} to {view.time[part][-1]:.2f} s: the "
         f"loop with {view.effect.name} should lie on the measured one, the one without it should "
-        "not."
+        f"not.{_weigh(view)}"
     )
     return _picture(view, "loop", x, y, curves, caption)
 
@@ -255,7 +290,7 @@ def _line(view: View) -> Picture:
     caption = (
         f"The {view.sensor_name} as measured against the prediction without {view.effect.name}: "
         "were that right, the points would lie on the dashed diagonal; with the effect the "
-        "prediction lies where the data do."
+        f"prediction lies where the data do.{_weigh(view)}"
     )
     return _picture(
         view,
@@ -313,11 +348,7 @@ def _told_amplitude(effect: Finding) -> tuple[float, float] | None:
 
 def _by_time(view: View) -> Picture:
     """Measured and predicted in the second in which the prediction without it is worst."""
-    ticks = min(max(round(LOOKED_AT / view.period), 2), len(view.time))
-    power = (view.counts > COUNTS) * (view.measured - view.before) ** 2
-    sums = np.concatenate([[0.0], np.cumsum(power)])
-    start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
-    part = slice(start, start + ticks)
+    part = _stretch(view, (view.counts > COUNTS) * (view.measured - view.before) ** 2, LOOKED_AT)
     curves = [
         Curve("measured", view.time[part], view.measured[part]),
         Curve("before", view.time[part], view.before[part]),
@@ -325,7 +356,8 @@ def _by_time(view: View) -> Picture:
     ]
     caption = (
         f"The {view.sensor_name} in the second in which the prediction without "
-        f"{view.effect.name} is furthest off: with the effect it should follow the measured line."
+        f"{view.effect.name} is furthest off: with the effect it should follow the measured "
+        f"line.{_weigh(view)}"
     )
     if np.array_equal(view.before, view.after):
         caption = (

@@ -3,17 +3,21 @@ as a browser prints it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from rigtwin import __version__
+from rigtwin.components import KINDS
 from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.attribute import library
 from rigtwin.diagnosis.finding import Answer, Finding
+from rigtwin.diagnosis.overlay import Overlay
 from rigtwin.diagnosis.text import against_nominal
 from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.units import write as write_size
@@ -58,6 +62,63 @@ def bars(answer: Answer) -> list[Bar]:
     return [Bar(name, b, a, width(b), width(a), width(1.0)) for name, b, a in levels]
 
 
+WORSE = 1.5
+"""Times the typical error of the recordings from which the worst of them is told at the top."""
+NEXT_TO_NOTHING = 0.02
+"""Share of the signals' swing below which a twin predicts nothing."""
+MEASURED = "how often names like it were right on test machines that this library does not describe"
+PROBABLE = "the probability that it is this effect, and none other that was tried"
+
+
+def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
+    """How good the twin is before and after in percent of the signals, and where it is not.
+
+    Parameters
+    ----------
+    overlays
+        Of a diagnosis.
+    corrected
+        Whether anything was found.
+
+    Returns
+    -------
+    list of str
+        Sentences.
+    """
+    if not overlays:
+        return []
+    said = []
+    if all(float(np.std(each.nominal)) < NEXT_TO_NOTHING * each.swing for each in overlays):
+        said.append(
+            "The nominal twin predicts next to nothing of these signals: what was found identifies "
+            "the machine, rather than correcting a model of it."
+        )
+    if not corrected:
+        return said
+    held = [each for each in overlays if each.held_out]
+    counted = held or list(overlays)
+    after = [each.after_percent for each in counted]
+    before = [each.before_percent for each in counted]
+    data = "recordings that were not fitted" if held else "the recordings"
+    said.append(
+        f"Error on {data}, in percent of each signal's swing: {_between(before)} before, "
+        f"{_between(after)} after."
+    )
+    worst = counted[int(np.argmax(after))]
+    if worst.after_percent > WORSE * float(np.median(after)):
+        said.append(
+            f"In {worst.recording} {spell(worst.after_percent, 3)} % is left of the "
+            f"{worst.sensor.replace('_', ' ')}: do not rely on the corrected twin in such tests."
+        )
+    return said
+
+
+def _between(values: Sequence[float]) -> str:
+    """The least and the greatest of some figures."""
+    low, high = (spell(end, 3) for end in (min(values), max(values)))
+    return f"{low} %" if low == high else f"{low} to {high} %"
+
+
 def html(diagnosis: Diagnosis) -> str:
     """The page."""
     environment = Environment(
@@ -87,6 +148,11 @@ def html(diagnosis: Diagnosis) -> str:
         corrected=corrected,
         advice=advise(answer),
         title_of=title_of,
+        meaning_of=meaning_of,
+        headlines=headlines(overlays, corrected),
+        tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
+        confidence=MEASURED if diagnosis.described.rough else PROBABLE,
+        weight="weight among those tried" if diagnosis.described.rough else "probability",
         spell=spell,
         say=say,
         against_nominal=against_nominal,
@@ -104,6 +170,11 @@ def html(diagnosis: Diagnosis) -> str:
 def title_of(effect: Finding) -> str:
     """An effect in words, with its component."""
     return f"{effect.title[0].upper()}{effect.title[1:]}, {name_part(effect.name.component)}"
+
+
+def meaning_of(effect: Finding) -> str:
+    """What an effect does, in words."""
+    return next((each.meaning for each in KINDS if each.name == effect.name.kind), "")
 
 
 def _code(text: str) -> Markup:

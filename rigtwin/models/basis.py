@@ -70,7 +70,7 @@ def low_pass(signal: Array, time_constant: float, period: float) -> Array:
 
 def _past(signal: Array, seconds: Sequence[float], period: float) -> NamedSignals:
     for each in seconds:
-        yield "its past", low_pass(signal, each, period)
+        yield "its recent past", low_pass(signal, each, period)
 
 
 def _ticks(period: float) -> list[float]:
