@@ -68,12 +68,12 @@ def test_without_a_gap_nothing_is_corrected_but_what_was_not_seen_is_said():
 
 def test_what_fits_alike_is_told_apart_by_the_test_that_does_it():
     alike = finding("guide", "compliance", 0.5, "mount")
-    (hint,) = [s for s in advise(answer("explained", effects=(alike,))) if "cannot say" in s]
-    assert "compliance@guide or mount@guide" in hint
+    (hint,) = [s for s in advise(answer("explained", effects=(alike,))) if "cannot tell" in s]
+    assert "compliance@guide from mount@guide" in hint
     test = NextTest("sweep", "rigtwin run any sweep", 20.0, ("compliance@guide", "mount@guide"))
     said = advise(answer("explained", effects=(alike,), next_test=test))
     assert any("`rigtwin run any sweep`" in each for each in said)
-    assert not any("cannot say" in each for each in said)
+    assert not any("cannot tell" in each for each in said)
 
 
 def test_only_the_less_sure_effects_are_looked_at_again():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,11 @@ from tests.helpers.described import NOISY, described
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 SHORT = {"timing": {"duration": 3.0}}
+
+
+def wrong(value: object) -> Any:
+    """Of a type that no checker lets pass."""
+    return value
 
 
 def folder_machine(folder: Path) -> rigtwin.Machine:
@@ -181,7 +187,7 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
     ("call", "said"),
     [
         (lambda rig: rigtwin.run(rig, "nope"), "unknown experiment 'nope'; there are drop"),
-        (lambda rig: rigtwin.run(rig, "drop", seed=-1), "seed -1: expected 0 or more"),
+        (lambda rig: rigtwin.run(rig, "drop", seed=-1), "seed -1: expected a whole number from 0"),
         (lambda rig: rigtwin.run(rig, "drop", effects={"coulomb@wing": 1}), "unknown effect"),
         (
             lambda rig: rigtwin.run(rig, "drop", settings={"rail": {"coulomb": -1}}),
@@ -190,6 +196,35 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
         (lambda rig: rigtwin.machine("lathe"), "unknown machine 'lathe'; there are"),
         (lambda rig: rigtwin.load("nowhere.mcap"), "cannot read nowhere.mcap"),
         (lambda rig: rigtwin.diagnose([]), "no recording to diagnose"),
+        (
+            lambda rig: rigtwin.diagnose(wrong(None)),
+            "None: expected a recording, or the path of one",
+        ),
+        (lambda rig: rigtwin.compare(wrong(3)), "3: expected a recording, or the path of one"),
+        (lambda rig: rigtwin.load(wrong(5)), "5: expected the path of a recording"),
+        (lambda rig: rigtwin.run(wrong(5), "drop"), "5: expected a machine, its name"),
+        (lambda rig: rigtwin.run(rig, wrong(5)), "experiment 5: expected a name, or a function"),
+        (
+            lambda rig: rigtwin.run(rig, "drop", seed=wrong("x")),
+            "seed 'x': expected a whole number",
+        ),
+        (
+            lambda rig: rigtwin.run(rig, "drop", effects=wrong(5)),
+            "effects 5: expected {'coulomb@rail'",
+        ),
+        (
+            lambda rig: rigtwin.run(rig, "drop", controller=wrong(5)),
+            "controller 5: expected a function",
+        ),
+        (lambda rig: rigtwin.run(rig, "drop", effects_from=1.0), "expected an effect besides"),
+        (
+            lambda rig: rigtwin.run(rig, "drop", effects=["coulomb@rail=60"], effects_from=1e9),
+            "the test is over at",
+        ),
+        (lambda rig: rigtwin.stability("car", tau=wrong("x")), "tau = 'x': expected a number"),
+        (lambda rig: rigtwin.stability(wrong(5)), "vehicle 5: expected a name"),
+        (lambda rig: rigtwin.rths(1, noise=wrong(-1)), "noise -1: expected a Noise"),
+        (lambda rig: rigtwin.watch("no.mcap", patience=math.nan), "a patience of nan s"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(call, said):

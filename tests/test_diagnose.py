@@ -10,11 +10,12 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
-from rigtwin.components import Motion, RigPlant
+from rigtwin.components import Motion, RigPlant, find
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
+from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.localisation import region
 from rigtwin.diagnosis.next_test import propose_test
@@ -23,7 +24,7 @@ from rigtwin.diagnosis.sampling import find_outstanding
 from rigtwin.diagnosis.unknown_input import locate_disturbance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
-from tests.helpers.recordings import SHIPPED, beginning, beside, shipped
+from tests.helpers.recordings import SHIPPED, beginning, beside, replace_sensors, shipped
 from tests.helpers.twin import RIG, answer, evidence_of, recorded, rig_effect
 
 SLOW = pytest.mark.slow
@@ -169,6 +170,33 @@ def test_a_free_disturbance_finds_the_component_without_the_library(effect):
     evidence = evidence_of(recorded("imposed", (effect,)))
     name = effect.partition("=")[0].partition("@")[2]
     assert locate_disturbance(evidence, evidence.plant)[0].component == name
+
+
+def drifting(recording: Recording, rate: float) -> Recording:
+    """Its suspension LVDT's zero moving, m/s."""
+    moved = recording["/sensor.suspension_lvdt"] + rate * recording.time
+    return replace_sensors(recording, suspension_lvdt=moved)
+
+
+@SLOW
+def test_an_offset_is_not_named_for_a_drift_that_it_has_a_part_of():
+    outcome = answer(drifting(recorded("imposed", (), 20.0), 4e-5))
+    assert outcome.verdict == "unknown"
+    assert not outcome.effects
+    assert outcome.where[0].component == "suspension_lvdt"
+    assert "offset@suspension_lvdt not named" in " ".join(outcome.answer.notes)
+
+
+def test_a_free_disturbance_is_judged_beside_the_tolerances_that_the_plant_uses():
+    evidence = evidence_of(drifting(recorded("imposed", (), 8.0), 1e-4))
+    offset = find("offset@suspension_lvdt", evidence.plant)
+    plant = with_values(evidence.plant, (offset,), ((4e-4,),))
+    first = locate_disturbance(evidence, plant, (offset,))[0]
+    assert first.component == "suspension_lvdt"
+    assert first.forms[0] in ("a constant", "time")
+    assert first.gained > 0.03 * evidence.expected
+    nominal = evidence_of(recorded("imposed", (), 8.0))
+    assert locate_disturbance(nominal, nominal.plant)[0].gained < 0.01 * nominal.expected
 
 
 def deviation_of(recording: Recording) -> Deviation | None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+import rigtwin
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable, write_whole
@@ -19,6 +20,7 @@ from rigtwin.recording.export import export
 from rigtwin.recording.schema import END_RECORD
 from rigtwin.render.plot import _part, draw
 from rigtwin.studies.sweep.cluster import Cluster
+from tests.helpers.described import NOISY, described
 
 
 def recording_of(path: Path, values: np.ndarray, names: list[str], machine: str = "bench"):
@@ -125,3 +127,52 @@ def test_streams_that_are_closed_stop_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr(sys, "stdout", Closed())
     assert main(["--version"]) == 1
+
+
+def test_nothing_that_was_made_overwrites_what_it_was_made_of(tmp_path):
+    described(tmp_path, "slide", NOISY)
+    machine = rigtwin.machine(tmp_path / "bench.toml")
+    short = {"timing": {"duration": 2.0}}
+    made = rigtwin.run(machine, "shake", settings=short, path=tmp_path / "one.mcap")
+    answer = rigtwin.diagnose(made)
+    inputs = [tmp_path / "one.mcap", *machine.files]
+    assert [path.suffix for path in inputs] == [".mcap", ".toml", ".xml"]
+    before = [path.read_bytes() for path in inputs]
+    writers = [answer.report, answer.save_twin, answer.save_mjcf]
+    writers += [lambda path: rigtwin.look(made).save(path, {})]
+    writers += [lambda path: made.export(path), lambda path: made.plot(path)]
+    for path in inputs:
+        for write in writers[:4]:
+            with pytest.raises(RigtwinError, match="is the input; name another output"):
+                write(path)
+    for write in writers[4:]:
+        with pytest.raises(RigtwinError, match="is the input; name another output"):
+            write(inputs[0])
+    for path in machine.files:
+        with pytest.raises(RigtwinError, match="is the input; name another output"):
+            rigtwin.run(machine, "shake", settings=short, path=path)
+    assert [path.read_bytes() for path in inputs] == before
+
+
+def test_a_command_does_not_overwrite_a_model_or_what_it_includes(tmp_path, capsys):
+    described(tmp_path, "slide", NOISY)
+    model = tmp_path / "bench.xml"
+    whole = model.read_text()
+    (tmp_path / "extra.xml").write_text("<mujoco><worldbody><site/></worldbody></mujoco>")
+    model.write_text(whole.replace("<worldbody>", '<include file="extra.xml"/><worldbody>', 1))
+    toml = tmp_path / "bench.toml"
+    for out in ("bench.xml", "extra.xml", "bench.toml"):
+        before = (tmp_path / out).read_bytes()
+        arguments = ["run", "shake", "--machine", str(toml), "--out", str(tmp_path / out)]
+        assert main(arguments) == 1
+        assert "is the input; name another output" in capsys.readouterr().err
+        assert (tmp_path / out).read_bytes() == before
+
+
+def test_what_an_mjcf_includes_must_be_a_file(tmp_path):
+    described(tmp_path, "slide", NOISY)
+    model = tmp_path / "bench.xml"
+    text = model.read_text()
+    model.write_text(text.replace("<worldbody>", '<include file="/dev/zero"/><worldbody>', 1))
+    with pytest.raises(RigtwinError, match="it includes /dev/zero; expected a file"):
+        rigtwin.machine(tmp_path / "bench.toml")

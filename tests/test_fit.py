@@ -175,3 +175,20 @@ def test_two_effects_are_told_apart():
     assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}
     assert sum(found.shares.values()) == pytest.approx(found.explained)
     assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)
+
+
+def test_a_shape_at_the_end_of_its_range_is_seen_and_a_phase_or_a_zero_is_none(nominal):
+    fitter = Fitter(nominal)
+    stribeck, cogging = (rig_effect(name) for name in ("stribeck@rail", "cogging@motor"))
+    inside, low, high = (
+        Fit((stribeck,), ((5.0, speed, exponent),), 0.0, (), fitter.plant)
+        for speed, exponent in ((0.01, 1.0), (1e-4, 1.0), (0.01, 3.0))
+    )
+    assert not fitter.has_shape_at_end(inside)
+    assert fitter.has_shape_at_end(low)
+    assert fitter.has_shape_at_end(high)
+    end = cogging.quantities()["cogging_phase"].high
+    turned = Fit((cogging,), ((5.0, 0.03, end),), 0.0, (), fitter.plant)
+    assert not fitter.has_shape_at_end(turned)
+    yielding = rig_effect("compliance@structure_cylinder")
+    assert not fitter.has_shape_at_end(Fit((yielding,), ((1e-6, 0.0),), 0.0, (), fitter.plant))

@@ -231,6 +231,12 @@ RECORDS = [{"t": t, "x": x, "f": f} for t, x, f in zip(TIME, POSITION, FORCE, st
 NESTED = [{"t": r["t"], "at": {"x": r["x"]}, "f": [r["f"], 0], "on": "yes"} for r in RECORDS]
 
 
+def test_json_s_keys_stand_there_once(tmp_path: Path):
+    (tmp_path / "a.json").write_text('{"t": [0, 1], "t": [0, 2], "x": [1, 2]}')
+    with pytest.raises(RigtwinError, match="not valid JSON: 't' stands there twice"):
+        read(tmp_path / "a.json")
+
+
 @pytest.mark.parametrize(
     ("name", "data", "changes"),
     [
@@ -378,6 +384,8 @@ BAD_MAPS = [
     (MAP.replace('column = "t"', 'column = "t"\nunit = "mm"'), "expected s, ms"),
     (MAP.replace('unit = "mm"', 'unit = "furlong"'), "unknown unit 'furlong'"),
     (MAP.replace('unit = "mm"', "sign = 2"), "expected 1 or -1"),
+    (MAP.replace('unit = "mm"', "scale = 1e308"), "expected numbers below 1e+15"),
+    (MAP.replace('column = "t"', 'column = ["t", "t"]'), "one stands there twice"),
     (MAP.replace('unit = "mm"', "scale = 0"), "expected anything else"),
     (MAP.replace('unit = "mm"', 'scale = "2"'), "expected a number"),
     (MAP.replace('unit = "mm"', "scal = 2"), "unknown key 'scal'"),
@@ -387,7 +395,10 @@ BAD_MAPS = [
     (MAP + '"/sensor.a" = { formula = "2 *" }', "is no formula"),
     (MAP + '"/sensor.a" = { formula = "3.0" }', "it names no column"),
     (MAP + '"/sensor.a" = { formula = "x", unit = "mm" }', "unit goes with a column"),
-    (MAP + '"/sensor.a" = { formula = "1 / (x - x)" }', "is not a number at 0 s"),
+    (
+        MAP + '"/sensor.a" = { formula = "1 / (x - x)" }',
+        "is inf at 0 s; expected numbers below",
+    ),
     (MAP + '[columns]\n"a b" = "x"', "'a b': expected a name of letters"),
     (MAP + '[columns]\na = "x"\n[constants]\na = 1', "[columns] has that name too"),
     (MAP + "[constants]\na = 'x'", "[constants] a = 'x': expected a number"),

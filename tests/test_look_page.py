@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -238,10 +239,11 @@ def answer_of(look: Look, effect: str, values: tuple[float, ...]) -> dict[str, o
     return {
         "machine": look.machine.name,
         "recordings": [str(look.recording.path)],
+        "verdict": "explained",
         "sentence": "dry friction of the guide",
         "effects": [
             found(effect, look, values),
-            {"component": "computer", "kind": "setting", "parameters": {}, "confidence": 0.9},
+            {"component": "controller", "kind": "setting", "parameters": {}, "confidence": 0.9},
         ],
     }
 
@@ -263,7 +265,7 @@ def test_it_begins_with_what_was_diagnosed(look, tmp_path):
     path.write_text(json.dumps(answer_of(look, EFFECT, (TRUE,))))
     given = read_answer(path, look)
     assert given.values == {EFFECT: (TRUE,)}
-    assert given.beside == ("setting@computer",)
+    assert given.beside == ("setting@controller",)
     with rigtwin.show_look(look, diagnosis=path) as page:
         assert page.values == given.values
 
@@ -275,13 +277,20 @@ def test_it_begins_with_what_was_diagnosed(look, tmp_path):
         ({"recordings": ["other.mcap"]}, "is a diagnosis of other.mcap; expected"),
         ({"effects": [{}]}, "expected the JSON of rigtwin diagnose --json"),
         ({"effects": 3}, "expected the JSON of rigtwin diagnose --json"),
+        ({"verdict": 5}, "expected the JSON of rigtwin diagnose --json"),
+        (
+            {"effects": [{"component": "no", "kind": "gain", "parameters": {}, "confidence": 1}]},
+            "bench can have no gain@no",
+        ),
         (None, "expected the JSON of rigtwin diagnose --json"),
     ],
 )
 def test_what_is_no_diagnosis_of_it_is_said_in_one_line(look, tmp_path, change, said):
     path = tmp_path / "why.json"
     path.write_text(
-        "no" if change is None else json.dumps({**answer_of(look, EFFECT, (TRUE,)), **change})
+        "[" * 100_000
+        if change is None
+        else json.dumps({**answer_of(look, EFFECT, (TRUE,)), **change})
     )
     with pytest.raises(rigtwin.RigtwinError, match=re.escape(said)) as error:
         rigtwin.show_look(look, diagnosis=path)
@@ -381,3 +390,24 @@ def test_every_machine_has_a_page_that_follows_its_effects(name):
             while page.prediction.overall == look.nominal.overall and time.monotonic() < until:
                 time.sleep(0.05)
             assert page.prediction.overall == look.predict(largest).overall
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "status"),
+    [
+        ("127.0.0.1", None, 101),
+        ("127.0.0.1", "http://127.0.0.1", 101),
+        ("127.0.0.1", "http://evil.example", 403),
+        ("evil.example", None, 403),
+    ],
+)
+def test_it_answers_pages_of_its_own_alone(look, host, origin, status):
+    with rigtwin.show_look(look) as page:
+        port = int(page.url.rsplit(":", 1)[1])
+        lines = ["GET / HTTP/1.1", f"Host: {host}:{port}", "Upgrade: websocket"]
+        lines += [f"Origin: {origin}:{port}"] if origin else []
+        lines += ["Connection: Upgrade", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="]
+        lines += ["Sec-WebSocket-Version: 13", "Sec-WebSocket-Protocol: viser-v1.1.1", "", ""]
+        with socket.create_connection(("127.0.0.1", port), timeout=10.0) as asked:
+            asked.sendall("\r\n".join(lines).encode())
+            assert asked.recv(64).startswith(f"HTTP/1.1 {status} ".encode())

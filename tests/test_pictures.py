@@ -156,3 +156,14 @@ def test_what_the_commands_alone_say_is_not_promised_to_move_a_line():
     found = picture(evidence_of(recorded("imposed", GAIN, 3.5)), RIG.plant, finding)
     assert np.array_equal(curve(found, "before")[1], curve(found, "after")[1])
     assert "changes no line" in found.caption
+
+
+def test_a_picture_says_how_much_of_the_effect_its_recording_asks_for():
+    assert shown("gain@load_cell", gain=1.1).caption.endswith(
+        "asks for as much of it as was found."
+    )
+    evidence = evidence_of(recorded("imposed", GAIN, 3.5))
+    twice = RIG.plant._replace(load_cell=RIG.plant.load_cell._replace(gain=1.15))
+    found = picture(evidence, twice, finding_of("gain@load_cell", gain=1.15))
+    share = float(found.caption.rsplit(" asks for ", 1)[1].split(" times")[0])
+    assert share == pytest.approx(0.667, abs=0.05)

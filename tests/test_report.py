@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 
 import rigtwin.diagnosis
@@ -16,7 +17,8 @@ from rigtwin.description.changes import from_toml, override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
-from rigtwin.diagnosis.report import bars, html
+from rigtwin.diagnosis.overlay import Overlay
+from rigtwin.diagnosis.report import bars, headlines, html
 from rigtwin.diagnosis.result import Diagnosis
 from tests.helpers.browser import BROWSER, looked_at
 from tests.helpers.recordings import replace_sensors
@@ -162,7 +164,7 @@ def test_the_page_says_what_to_do_next_before_any_evidence(outcomes):
         assert page.index("<h1>") < page.index("What to do next") < page.index("What was checked")
     found = html(outcomes["explained"])
     assert found.index("What to do next") < found.index("The evidence")
-    assert "<code>--save-twin twin.toml</code>" in found
+    assert "--save-twin twin.toml</code>" in found
 
 
 def test_names_from_files_cannot_write_the_page(outcomes):
@@ -192,3 +194,36 @@ def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(
     assert result["serious"] == []
     drawn = 0 if verdict == "unusable" else 4 + len(outcomes[verdict].effects)
     assert result["drawn"] == drawn
+
+
+def overlay_of(name: str, nominal: float, left: float, held_out: bool = True) -> Overlay:
+    """A sine of which a twin predicts shares."""
+    time = np.arange(400) * 0.01
+    measured = np.sin(5.0 * time)
+    return Overlay(
+        recording=name,
+        held_out=held_out,
+        sensor="load_cell",
+        kind="force",
+        unit="N",
+        time=time,
+        measured=measured,
+        nominal=nominal * measured,
+        corrected=(1.0 - left) * measured,
+        counts=np.ones(400),
+        noise=1e-3,
+    )
+
+
+def test_the_top_says_how_good_the_twin_is_and_where_it_is_not():
+    good = [overlay_of("a", 0.5, 0.1), overlay_of("b", 0.6, 0.12), overlay_of("c", 0.5, 0.1)]
+    said = headlines([*good, overlay_of("fitted", 0.0, 0.9, held_out=False)], corrected=True)
+    assert len(said) == 1
+    assert "not fitted, in percent of each signal's swing: 4" in said[0]
+    assert "before, 1" in said[0]
+    said = headlines([*good, overlay_of("fast", 0.5, 0.6)], corrected=True)
+    assert said[1].startswith("In fast 6")
+    assert "do not rely on the corrected twin in such tests" in said[1]
+    (said,) = headlines([overlay_of("a", 0.001, 0.5)], corrected=False)
+    assert "predicts next to nothing" in said
+    assert not headlines([], corrected=True)

@@ -65,8 +65,8 @@ def _tell_apart(answer: Answer) -> list[str]:
     if not alike:
         return []
     return [
-        f"These data cannot tell {', nor '.join(alike)}; the twin is as good with either. A look at "
-        "the part tells, or a test in which they differ."
+        f"These data cannot tell {', nor '.join(alike)}; the twin is as good with either. A look "
+        "at the part tells, or a test in which they differ."
     ]
 
 

@@ -113,10 +113,9 @@ def _weigh(view: View) -> str:
     if power <= 0.0:
         return ""
     share = float(step @ (view.measured - view.before)[there]) / power
-    said = (
-        "as much as was found" if abs(share - 1.0) < AGREES else f"{share:.2f} times what was found"
-    )
-    return f" This recording asks for {said}."
+    if abs(share - 1.0) < AGREES:
+        return f" {view.recording} asks for as much of it as was found."
+    return f" {view.recording} asks for {share:.2f} times what was found."
 
 
 def _stretch(view: View, weight: Array, seconds: float) -> slice:
@@ -388,6 +387,7 @@ PICTURES: dict[str, str] = {
     "load_friction": "velocity",
     "drag": "velocity",
     "damping": "velocity",
+    "damping_gain": "velocity",
     "cogging": "position",
     "mass": "acceleration",
     "armature": "acceleration",
@@ -414,6 +414,8 @@ PICTURES: dict[str, str] = {
     "offset": "line",
     "saturation": "line",
     "deadband": "line",
+    "position_gain": "time",
+    "force_limit": "time",
     "rate_limit": "time",
     "hum": "spectrum",
     "noise": "spectrum",

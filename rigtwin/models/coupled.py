@@ -32,7 +32,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
-from rigtwin.components.servo import push, push_law
+from rigtwin.components.servo import Push, push, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
@@ -261,7 +261,7 @@ class CoupledModel:
         size, names = self._bodies.coordinates, self._servos
         laws = [push_law(getattr(plant, name)) for name in names]
         return Servos(
-            laws=np.array(laws, float).reshape(len(names), -1),
+            laws=np.array(laws, float).reshape(len(names), len(Push._fields)),
             levers=np.array([self._along[name] for name in names]).reshape(-1, size),
             zero=np.array([self._zero[name] for name in names]),
             inertia=np.array([self._felt(self._along[name]) for name in names]),
