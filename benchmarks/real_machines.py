@@ -48,6 +48,24 @@ moved_by = "servo"
 observe = ["encoder"]
 """
 """The pendulum's description in a closed loop: the recorded voltage is the formula's."""
+SERVO = """
+[machine]
+name = "pendulum-servo"
+title = "XL330 pendulum on its servo"
+model = "servo.xml"
+[components]
+arm = { body = "arm", effects = [] }
+gearbox = { joint = "shaft" }
+servo = { actuator = "servo", type = "servo", command = "goal" }
+encoder = { sensor = "encoder", channel = "position" }
+[[replays]]
+name = "held"
+moved_by = "servo"
+observe = ["encoder"]
+"""
+"""The same as a servo whose voltage nobody recorded, at the gain of 400."""
+MOTOR = '<motor name="servo" joint="shaft" gear="0.06785"/>'
+"""Of the pendulum's MJCF: Nm/V."""
 HELD_MAP = """
 machine = "pendulum-servo"
 time = {{ column = "t" }}
@@ -57,6 +75,30 @@ controller = {{ kp = {} }}
 "/command.goal" = {{ column = "goal" }}
 "/sensor.position" = {{ column = "position" }}
 """
+SERVO_MAP = """
+machine = "pendulum-servo"
+time = { column = "t" }
+[channels]
+"/command.goal" = { column = "goal" }
+"/sensor.position" = { column = "position" }
+"""
+
+
+def position_actuator(gain: float) -> str:
+    """What stands in the motor's place: torque by the angle's error, Nm/rad, up to 7.4 V."""
+    return f'<position name="servo" joint="shaft" kp="{gain}" forcerange="-0.502 0.502"/>'
+
+
+def write_descriptions(folder: Path) -> None:
+    """Adds the pendulum's in a closed loop to its own."""
+    (folder / "held.toml").write_text(HELD)
+    (folder / "servo.toml").write_text(SERVO)
+    (folder / "servo_400.toml").write_text(SERVO_MAP)
+    model = (folder / "pendulum.xml").read_text()
+    # As its firmware has it: 0.0212926 V for each rad and unit of its gain.
+    (folder / "servo.xml").write_text(model.replace(MOTOR, position_actuator(0.578)))
+    for kp in (100, 200, 400, 800):
+        (folder / f"held_{kp}.toml").write_text(HELD_MAP.format(kp))
 
 
 @dataclass(frozen=True)
@@ -91,6 +133,12 @@ def pendulum(test: str, description: str, map_name: str) -> Case:
     return Case("pendulum_servo", description, map_name, tuple(fitted), tuple(held_out))
 
 
+def servo(gain: float) -> Case:
+    """The pendulum as a servo of that nominal gain, Nm/rad; each half judges the other."""
+    settings = {"servo": {"position_gain": gain}}
+    return Case("pendulum_servo", "servo.toml", "servo_{}.toml", ("sin_sin_400",), (), settings)
+
+
 CASES = {
     "damper-0": damper(0.0),
     "damper-150": damper(150e3),
@@ -100,6 +148,8 @@ CASES = {
     "bench": bench("body", "quarter-car-bench", "quarter_car_bench"),
     "swing": pendulum("lift_and_drop", "pendulum.toml", "map.toml"),
     "held": pendulum("sin_sin", "held.toml", "held_{}.toml"),
+    "servo": servo(0.578),
+    "servo-weaker": servo(0.4),
     "emps": Case("emps", "emps", "", ("DATA_EMPS",), ("DATA_EMPS_PULSES",)),
 }
 
@@ -149,10 +199,8 @@ def judge(name: str, data: Path) -> Told:
         folder = Path(shutil.copytree(data / case.folder, Path(work) / case.folder))
         for path in (folder, *folder.iterdir()):
             path.chmod(0o755)
-        if name == "held":
-            (folder / "held.toml").write_text(HELD)
-            for kp in (100, 200, 400, 800):
-                (folder / f"held_{kp}.toml").write_text(HELD_MAP.format(kp))
+        if case.folder == "pendulum_servo":
+            write_descriptions(folder)
         own = folder / case.description
         on = rigtwin.machine(own if own.is_file() else case.description)
         fitted = [imported(case, each, folder) for each in case.fitted]
@@ -161,8 +209,9 @@ def judge(name: str, data: Path) -> Told:
         began = time.perf_counter()
         answer = rigtwin.diagnose(fitted, machine=on, settings=case.settings, held_out=held_out)
         seconds = time.perf_counter() - began
-        before = errors(on, held_out, nominal, nominal)
-        return Told(answer, before, errors(on, held_out, nominal, answer.corrected), seconds)
+        judged = held_out or fitted
+        before = errors(on, judged, nominal, nominal)
+        return Told(answer, before, errors(on, judged, nominal, answer.corrected), seconds)
 
 
 def tell(name: str, told: Told) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rigtwin
 from experiments import EXPERIMENTS
 from rigtwin.cli import main
 from rigtwin.components import Motion, RigPlant, find
@@ -203,6 +204,23 @@ def deviation_of(recording: Recording) -> Deviation | None:
     assert RIG.control is not None
     settings = RIG.configuration_of(recording).controller
     return ControllerReplay(RIG.control, recording, settings).deviation()
+
+
+def test_a_setting_that_only_makes_the_commands_small_is_not_named():
+    machine = rigtwin.machine("emps")
+    short = {"timing": {"duration": 2.5}}
+    recording = rigtwin.run(machine, "positioning", settings=short)
+    turned = {
+        topic: {name: values[::-1] for name, values in columns.items()}
+        for topic, columns in recording.columns.items()
+    }
+    assert machine.control is not None
+    settings = machine.configuration_of(recording).controller
+    assert ControllerReplay(machine.control, recording, settings).deviation() is None
+    backwards = replace(recording, columns=turned)
+    deviation = ControllerReplay(machine.control, backwards, settings).deviation()
+    assert deviation is not None
+    assert deviation.kind == "unknown"
 
 
 SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}

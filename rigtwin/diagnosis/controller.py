@@ -25,6 +25,11 @@ rounds too."""
 CLOSER = 0.3
 """Share of what is left that another value must leave at most to be the explanation, of a
 controller described inexactly."""
+NEARLY = 0.1
+"""Share of how far commands move by which those of another value may differ at most."""
+RAN_AWAY = 1e100
+"""Commands from which a replay is off by that much and no more; whoever looks for the least needs a
+number."""
 LATE = 4
 """Ticks by which the commands may lag behind, at most, to be recognised."""
 REPEATED = 0.2
@@ -92,8 +97,8 @@ class ControllerReplay:
         difference = (commands - self.recorded)[:, SETTLED:]
         if counted is not None:
             difference = difference[:, counted[SETTLED:]]
-        if not np.isfinite(difference).all():
-            return float("inf")
+        if not np.max(np.abs(difference), initial=0.0) < RAN_AWAY:
+            return RAN_AWAY
         return max(rms(row) / exact for row, exact in zip(difference, self._exact, strict=True))
 
     def deviation(self) -> Deviation | None:
@@ -156,10 +161,18 @@ class ControllerReplay:
                 found.append((best, Deviation("setting", name, told, value, "1")))
         enough = 1.0 if self._control.exact is None else max(1.0, CLOSER * left)
         return min(
-            (each for each in found if each[0] <= enough),
+            (each for each in found if each[0] <= enough and self._reproduces(each[1])),
             key=lambda each: each[0],
             default=(0.0, None),
         )[1]
+
+    def _reproduces(self, found: Deviation) -> bool:
+        """Whether commands with another setting are nearly those recorded, and not merely smaller
+        than those with the told one."""
+        if self._control.exact is None:
+            return True
+        settings = self._settings._replace(**{found.name: found.used})
+        return self._consequence(self.commands(settings)) < NEARLY
 
 
 def _minimise(
