@@ -41,6 +41,7 @@ from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import Test, record_in_real_time
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
+from tests.helpers.described import NOISY, described
 
 TABLE = load_table(CARD)
 SHORT = ["--set", "timing.duration=1", "--set", "safety.ramp=0.3", "--set", "safety.hold=0.1"]
@@ -565,3 +566,36 @@ def test_a_recording_that_cannot_be_written_is_said_at_once(tmp_path):
     twin = InRealTime(WiredTwin(test.terminals(), TABLE), 1e-3)
     with pytest.raises(RigtwinError, match="cannot write"):
         record_in_real_time(twin, test, tmp_path / "no" / "r.mcap", lambda: None, guarded=False)
+
+
+def test_a_list_is_run_on_the_twin_of_any_machine(tmp_path, capsys):
+    described(tmp_path, "slide", NOISY)
+    toml, plan, folder = tmp_path / "bench.toml", tmp_path / "list.toml", tmp_path / "out"
+    plan.write_text(
+        '[[test]]\nexperiment = "shake"\nname = "one"\nset = {timing = {duration = 1.0}}\n'
+        '[[test]]\nexperiment = "shake"\nname = "two"\nseed = 2\n'
+    )
+    session = ["session", str(plan), "--machine", str(toml), "--folder", str(folder)]
+    assert main([*session, "--effect", "coulomb@guide=2"]) == 0
+    said = capsys.readouterr().out
+    assert "1.000 s recorded" in said
+    assert said.count("encoder") == 2
+    one, two = (rigtwin.load(folder / f"{name}.mcap", toml) for name in ("one", "two"))
+    assert (one.ticks, two.ticks) == (1000, 4000)
+    assert main([*session, "--resume"]) == 0
+    assert "2 of 2 tests are done already" in capsys.readouterr().out
+    for option in (["--card", "card.toml"], ["--target", "daq"], ["--real-time"], ["--dry-run"]):
+        assert main([*session, "--resume", *option]) == 1
+        error = capsys.readouterr().err
+        assert f"{option[0]} is of the nominal suspension rig alone" in error
+        assert error.count("\n") == 1
+
+
+def test_a_list_names_the_machines_own_tests(tmp_path):
+    plan = tmp_path / "list.toml"
+    plan.write_text('[[test]]\nexperiment = "drop"\n')
+    described(tmp_path, "slide", NOISY)
+    with pytest.raises(RigtwinError, match="unknown experiment 'drop'"):
+        rigtwin.run_session(
+            plan, tmp_path / "out", lambda *_: True, machine=tmp_path / "bench.toml"
+        )

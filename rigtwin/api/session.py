@@ -11,9 +11,11 @@ from datetime import date
 from pathlib import Path
 
 from experiments import find
-from rigtwin.api.machines import Effects, Settings, effect_texts
+from machines import DEFAULT_MACHINE
+from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, load
 from rigtwin.description.changes import read_toml, with_changes
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
@@ -31,6 +33,7 @@ from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording.owner import open_alone
+from rigtwin.simulation.experiment import Experiment, find_experiment
 
 PORTS = 65535
 LOCK = "session.lock"
@@ -278,11 +281,10 @@ def run_session(
     folder: str | Path,
     run: Callable[[PlannedTest, Path], bool],
     *,
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     resume: bool = False,
     real: bool = False,
-    prepare: Callable[[PlannedTest], object] = lambda test: plan_test(
-        test.experiment, seed=test.seed, settings=test.changes
-    ),
+    prepare: Callable[[PlannedTest], object] | None = None,
     told: Callable[[str], object] = lambda _: None,
 ) -> bool:
     """Runs a list of tests, up to the first that does not complete.
@@ -294,13 +296,17 @@ def run_session(
     folder
         Of the recordings.
     run
-        Runs one test into a recording, by `run_on_twin` or `run_on_card`; whether it completed.
+        Runs one test into a recording, by `run_on_twin`, `run_on_card` or, of any machine,
+        `rigtwin.run`; whether it completed.
+    machine
+        Whose experiments the list names.
     resume
         Whether to leave out what has completed already.
     real
         Whether only a recording of the rig itself counts as that.
     prepare
-        Called with every test before the first is run; raises for one that cannot be.
+        Called with every test before the first is run; raises for one that cannot be. By default
+        that is one whose settings the machine does not have.
     told
         Called with a line for people.
 
@@ -315,14 +321,23 @@ def run_session(
         For a mistake in any test of the list, or a folder into which another session runs, before
         anything moves.
     """
-    folder = Path(folder)
-    tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find))
+    folder, on = Path(folder), the_machine(machine)
+
+    def find_test(name: str) -> Experiment:
+        return find_experiment(on, name)
+
+    def check(test: PlannedTest) -> object:
+        if on.structure is Structure.QUARTER_CAR:
+            return plan_test(test.experiment, seed=test.seed, settings=test.changes)
+        return with_changes(find_test(test.experiment).configuration, test.changes)
+
+    tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     with _alone(folder):
-        return _run_tests(tests, folder, run, resume, real, prepare, told)
+        return _run_tests(tests, folder, run, resume, real, prepare or check, told)
 
 
 @contextmanager

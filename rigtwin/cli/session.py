@@ -1,4 +1,4 @@
-"""`rigtwin session`: a list of tests on the rig."""
+"""`rigtwin session`: a list of tests on the rig, or on any machine's twin."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rigtwin
-from rigtwin.cli.options import add_effect, add_settings
-from rigtwin.cli.supervised import add_supervised, plan, require_card
+from machines import DEFAULT_MACHINE
+from rigtwin.cli.options import add_effect, add_settings, settings_of
+from rigtwin.cli.supervised import add_supervised, is_the_rig, plan, require_card, require_twin
 from rigtwin.cli.supervised import run as run_supervised
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
+    from rigtwin import Machine
     from rigtwin.hardware.session.plan import PlannedTest
 
-SUMMARY = "run a list of tests on the rig, one recording each"
+SUMMARY = "run a list of tests on the rig or on a machine's twin, one recording each"
 MORE = """\
 The list is a TOML file of [[test]] tables: experiment, and if wanted seed, pause (s before it),
 name, set (a table of settings). After each test its recording is compared with the twin. A session
@@ -32,6 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="keep the recordings that were completed; run the others",
     )
+    parser.add_argument(
+        "--machine",
+        default=DEFAULT_MACHINE,
+        metavar="F.toml",
+        help="the machine, by name or description; another than the suspension rig has a twin only",
+    )
     add_effect(parser, "give the twin an effect that its settings do not tell")
     add_settings(parser)
     add_supervised(parser)
@@ -39,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(parsed: argparse.Namespace) -> int:
     """Runs the list and tells of each test what the twin says of it."""
+    machine = rigtwin.machine(parsed.machine)
+    if not is_the_rig(machine):
+        return _run_on_twin(parsed, machine)
     from rigtwin.hardware.session.permission import require_permission
 
     require_card(parsed)
@@ -70,17 +81,56 @@ def execute(parsed: argparse.Namespace) -> int:
     return code
 
 
+def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
+    """Runs the list on the twin of any machine."""
+    from rigtwin.description.changes import with_changes
+    from rigtwin.simulation.experiment import find_experiment
+
+    require_twin(parsed, machine)
+    code = 0
+
+    def run(test: PlannedTest, path: Path) -> bool:
+        nonlocal code
+        recording = rigtwin.run(
+            machine,
+            test.experiment,
+            seed=test.seed,
+            effects=parsed.effect,
+            settings=settings_of(_command_line(parsed, test)),
+            path=path,
+        )
+        seconds = recording.ticks * recording.period
+        print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {recording.end}")
+        _compare(path, parsed.machine)
+        code = 3 if recording.tripped else 0
+        return not recording.tripped
+
+    rigtwin.run_session(
+        parsed.list,
+        parsed.folder,
+        run,
+        machine=machine,
+        resume=parsed.resume,
+        prepare=lambda test: with_changes(
+            find_experiment(machine, test.experiment).configuration,
+            settings_of(_command_line(parsed, test)),
+        ),
+        told=lambda line: print(line, flush=True),
+    )
+    return code
+
+
 def _command_line(parsed: argparse.Namespace, test: PlannedTest) -> argparse.Namespace:
     """The command line of one test: its own settings after those of the session."""
     settings = [*parsed.set, *test.settings]
     return argparse.Namespace(**{**vars(parsed), "seed": test.seed, "set": settings})
 
 
-def _compare(path: Path) -> None:
+def _compare(path: Path, machine: str | None = None) -> None:
     """Says where the rig and the twin disagree, at once."""
     from rigtwin.cli.compare import execute as compare
 
-    nothing = {"other": None, "json": None, "machine": None, "config": None}
+    nothing = {"other": None, "json": None, "machine": machine, "config": None}
     try:
         compare(argparse.Namespace(recording=path, effect=[], set=[], **nothing))
     except RigtwinError as error:

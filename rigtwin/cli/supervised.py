@@ -16,7 +16,7 @@ from rigtwin.errors import RigtwinError
 if TYPE_CHECKING:
     from tqdm import tqdm
 
-    from rigtwin import DryRun
+    from rigtwin import DryRun, Machine
     from rigtwin.hardware.session.record import Test
 
 
@@ -62,6 +62,28 @@ def add_supervised(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help="live view for Foxglove (default port 8765)",
     )
+
+
+OWN = ("card", "dry_run", "real_time", "arm", "without_dry_run", "stop_file", "live")
+"""Options of a session that only the suspension rig has."""
+
+
+def is_the_rig(machine: Machine) -> bool:
+    """Whether a machine is the nominal suspension rig, which a card is there for."""
+    from rigtwin.components import RigPlant
+
+    return machine.plant == RigPlant()
+
+
+def require_twin(parsed: argparse.Namespace, machine: Machine) -> None:
+    """Raises RigtwinError where something is asked of a machine that needs the rig itself."""
+    asked = [name for name in OWN if getattr(parsed, name)]
+    asked += ["target"] if parsed.target == "daq" else []
+    if asked:
+        raise RigtwinError(
+            f"--{asked[0].replace('_', '-')} is of the nominal suspension rig alone; "
+            f"{machine.name} has a twin only"
+        )
 
 
 def require_card(parsed: argparse.Namespace) -> None:
