@@ -69,8 +69,8 @@ def describe(diagnosis: Answer) -> str:
             for name, estimate in effect.parameters.items()
         )
         lines.append(
-            f"  trace: {effect.name} ({values}) closes {100 * effect.share:.2g} "
-            "% of the gap: too little to be claimed"
+            f"  trace: {effect.name} ({values}) would close {100 * effect.share:.2g} "
+            "% of what is left: too little to be claimed"
         )
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
