@@ -117,7 +117,7 @@ def test_held_out_recordings_come_first_by_name():
     assert [each.held_out for each in found] == [True] * 4 + [False] * 4
 
 
-def test_the_worst_second_is_where_the_nominal_prediction_is_furthest_off():
+def test_the_worst_second_is_where_the_corrected_prediction_is_furthest_off():
     time = np.arange(8000) * 1e-3
     off = np.where((time > 5.2) & (time < 5.9), 3.0, 0.1)
     flat = np.zeros(8000)

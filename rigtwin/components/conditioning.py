@@ -208,6 +208,7 @@ KINDS = (
         ("gain_asymmetry",),
         "output greater for positive commands than for negative, by this share",
         _each(fixed_starts((-0.3, -0.07, 0.07, 0.3), 0.004), ForceActuator),
+        "output smaller for positive commands than for negative, by this share",
     ),
     Kind(
         "lag",

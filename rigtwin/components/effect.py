@@ -122,7 +122,8 @@ class Kind:
 
     title: its name in a sentence; parameters: of the component that it sets, the first its
     magnitude; meaning: what it does; at: type of component that can have it → where the search
-    starts, None where it is read off the signals instead.
+    starts, None where it is read off the signals instead; negative: what it does where its
+    magnitude is below zero, if that is something else.
     """
 
     name: str
@@ -130,6 +131,7 @@ class Kind:
     parameters: tuple[str, ...]
     meaning: str
     at: Mapping[type, Guess | None] = field(compare=False, repr=False)
+    negative: str = field(default="", compare=False, repr=False)
 
 
 @dataclass(frozen=True)

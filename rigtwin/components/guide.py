@@ -302,6 +302,7 @@ def _damping(scales: Scales) -> float:
     return scales.force / scales.speed
 
 
+LESS_AT_REST = "dry friction smaller near standstill, which presliding looks like too"
 KINDS = (
     Kind(
         "coulomb",
@@ -330,6 +331,7 @@ KINDS = (
         ("stribeck", "stribeck_velocity", "stribeck_exponent"),
         "dry friction greater near standstill",
         {Rail: _rig_stribeck, Motor: _rig_stribeck},
+        LESS_AT_REST,
     ),
     Kind(
         "stribeck",
@@ -337,6 +339,7 @@ KINDS = (
         ("stribeck", "stribeck_velocity"),
         "dry friction greater near standstill",
         {Guide: _stribeck},
+        LESS_AT_REST,
     ),
     Kind(
         "asymmetry",
@@ -348,6 +351,7 @@ KINDS = (
             Motor: _rig_asymmetry,
             Guide: around_nominal(_force, (-0.5, -0.1, 0.1, 0.5), 0.005),
         },
+        "dry friction greater in negative direction than in positive",
     ),
     Kind(
         "load_friction",
@@ -408,6 +412,7 @@ KINDS = (
         ("viscous_asymmetry",),
         "viscous friction greater in positive direction than in negative",
         {Guide: around_nominal(_damping, (-0.6, -0.1, 0.1, 0.6), 0.01)},
+        "viscous friction greater in negative direction than in positive",
     ),
     Kind(
         "drag",

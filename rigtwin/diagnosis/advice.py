@@ -37,8 +37,8 @@ def advise(answer: Answer) -> tuple[str, ...]:
     if unsure := [each for each in answer.effects if each.confidence < SURE]:
         names = ", ".join(f"{each.name} ({100 * each.confidence:.0f} %)" for each in unsure)
         said.append(
-            f"Do not rely on the less sure ones, {names}, where the caption of their evidence says "
-            "that the data ask for much more or less than was found."
+            f"The names of the less sure ones, {names}, may be wrong where their sizes are right: "
+            "use the values, and look at the part before you repair anything."
         )
     if answer.verdict != "explained":
         said += _look_further(answer)

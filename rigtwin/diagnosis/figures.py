@@ -229,8 +229,9 @@ def _caption(overlay: Overlay, corrected: bool) -> str:
     name = overlay.sensor.replace("_", " ")
     where = f"{'held-out ' if overlay.held_out else ''}{overlay.recording}"
     text = (
-        f"The {name} of {where}, {start:.2f} to {end:.2f} s, where the nominal prediction is "
-        f"worst: it is off by {say(overlay.before, overlay.unit)} rms "
+        f"The {name} of {where}, {start:.2f} to {end:.2f} s, where the "
+        f"{'corrected' if corrected else 'nominal'} prediction is worst. "
+        f"The nominal one is off by {say(overlay.before, overlay.unit)} rms "
         f"({spell(overlay.before_percent, 2)} % of the signal) over the whole recording"
     )
     if corrected:

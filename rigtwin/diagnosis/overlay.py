@@ -73,10 +73,11 @@ class Overlay:
 
     @property
     def worst(self) -> tuple[float, float]:
-        """First and last time, s, of the second in which the nominal prediction is worst."""
+        """First and last time, s, of the second in which the corrected prediction is worst; where
+        nothing was corrected, that is the nominal one."""
         period = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 1.0
         ticks = min(max(round(LOOKED_AT / period), 1), len(self.time))
-        power = (self.counts > COUNTS) * (self.measured - self.nominal) ** 2
+        power = (self.counts > COUNTS) * (self.measured - self.corrected) ** 2
         sums = np.concatenate([[0.0], np.cumsum(power)])
         start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
         return float(self.time[start]), float(self.time[start + ticks - 1])

@@ -51,9 +51,10 @@ def bars(answer: Answer) -> list[Bar]:
         return []
     gap = answer.gap
     levels = [("all sensors", gap.before, gap.after)]
-    levels += [
+    replays = [
         (name.replace("_", " "), level.before, level.after) for name, level in gap.replays.items()
     ]
+    levels = [*levels, *replays] if len(replays) > 1 else replays or levels
     largest = max(max(before, after, 1.0) for _, before, after in levels)
 
     def width(value: float) -> float:
@@ -66,7 +67,10 @@ WORSE = 1.5
 """Times the typical error of the recordings from which the worst of them is told at the top."""
 NEXT_TO_NOTHING = 0.02
 """Share of the signals' swing below which a twin predicts nothing."""
-MEASURED = "how often names like it were right on test machines that this library does not describe"
+MEASURED = (
+    "of so many names like it, found on test machines whose physics this library does not have, "
+    "was right"
+)
 PROBABLE = "the probability that it is this effect, and none other that was tried"
 
 
@@ -101,8 +105,8 @@ def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
     before = [each.before_percent for each in counted]
     data = "recordings that were not fitted" if held else "the recordings"
     said.append(
-        f"Error on {data}, in percent of each signal's swing: {_between(before)} before, "
-        f"{_between(after)} after."
+        f"Rms of measured less predicted on {data}, in percent of the signal's standard "
+        f"deviation: {_between(before)} before, {_between(after)} after."
     )
     worst = counted[int(np.argmax(after))]
     if worst.after_percent > WORSE * float(np.median(after)):
@@ -149,6 +153,8 @@ def html(diagnosis: Diagnosis) -> str:
         advice=advise(answer),
         title_of=title_of,
         meaning_of=meaning_of,
+        share_of=share_of,
+        rough=diagnosis.described.rough,
         headlines=headlines(overlays, corrected),
         tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
         confidence=MEASURED if diagnosis.described.rough else PROBABLE,
@@ -172,9 +178,19 @@ def title_of(effect: Finding) -> str:
     return f"{effect.title[0].upper()}{effect.title[1:]}, {name_part(effect.name.component)}"
 
 
+def share_of(effect: Finding) -> str:
+    """An effect's share of the gap in percent."""
+    return "under 1 %" if 0.0 < effect.share < 0.01 else f"{100.0 * effect.share:.0f} %"
+
+
 def meaning_of(effect: Finding) -> str:
-    """What an effect does, in words."""
-    return next((each.meaning for each in KINDS if each.name == effect.name.kind), "")
+    """What an effect does, in words; by its sign, where that makes a difference."""
+    kind = next((each for each in KINDS if each.name == effect.name.kind), None)
+    if kind is None:
+        return ""
+    estimate = effect.parameters.get(kind.parameters[0])
+    below = estimate is not None and estimate.value < 0.0
+    return kind.negative if below and kind.negative else kind.meaning
 
 
 def _code(text: str) -> Markup:
