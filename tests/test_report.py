@@ -219,7 +219,7 @@ def test_the_top_says_how_good_the_twin_is_and_where_it_is_not():
     good = [overlay_of("a", 0.5, 0.1), overlay_of("b", 0.6, 0.12), overlay_of("c", 0.5, 0.1)]
     said = headlines([*good, overlay_of("fitted", 0.0, 0.9, held_out=False)], corrected=True)
     assert len(said) == 1
-    assert "not fitted, in percent of each signal's swing: 4" in said[0]
+    assert "not fitted, in percent of the signal's standard deviation: 4" in said[0]
     assert "before, 1" in said[0]
     said = headlines([*good, overlay_of("fast", 0.5, 0.6)], corrected=True)
     assert said[1].startswith("In fast 6")
