@@ -16,6 +16,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
+from rigtwin.diagnosis.diagnose import _find_instead
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.localisation import region
@@ -179,13 +180,16 @@ def drifting(recording: Recording, rate: float) -> Recording:
     return replace_sensors(recording, suspension_lvdt=moved)
 
 
-@SLOW
-def test_an_offset_is_not_named_for_a_drift_that_it_has_a_part_of():
-    outcome = answer(drifting(recorded("imposed", (), 20.0), 4e-5))
-    assert outcome.verdict == "unknown"
-    assert not outcome.effects
-    assert outcome.where[0].component == "suspension_lvdt"
-    assert "offset@suspension_lvdt not named" in " ".join(outcome.answer.notes)
+def test_what_something_unnamed_at_its_component_explains_alone_is_not_named():
+    evidence = evidence_of(drifting(recorded("imposed", (), 20.0), 8e-5))
+    offset, gain = (find(name, evidence.plant) for name in ("offset@suspension_lvdt", "gain@motor"))
+    most = 1.1 * evidence.expected
+    instead = _find_instead(evidence, (offset,), most)
+    assert instead is not None
+    assert instead[0].component == "suspension_lvdt"
+    assert _find_instead(evidence, (gain,), most) is None
+    assert _find_instead(evidence, (), most) is None
+    assert _find_instead(evidence, (offset,), 1.0 * evidence.expected) is None
 
 
 def test_a_free_disturbance_is_judged_beside_the_tolerances_that_the_plant_uses():

@@ -3,6 +3,7 @@ as a browser prints it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,7 +65,10 @@ def bars(answer: Answer) -> list[Bar]:
 
 
 WORSE = 1.5
-"""Times the typical error of the recordings from which the worst of them is told at the top."""
+"""Times a sensor's typical error of the recordings from which the worst of them is told at the
+top,"""
+TOLERABLE = 10.0
+"""if it is more than so many percent of the signal."""
 NEXT_TO_NOTHING = 0.02
 """Share of the signals' swing below which a twin predicts nothing."""
 MEASURED = (
@@ -108,13 +112,23 @@ def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
         f"Rms of measured less predicted on {data}, in percent of the signal's standard "
         f"deviation: {_between(before)} before, {_between(after)} after."
     )
-    worst = counted[int(np.argmax(after))]
-    if worst.after_percent > WORSE * float(np.median(after)):
+    beyond = [_beyond_noise(each) for each in counted]
+    worst = int(np.argmax(beyond))
+    alike = [
+        b for each, b in zip(counted, beyond, strict=True) if each.sensor == counted[worst].sensor
+    ]
+    if beyond[worst] > max(WORSE * float(np.median(alike)), TOLERABLE):
         said.append(
-            f"In {worst.recording} {spell(worst.after_percent, 3)} % is left of the "
-            f"{worst.sensor.replace('_', ' ')}: do not rely on the corrected twin in such tests."
+            f"In {counted[worst].recording} {spell(after[worst], 3)} % is left of the "
+            f"{counted[worst].sensor.replace('_', ' ')}: do not rely on the corrected twin in such "
+            "tests."
         )
     return said
+
+
+def _beyond_noise(overlay: Overlay) -> float:
+    """What is left of a sensor, its noise taken off, in percent of its standard deviation."""
+    return 100.0 * math.sqrt(max(overlay.after**2 - overlay.noise**2, 0.0)) / overlay.swing
 
 
 def _between(values: Sequence[float]) -> str:
