@@ -11,6 +11,7 @@ import time
 
 import pytest
 
+import rigtwin
 from rigtwin.cli import main
 from rigtwin.interruptions import held_back
 
@@ -55,3 +56,24 @@ def test_an_interruption_while_packages_are_imported_is_one_line(monkeypatch, ca
     monkeypatch.setattr("rigtwin.cli.import_module", interrupt)
     assert main(["list"]) == 130
     assert capsys.readouterr().err == "rigtwin: interrupted\n"
+
+
+def test_an_interruption_that_a_package_makes_an_import_error_of_is_one(monkeypatch, capsys):
+    def interrupt(_: str) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as pressed:
+            raise ImportError("initialization failed") from pressed
+
+    monkeypatch.setattr("rigtwin.cli.import_module", interrupt)
+    assert main(["list"]) == 130
+    assert capsys.readouterr().err == "rigtwin: interrupted\n"
+
+
+def test_a_referee_that_still_records_says_nothing_of_an_interruption(tmp_path, capfd):
+    def interrupt(*_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        rigtwin.blindcheck(2, seed=1, folder=tmp_path, workers=1, progress=interrupt)
+    assert capfd.readouterr().err == ""

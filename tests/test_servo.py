@@ -13,6 +13,7 @@ import pytest
 import rigtwin
 from rigtwin.components import Servo
 from rigtwin.components.servo import push, push_law
+from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
 from rigtwin.models.mujoco import MujocoModel
@@ -209,6 +210,27 @@ def test_the_gain_of_one_of_two_servos_is_found(tmp_path: Path) -> None:
     (found,) = answer.effects
     assert str(found.name) == "position_gain@shoulder_servo"
     assert found.parameters["position_gain"].value == pytest.approx(15.0, rel=0.02)
+
+
+def test_the_users_mjcf_gets_the_gains_that_were_found(tmp_path: Path) -> None:
+    machine = machine_in(tmp_path, ONE, model_text(two=False))
+    changes = [Change("servo", "position_gain", 15.0), Change("servo", "damping_gain", 1.4)]
+    left = write_mjcf(tmp_path / "new.xml", machine, [*changes, Change("servo", "delay", 0.01)])
+    assert left == ("servo.delay = 0.01",)
+    before, after = (
+        mujoco.MjModel.from_xml_path(str(tmp_path / n)) for n in ("arm.xml", "new.xml")
+    )
+    assert before.actuator_gainprm[0, 0] == 20.0
+    assert after.actuator_gainprm[0, 0] == 15.0
+    assert after.actuator_biasprm[0, 1:3].tolist() == [-15.0, -1.4]
+
+
+@pytest.mark.parametrize("name", ["forcerange", "ctrlrange"])
+def test_a_range_the_wrong_way_round_is_refused(tmp_path: Path, name: str) -> None:
+    text = model_text(two=False).replace('kv="1.0" />', f'kv="1.0" {name}="5 -5"/>')
+    said = f"{name} of actuator 'shoulder_servo' is 5 -5; expected the lower end first"
+    with pytest.raises(RigtwinError, match=said):
+        machine_in(tmp_path, ONE, text)
 
 
 def test_an_actuator_that_is_no_servo_is_refused(tmp_path: Path) -> None:

@@ -434,6 +434,7 @@ class TestCommand:
             (["--set", "sprung_mass=-3"], "sprung_mass -3: expected 0.001 to"),
             (["--tau", "0"], "--tau 0: expected 1e-09 to"),
             (["-o", "x.png"], "expected --map X Y"),
+            (["--model", "suspension"], "expected --map X Y"),
             (["--map", "tau", "sprung_mass", "-o", "x.doc"], "cannot draw 'x.doc'"),
             (["--map", "tau", "sprung_mass", "--delay"], "a map is of lags"),
             (["--map", "tau", "weight"], "unknown parameter 'weight'"),

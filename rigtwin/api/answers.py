@@ -22,15 +22,15 @@ from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
-Given = reader.Recording | str | Path
+Recorded = reader.Recording | str | Path
 """A recording, or the path of one."""
 
 
 def diagnose(
-    recordings: Given | Sequence[Given],
+    recordings: Recorded | Sequence[Recorded],
     *,
     machine: Machine | str | Path | None = None,
-    held_out: Given | Sequence[Given] = (),
+    held_out: Recorded | Sequence[Recorded] = (),
     settings: Settings = (),
     without: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
@@ -78,7 +78,7 @@ def diagnose(
 
 
 def what_changed(
-    recordings: Sequence[Given],
+    recordings: Sequence[Recorded],
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
@@ -120,7 +120,7 @@ def what_changed(
 
 
 def compare(
-    recording: Given,
+    recording: Recorded,
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
@@ -154,7 +154,9 @@ def compare(
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 
 
-def compare_recordings(first: Given, second: Given) -> tuple[dict[str, Residual], tuple[str, ...]]:
+def compare_recordings(
+    first: Recorded, second: Recorded
+) -> tuple[dict[str, Residual], tuple[str, ...]]:
     """Two recordings of one test, sensor by sensor.
 
     Parameters
@@ -175,7 +177,7 @@ def compare_recordings(first: Given, second: Given) -> tuple[dict[str, Residual]
     return find_differences(machine_of(first), first, second), differences(first, second)
 
 
-def calibrate(recording: Given) -> Calibration:
+def calibrate(recording: Recorded) -> Calibration:
     """The friction compensator's settings that a recording of the suspension rig asks for.
 
     Parameters
@@ -206,7 +208,7 @@ def calibrate(recording: Given) -> Calibration:
     return found
 
 
-def _several(given: Given | Sequence[Given]) -> Iterator[reader.Recording]:
+def _several(given: Recorded | Sequence[Recorded]) -> Iterator[reader.Recording]:
     several = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for each in several:
         yield the_recording(each)

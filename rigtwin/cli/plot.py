@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_stretch
-from rigtwin.files import keep_apart
 
 SUMMARY = "draw a recording: motions, force, wheel and voltage over time"
 MORE = """\
@@ -44,7 +43,7 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording)
-    out = keep_apart(parsed.out or parsed.recording.with_suffix(".png"), parsed.recording)
+    out = parsed.out or parsed.recording.with_suffix(".png")
     drawn = recording.plot(out, parsed.start, parsed.until, style=parsed.style, panels=parsed.panel)
     print(f"drawn in {drawn}")
     return 0

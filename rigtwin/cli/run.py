@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
-from rigtwin.cli.supervised import add_supervised, require_card, run
+from rigtwin.cli.supervised import add_supervised, is_the_rig, require_card, run
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 
@@ -107,9 +107,7 @@ def _fresh(stem: str) -> Path:
 
 
 def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) -> int:
-    from rigtwin.components import RigPlant
-
-    if machine.plant != RigPlant():
+    if not is_the_rig(machine):
         raise RigtwinError(
             "--card, --real-time and --target daq run the nominal suspension rig alone; "
             f"{machine.name} has other components or values"

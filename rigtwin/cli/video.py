@@ -7,7 +7,6 @@ from pathlib import Path
 
 from rigtwin.cli.options import add_machine, add_settings, add_stretch, settings_of
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
 
 SUMMARY = "film a recording: the machine moving, its signals drawn beneath"
 MORE = ""
@@ -51,7 +50,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if not parsed.ghost and (parsed.set or parsed.config):
         raise RigtwinError("--set and --config are of the twin that --ghost draws; add --ghost")
     recording = rigtwin.load(parsed.recording, parsed.machine)
-    out = keep_apart(parsed.out or parsed.recording.with_suffix(".mp4"), parsed.recording)
+    out = parsed.out or parsed.recording.with_suffix(".mp4")
     with tqdm(unit="frame", disable=None, desc="filming", leave=False) as bar:
 
         def progress(done: int, total: int) -> None:

@@ -12,7 +12,7 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
-from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor
+from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -22,8 +22,9 @@ ATTRIBUTES: dict[type, dict[str, str]] = {
     Guide: {"coulomb": "frictionloss", "viscous": "damping", "stiffness": "stiffness"},
     Rail: {"coulomb": "frictionloss", "viscous": "damping"},
     Rotor: {"inertia": "armature"},
+    Servo: {"position_gain": "kp", "damping_gain": "kv"},
 }
-"""Component → parameter → attribute of its joint or tendon."""
+"""Component → parameter → attribute of its joint, tendon or position actuator."""
 PARENTS = {"joint": "body", "tendon": "tendon", "actuator": "actuator"}
 """Element of a description → what its tag stands in."""
 HEAVY = ("mass", "diaginertia", "fullinertia", "density")
@@ -183,8 +184,13 @@ def _apply(document: Document, machine: Machine, change: Change) -> bool:
         return False
     nominal = getattr(machine.plant, change.component)
     attribute = ATTRIBUTES.get(type(nominal), {}).get(change.parameter)
-    if attribute is not None and component.element in ("joint", "tendon"):
+    if attribute is not None and component.element in PARENTS:
         tag = document.find(component.element, component.mjcf)
+        if component.element == "actuator" and (
+            tag.name != "position" or "dampratio" in tag.attributes
+        ):
+            # Another tag has other attributes, and a ratio would be what kv is worked out from.
+            return False
         document.set(tag, attribute, _number(change.value))
         return True
     if isinstance(nominal, Mass) and change.parameter == "mass" and nominal.mass > 0.0:

@@ -34,11 +34,8 @@ NOT_NEGATIVE = {
 }
 """Array of a model → its attribute in MJCF; MuJoCo takes them negative, and then energy comes from
 nowhere."""
-RANGES = (
-    ("actuator_ctrllimited", "actuator_ctrlrange", "ctrlrange"),
-    ("actuator_forcelimited", "actuator_forcerange", "forcerange"),
-)
-"""Arrays of a model that say whether there is a limit, and both ends of it; its attribute."""
+RANGES = {"actuator_ctrlrange": "ctrlrange", "actuator_forcerange": "forcerange"}
+"""Array of a model → its attribute in MJCF; MuJoCo takes one the wrong way round for none."""
 OWNERS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "jnt": mujoco.mjtObj.mjOBJ_JOINT,
@@ -155,9 +152,9 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
                 f"model {path}: {_owner(model, name, place)} is {values[place]}; "
                 "expected a finite number"
             )
-    for limited, limits, attribute in RANGES:
+    for limits, attribute in RANGES.items():
         pairs = getattr(model, limits)
-        wrong = np.flatnonzero(getattr(model, limited).astype(bool) & ~(pairs[:, 0] < pairs[:, 1]))
+        wrong = np.flatnonzero(pairs.any(axis=1) & ~(pairs[:, 0] < pairs[:, 1]))
         if len(wrong):
             low, high = pairs[wrong[0]]
             raise RigtwinError(

@@ -72,8 +72,8 @@ TOLERABLE = 10.0
 NEXT_TO_NOTHING = 0.02
 """Share of the signals' swing below which a twin predicts nothing."""
 MEASURED = (
-    "of so many names like it, found on test machines whose physics this library does not have, "
-    "was right"
+    "how many of a hundred names like it were right on test machines whose physics this library "
+    "does not have"
 )
 PROBABLE = "the probability that it is this effect, and none other that was tried"
 
