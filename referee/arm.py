@@ -4,29 +4,22 @@ accept."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from referee.arm_cases import MACHINES, ArmCase, ArmTest, draw_arm, record_arm
+from referee.arm_cases import MACHINES, ArmCase, draw_arm, record_arm
 from referee.score import Row, names, share_of
-from referee.wild import answer_wild
 from referee.wild_cases import WildData
-from rigtwin.studies.sweep import Store, Workers, run_jobs
+from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
+from rigtwin.studies.sweep import Workers
 
 FLAGGED = ("unknown", "partly explained")
 """Verdicts that say that something has no name."""
 
-
-@dataclass(frozen=True)
-class ArmResult:
-    """A check. answers: what the diagnosis said, a JSON document a case."""
-
-    seed: int
-    cases: tuple[ArmCase, ...]
-    answers: tuple[dict[str, Any], ...]
+ArmResult = Withheld[ArmCase]
 
 
 def check_arms(
@@ -36,39 +29,14 @@ def check_arms(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> ArmResult:
-    """The whole check.
+    """The whole check, its answers kept in a folder; see `check_machines`."""
 
-    Parameters
-    ----------
-    folder
-        Where answers are kept, so that an interrupted check goes on.
-    count, seed
-        Of cases, and of their draw.
-    workers
-        Who diagnoses: they see recordings and a description, and draw nothing.
-    progress
-        Called with 1 for each answer.
+    def ask(case: ArmCase) -> Question:
+        tests = [record_arm(case, again) for again in (0, 1)]
+        return MACHINES[case.machine], [WildData(each.columns, each.period, {}) for each in tests]
 
-    Returns
-    -------
-    ArmResult
-        Cases and answers.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    cases = tuple(draw_arm(number, seed) for number in range(count))
-
-    def load(test: ArmTest) -> WildData:
-        return WildData(test.columns, test.period, {})
-
-    def jobs() -> Iterator[tuple[str, tuple[str, list[WildData]]]]:
-        for number, case in enumerate(cases):
-            tests = [load(record_arm(case, again)) for again in (0, 1)]
-            yield keys[number], (MACHINES[case.machine], tests)
-
-    keys = [f"{seed}-{number}" for number in range(count)]
-    with Store(folder / f"arm-{seed}.sqlite") as store:
-        run_jobs(store, workers, answer_wild, jobs(), progress)
-        return ArmResult(seed, cases, tuple(store[key] for key in keys))
+    cases = [draw_arm(number, seed) for number in range(count)]
+    return check_machines(folder / f"arm-{seed}.sqlite", cases, seed, ask, workers, progress)
 
 
 def _accept_all(case: ArmCase) -> frozenset[str]:
@@ -105,7 +73,6 @@ def arm_rows(result: ArmResult) -> list[Row]:
 
     errors = list(_weigh_payloads(result))
     said = f"{100 * np.median(errors):.1f} % / {100 * max(errors):.1f} %" if errors else "no case"
-    seconds = [answer["seconds"] for _, answer in pairs]
     return [
         share_of("single effects: joint and kind", [is_right(*p) for p in of("single")], ">= 92 %"),
         share_of("pairs on different joints: both", [is_right(*p) for p in of("pair")], ">= 80 %"),
@@ -117,9 +84,7 @@ def arm_rows(result: ArmResult) -> list[Row]:
         ),
         share_of("a wrong name", [is_wrong(*p) for p in pairs], "<= 5 %"),
         Row("mass of a payload, error, median / largest", said, "<= 3 %"),
-        Row(
-            "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
-        ),
+        seconds_row(result.answers),
     ]
 
 
@@ -163,10 +128,5 @@ def arm_document(result: ArmResult) -> dict[str, Any]:
 
 def arm_table(result: ArmResult) -> str:
     """The score as text."""
-    lines = [f"seed {result.seed}, {len(result.cases)} machines", ""]
-    for row in arm_rows(result):
-        interval = ""
-        if row.low is not None and row.high is not None:
-            interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]"
-        lines.append(f"{row.measure:44s} {row.value:20s} {interval:16s} {row.goal}".rstrip())
+    lines = score_lines(result.seed, len(result.cases), arm_rows(result))
     return "\n".join([*lines, "", "not answered right:", *_list_misses(result)])

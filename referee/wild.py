@@ -3,7 +3,6 @@ would accept."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
@@ -13,23 +12,16 @@ from typing import Any
 import numpy as np
 
 from referee.score import Row, names, share_of
-from referee.wild_cases import MACHINES, WildCase, WildData, draw_wild, record_wild
-from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep import Store, Workers, run_jobs
+from referee.wild_cases import MACHINES, WildCase, draw_wild, record_wild
+from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
+from rigtwin.studies.sweep import Workers
 
 SURE = 0.8
 """Confidence from which nine names in ten must be right."""
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 1.0)
 """Of the reliability diagram."""
 
-
-@dataclass(frozen=True)
-class WildResult:
-    """A check. answers: what the diagnosis said, a JSON document a case."""
-
-    seed: int
-    cases: tuple[WildCase, ...]
-    answers: tuple[dict[str, Any], ...]
+WildResult = Withheld[WildCase]
 
 
 @dataclass(frozen=True)
@@ -47,60 +39,13 @@ def check_wild(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> WildResult:
-    """The whole check.
+    """The whole check, its answers kept in a folder; see `check_machines`."""
 
-    Parameters
-    ----------
-    folder
-        Where answers are kept, so that an interrupted check goes on.
-    count, seed
-        Of cases, and of their draw.
-    workers
-        Who diagnoses: they see recordings and a description, and draw nothing.
-    progress
-        Called with 1 for each answer.
+    def ask(case: WildCase) -> Question:
+        return MACHINES[case.machine], [record_wild(case, again) for again in (0, 1)]
 
-    Returns
-    -------
-    WildResult
-        Cases and answers.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    cases = tuple(draw_wild(number, seed) for number in range(count))
-
-    def jobs() -> Iterator[tuple[str, tuple[str, list[WildData]]]]:
-        for number, case in enumerate(cases):
-            tests = [record_wild(case, again) for again in (0, 1)]
-            yield keys[number], (MACHINES[case.machine], tests)
-
-    keys = [f"{seed}-{number}" for number in range(count)]
-    with Store(folder / f"wild-{seed}.sqlite") as store:
-        run_jobs(store, workers, answer_wild, jobs(), progress)
-        return WildResult(seed, cases, tuple(store[key] for key in keys))
-
-
-def answer_wild(question: tuple[str, list[WildData]]) -> dict[str, Any]:
-    """One case's answer, of a recording and one held out. What is not answered at all is an answer
-    too."""
-    from rigtwin.description.catalogue import find
-    from rigtwin.diagnosis.diagnose import diagnose
-    from rigtwin.recording import Recording
-
-    name, tests = question
-    machine = find(name)
-
-    def load(data: WildData, label: str) -> Recording:
-        ticks = len(next(iter(next(iter(data.columns.values())).values())))
-        times = np.arange(ticks) * data.period
-        return Recording(Path(label), machine.name, "", data.period, times, data.columns, {})
-
-    began = time.perf_counter()
-    fitted, held_out = (load(data, label) for data, label in zip(tests, "ab", strict=True))
-    try:
-        return diagnose(machine, [fitted], held_out=[held_out]).document()
-    except RigtwinError as error:
-        seconds = time.perf_counter() - began
-        return {"verdict": "unusable", "effects": [], "sentence": str(error), "seconds": seconds}
+    cases = [draw_wild(number, seed) for number in range(count)]
+    return check_machines(folder / f"wild-{seed}.sqlite", cases, seed, ask, workers, progress)
 
 
 def judge_names(result: WildResult) -> list[Named]:
@@ -130,7 +75,6 @@ def wild_rows(result: WildResult) -> list[Row]:
     right = [bool(a["effects"]) and not bad for (_, a), bad in zip(pairs, wrong, strict=True)]
     named = judge_names(result)
     held = list(_intervals(result))
-    seconds = [a["seconds"] for _, a in pairs]
     return [
         share_of("a wrong family named", wrong, "<= 5 %"),
         share_of("named, and all of it acceptable", right, "none set"),
@@ -141,9 +85,7 @@ def wild_rows(result: WildResult) -> list[Row]:
             ">= 90 %",
         ),
         share_of("intervals that hold the truth", held, "90 to 98 %"),
-        Row(
-            "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
-        ),
+        seconds_row(result.answers),
     ]
 
 
@@ -179,12 +121,7 @@ def wild_document(result: WildResult) -> dict[str, Any]:
 
 def wild_table(result: WildResult) -> str:
     """The score as text."""
-    lines = [f"seed {result.seed}, {len(result.cases)} machines", ""]
-    for row in wild_rows(result):
-        interval = ""
-        if row.low is not None and row.high is not None:
-            interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]"
-        lines.append(f"{row.measure:40s} {row.value:24s} {interval:16s} {row.goal}".rstrip())
+    lines = score_lines(result.seed, len(result.cases), wild_rows(result))
     lines += ["", "confidence said, share acceptable, names"]
     lines += [
         f"{said:.2f}  {true:.2f}  {count}" for said, true, count in reliability(judge_names(result))

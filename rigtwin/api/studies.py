@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Literal
 
 from experiments.rths.actuator import draw_plants
 from experiments.rths.building import find_case
@@ -32,6 +33,7 @@ from rigtwin.studies.tuning.result import TuningResult, count_runs
 from rigtwin.studies.tuning.result import tune as tune_study
 
 MOST_PLANTS = 1000
+Draw = Literal["wild", "arm"]
 Progress = Callable[[int, int], object]
 """Called with what is done and with how much there is in all."""
 
@@ -283,21 +285,25 @@ def blindcheck(
         return check.check(Path(folder), cases, seed, baselines, open_, step)
 
 
-def blindcheck_wild(
+def blindcheck_machines(
     cases: int = 200,
     *,
+    draw: Draw = "wild",
     seed: int = 2026,
     folder: str | Path = "blindcheck",
     workers: int | None = None,
     cluster: str | None = None,
     progress: Progress = _nothing,
-) -> wild.WildResult:
-    """Holds the diagnosis to machines whose physics have forms that its library does not have.
+) -> wild.WildResult | arm.ArmResult:
+    """Holds the diagnosis to other machines than the rig, whose defects are withheld from it.
 
     Parameters
     ----------
     cases
         How many machines.
+    draw
+        "wild": machines whose physics have forms that the library does not have. "arm": joints that
+        act on each other.
     seed
         Of the draws.
     folder
@@ -310,45 +316,14 @@ def blindcheck_wild(
     Raises
     ------
     RigtwinError
-        If the folder cannot be written.
+        For another draw, or if the folder cannot be written.
     """
     _check_draw(cases, seed)
+    checks = {"wild": wild.check_wild, "arm": arm.check_arms}
+    if draw not in checks:
+        raise RigtwinError(f"draw {draw!r:.40}: expected one of {', '.join(checks)}")
     with open_workers(workers, cluster) as open_:
-        return wild.check_wild(Path(folder), cases, seed, open_, _counting(progress, cases))
-
-
-def blindcheck_arm(
-    cases: int = 200,
-    *,
-    seed: int = 2026,
-    folder: str | Path = "blindcheck",
-    workers: int | None = None,
-    cluster: str | None = None,
-    progress: Progress = _nothing,
-) -> arm.ArmResult:
-    """Holds the diagnosis to arms, joints that act on each other, whose defects are withheld.
-
-    Parameters
-    ----------
-    cases
-        How many machines.
-    seed
-        Of the draws.
-    folder
-        Of the answers; what is there already is not diagnosed again.
-    workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
-    progress
-        Called with the machines done and with how many there are.
-
-    Raises
-    ------
-    RigtwinError
-        If the folder cannot be written.
-    """
-    _check_draw(cases, seed)
-    with open_workers(workers, cluster) as open_:
-        return arm.check_arms(Path(folder), cases, seed, open_, _counting(progress, cases))
+        return checks[draw](Path(folder), cases, seed, open_, _counting(progress, cases))
 
 
 def _check_draw(cases: int, seed: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import rigtwin
 from rigtwin.cli.options import add_workers, counting_bar
@@ -84,10 +85,8 @@ def execute(parsed: argparse.Namespace) -> int:
         raise RigtwinError("--wild: expected without --tune and --baselines")
     if parsed.machine == "arm" and (parsed.wild or parsed.tune is not None or parsed.baselines):
         raise RigtwinError("--machine arm: expected without --wild, --tune and --baselines")
-    if parsed.wild:
-        return _wild(parsed)
-    if parsed.machine == "arm":
-        return _arms(parsed)
+    if parsed.wild or parsed.machine == "arm":
+        return _machines(parsed)
     return _diagnoses(parsed) if parsed.tune is None else _tuning(parsed)
 
 
@@ -110,43 +109,29 @@ def _diagnoses(parsed: argparse.Namespace) -> int:
     return 0
 
 
-def _wild(parsed: argparse.Namespace) -> int:
+def _machines(parsed: argparse.Namespace) -> int:
+    from referee.arm import arm_document, arm_table
     from referee.wild import judge_names, reliability, wild_document, wild_table
 
-    with counting_bar("machine", "wild machines") as progress:
-        result = rigtwin.blindcheck_wild(
+    draw = "wild" if parsed.wild else "arm"
+    table, document = (wild_table, wild_document) if parsed.wild else (arm_table, arm_document)
+    with counting_bar("machine", "machines") as progress:
+        result: Any = rigtwin.blindcheck_machines(
             CASES if parsed.cases is None else parsed.cases,
+            draw=draw,
             seed=parsed.seed,
             folder=parsed.folder,
             workers=parsed.workers,
             cluster=parsed.cluster,
             progress=progress,
         )
-    print(wild_table(result))
+    print(table(result))
     if parsed.json is not None:
-        write_json(parsed.json, wild_document(result))
+        write_json(parsed.json, document(result))
     if parsed.draw is not None:
         from referee.reliability import draw_reliability
 
         draw_reliability(reliability(judge_names(result)), parsed.draw)
-    return 0
-
-
-def _arms(parsed: argparse.Namespace) -> int:
-    from referee.arm import arm_document, arm_table
-
-    with counting_bar("machine", "arms") as progress:
-        result = rigtwin.blindcheck_arm(
-            CASES if parsed.cases is None else parsed.cases,
-            seed=parsed.seed,
-            folder=parsed.folder,
-            workers=parsed.workers,
-            cluster=parsed.cluster,
-            progress=progress,
-        )
-    print(arm_table(result))
-    if parsed.json is not None:
-        write_json(parsed.json, arm_document(result))
     return 0
 
 

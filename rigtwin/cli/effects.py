@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from machines import DEFAULT_MACHINE
+from rigtwin.cli.options import add_machine
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
 
@@ -15,12 +16,7 @@ Give one to a test with rigtwin run NAME --effect KIND@COMPONENT=VALUE."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("component", nargs="?", help="only those of this component")
-    parser.add_argument(
-        "--machine",
-        default=DEFAULT_MACHINE,
-        metavar="F.toml",
-        help=f"of that machine, by name or description (default {DEFAULT_MACHINE})",
-    )
+    add_machine(parser, "of that machine", DEFAULT_MACHINE)
 
 
 def execute(parsed: argparse.Namespace) -> int:

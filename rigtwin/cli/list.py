@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from machines import DEFAULT_MACHINE
+from rigtwin.cli.options import add_machine
 from rigtwin.console import table
 
 SUMMARY = "list the experiments, or the settings"
@@ -16,12 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--settings", metavar="NAME", help="the settings of that experiment instead"
     )
-    parser.add_argument(
-        "--machine",
-        default=DEFAULT_MACHINE,
-        metavar="F.toml",
-        help=f"of that machine, by name or description (default {DEFAULT_MACHINE})",
-    )
+    add_machine(parser, "of that machine", DEFAULT_MACHINE)
 
 
 def execute(parsed: argparse.Namespace) -> int:

@@ -39,11 +39,17 @@ def add_effect(parser: argparse.ArgumentParser, summary: str) -> None:
     )
 
 
-def add_machine(parser: argparse.ArgumentParser) -> None:
+def add_machine(
+    parser: argparse.ArgumentParser,
+    what: str = "the machine",
+    default: str | None = None,
+) -> None:
     parser.add_argument(
         "--machine",
+        default=default,
         metavar="F.toml",
-        help="the machine, by name or description (default: the one that the recording names)",
+        help=f"{what}, by name or description "
+        f"(default: {default or 'the one that the recording names'})",
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from machines import DEFAULT_MACHINE
-from rigtwin.cli.options import add_effect, add_settings, settings_of
+from rigtwin.cli.options import add_effect, add_machine, add_settings, settings_of
 from rigtwin.cli.supervised import add_supervised, is_the_rig, require_card, run
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
@@ -27,12 +27,7 @@ exit code 3: a limit tripped; the recording is kept."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", help="an experiment of rigtwin list")
-    parser.add_argument(
-        "--machine",
-        default=DEFAULT_MACHINE,
-        metavar="F.toml",
-        help=f"whose twin is run, by name or description (default {DEFAULT_MACHINE})",
-    )
+    add_machine(parser, "whose twin is run", DEFAULT_MACHINE)
     parser.add_argument(
         "--seed",
         type=int,

@@ -4,7 +4,6 @@ test."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Row
 from rigtwin.errors import RigtwinError
 from rigtwin.models.coupled import CoupledModel
+from rigtwin.models.demanded import pose_as_recorded
 from rigtwin.numerics.arrays import RUNAWAY, Array
-from rigtwin.recording import Recording
 
 
 def move_freely(
@@ -45,26 +44,12 @@ def move_freely(
     """
     (replay,) = machine.replays
     plant, period = configuration.plant, configuration.timing.period
-    found: dict[str, Array] = {}
-    columns: dict[str, dict[str, Array]] = {}
-    for name, demand in demands.items():
-        part = getattr(plant, name)
-        signal = demand
-        if measures(part):
-            signal = found[name] = apply_sensor(part, demand, period)
-        channel = machine.components[name].channel
-        assert channel is not None
-        columns.setdefault(channel[0], {})[channel[1]] = signal
-    ticks = len(next(iter(demands.values())))
-    recording = Recording(
-        path=Path("test"),
-        machine=machine.name,
-        experiment="",
-        period=period,
-        time=np.arange(ticks) * period,
-        columns=columns,
-        controller={},
-    )
+    found = {
+        name: apply_sensor(getattr(plant, name), demand, period)
+        for name, demand in demands.items()
+        if measures(getattr(plant, name))
+    }
+    recording = pose_as_recorded(machine, {**demands, **found}, period)
     unobserved = replace(replay, rows=())
     model = CoupledModel(machine, unobserved, recording, configuration, configuration.substeps)
     moved = model.move(plant)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import numpy as np
-
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.models.demanded import pose_as_recorded
 from rigtwin.models.moved import MovedModel
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
 
 
 def move_together(
@@ -38,21 +34,7 @@ def move_together(
     found = {
         name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
     }
-    columns: dict[str, dict[str, Array]] = {}
-    for name, reading in found.items():
-        channel = machine.components[name].channel
-        assert channel is not None
-        columns.setdefault(channel[0], {})[channel[1]] = reading
-    ticks = len(next(iter(found.values())))
-    recording = Recording(
-        path=Path("test"),
-        machine=machine.name,
-        experiment="",
-        period=period,
-        time=np.arange(ticks) * period,
-        columns=columns,
-        controller={},
-    )
+    recording = pose_as_recorded(machine, found, period)
     forces = MovedModel(machine, replay, recording).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
         found[row.name] = apply_sensor(getattr(plant, row.name), force, period)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from queue import SimpleQueue
-from types import TracebackType
 from typing import Any, Protocol
 
 from rigtwin.errors import RigtwinError
@@ -51,12 +50,7 @@ class Workers(Protocol):
         ...
 
     def __enter__(self) -> Workers: ...
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, kind: type[BaseException] | None, /, *_: object) -> None: ...
 
 
 class _Finished:
@@ -92,12 +86,7 @@ class Here:
     def __enter__(self) -> Workers:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, kind: type[BaseException] | None, /, *_: object) -> None: ...
 
 
 def open_workers(workers: int | None = None, cluster: str | None = None) -> Workers:

@@ -1,0 +1,112 @@
+"""Machines whose defects are withheld from the diagnosis, and what it said of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from referee.score import Row
+from referee.wild_cases import WildData
+from rigtwin.errors import RigtwinError
+from rigtwin.studies.sweep import Store, Workers, run_jobs
+
+Case = TypeVar("Case")
+Question = tuple[str, list[WildData]]
+"""A machine by name, and its data: a test and one held out."""
+
+
+@dataclass(frozen=True)
+class Withheld(Generic[Case]):
+    """A check. answers: what the diagnosis said, a JSON document a case."""
+
+    seed: int
+    cases: tuple[Case, ...]
+    answers: tuple[dict[str, Any], ...]
+
+
+def check_machines(
+    store: Path,
+    cases: Sequence[Case],
+    seed: int,
+    ask: Callable[[Case], Question],
+    workers: Workers,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Withheld[Case]:
+    """The whole check.
+
+    Parameters
+    ----------
+    store
+        File where answers are kept, so that an interrupted check goes on.
+    cases, seed
+        What is withheld, and the seed that it was drawn with.
+    ask
+        What the diagnosis is shown of a case.
+    workers
+        Who diagnoses: they see recordings and a description, and draw nothing.
+    progress
+        Called with 1 for each answer.
+
+    Returns
+    -------
+    Withheld
+        Cases and answers.
+    """
+    store.parent.mkdir(parents=True, exist_ok=True)
+    keys = [f"{seed}-{number}" for number in range(len(cases))]
+
+    def jobs() -> Iterator[tuple[str, Question]]:
+        for key, case in zip(keys, cases, strict=True):
+            yield key, ask(case)
+
+    with Store(store) as answers:
+        run_jobs(answers, workers, answer_question, jobs(), progress)
+        return Withheld(seed, tuple(cases), tuple(answers[key] for key in keys))
+
+
+def answer_question(question: Question) -> dict[str, Any]:
+    """One case's answer, of a recording and one held out. What is not answered at all is an answer
+    too."""
+    from rigtwin.description.catalogue import find
+    from rigtwin.diagnosis.diagnose import diagnose
+    from rigtwin.recording import Recording
+
+    name, tests = question
+    machine = find(name)
+
+    def load(data: WildData, label: str) -> Recording:
+        ticks = len(next(iter(next(iter(data.columns.values())).values())))
+        times = np.arange(ticks) * data.period
+        return Recording(Path(label), machine.name, "", data.period, times, data.columns, {})
+
+    began = time.perf_counter()
+    fitted, held_out = (load(data, label) for data, label in zip(tests, "ab", strict=True))
+    try:
+        return diagnose(machine, [fitted], held_out=[held_out]).document()
+    except RigtwinError as error:
+        seconds = time.perf_counter() - began
+        return {"verdict": "unusable", "effects": [], "sentence": str(error), "seconds": seconds}
+
+
+def seconds_row(answers: Sequence[dict[str, Any]]) -> Row:
+    """How long the answers took."""
+    seconds = [answer["seconds"] for answer in answers]
+    return Row(
+        "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
+    )
+
+
+def score_lines(seed: int, machines: int, rows: Sequence[Row]) -> list[str]:
+    """The head of a score as text, and a line for each measure."""
+    lines = [f"seed {seed}, {machines} machines", ""]
+    for row in rows:
+        interval = ""
+        if row.low is not None and row.high is not None:
+            interval = f"[{100 * row.low:.0f} to {100 * row.high:.0f} %]"
+        lines.append(f"{row.measure:44s} {row.value:24s} {interval:16s} {row.goal}".rstrip())
+    return lines
