@@ -220,18 +220,18 @@ class _Builder:
 
 
 @compilable
-def run(program: Program, registers: Any, memory: Any, period: float) -> float:
-    """The formula's value at this tick. registers: the program's, with the inputs' values written
-    into its first places; memory: what its blocks remember. Both are changed."""
-    count = len(program.operations)
+def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
+    """The formula's value at this tick. operations: of its program; registers: the program's, with
+    the inputs' values written into its first places; memory: what its blocks remember. Both are changed."""
+    count = len(operations)
     first = len(registers) - count
     value = 0.0
     for number in range(count):
-        code = program.operations[number, 0]
-        one = registers[program.operations[number, 1]]
-        two = registers[program.operations[number, 2]]
-        three = registers[program.operations[number, 3]]
-        at = program.operations[number, 4]
+        code = operations[number, 0]
+        one = registers[operations[number, 1]]
+        two = registers[operations[number, 2]]
+        three = registers[operations[number, 3]]
+        at = operations[number, 4]
         if code == ADD:
             value = one + two
         elif code == SUBTRACT:
@@ -283,14 +283,15 @@ def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> 
     if math.isnan(memory[at]):
         memory[at] = 0.0
         memory[at + 1 : at + 1 + size] = sample
-    place = int(memory[at])
-    memory[at + 1 + place] = sample
-    memory[at] = (place + 1) % size
+    place, first = int(memory[at]), at + 1
+    memory[first + place] = sample
+    memory[at] = place + 1 if place < length else 0
     if code == LATE:
-        return memory[at + 1 + (place - length) % size]
+        # The ring is one longer than what it remembers: the next place holds the oldest.
+        return memory[first + (place + 1 if place < length else 0)]
     total = 0.0
     for back in range(length):
-        total += memory[at + 1 + (place - back) % size]
+        total += memory[first + (place - back if place >= back else place - back + size)]
     return total / length
 
 
@@ -306,4 +307,4 @@ def _replayed(
     for tick in range(len(out)):
         for number in range(program.inputs):
             registers[number] = inputs[tick, number]
-        out[tick] = run(program, registers, memory, period)
+        out[tick] = run(program.operations, registers, memory, period)

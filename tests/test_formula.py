@@ -66,7 +66,7 @@ def test_python_and_compiled_code_agree(text):
     registers, out = program.registers.copy(), np.empty(TICKS)
     for tick in range(TICKS):
         registers[: program.inputs] = SIGNAL[tick]
-        out[tick] = run(program, registers, memory, PERIOD)
+        out[tick] = run(program.operations, registers, memory, PERIOD)
     inputs = [SIGNAL for _ in compiled.inputs] or [SIGNAL]
     np.testing.assert_allclose(out, compiled.replayed({}, inputs, PERIOD), atol=1e-12)
 

@@ -270,21 +270,24 @@ def integrate_pushed(
     share = h / (guide.relaxation + h)
     yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
     inner, speed = x, 0.0
+    # Taken out of their tuple here: in the loop it costs more than a step.
+    sensor, recorded, noise = loop.sensor, loop.recorded, loop.noise
+    operations, registers, memory = loop.program.operations, loop.registers, loop.memory
     for tick in range(len(command)):
         out[0, tick], out[1, tick] = x, v
         out[2, tick] = push(law, wanted, x, v) if follows else force
         if loop.closed:
-            for number in range(len(loop.sensor)):
-                which = loop.sensor[number]
-                loop.registers[number] = loop.recorded[tick, number]
+            for number in range(len(sensor)):
+                which = sensor[number]
+                registers[number] = recorded[tick, number]
                 if which >= 0:
                     true = x if kinds[which] == 0 else v
                     # To take a sensor out of the tuple costs more than the rest of a tick.
                     sensed = (
                         true if neutral[which] else transduce(sensors[which], states[which], true)
                     )
-                    loop.registers[number] = sensed + loop.noise[tick, number]
-            command[tick] = run(loop.program, loop.registers, loop.memory, period)
+                    registers[number] = sensed + noise[tick, number]
+            command[tick] = run(operations, registers, memory, period)
         for _ in range(steps):
             if follows:
                 before, wanted = wanted, condition(drive, held, command[tick])

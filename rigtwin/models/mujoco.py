@@ -217,7 +217,7 @@ class MujocoModel(JointModel):
             for number, channel in enumerate(control.channels):
                 name = by_channel.get(channel)
                 registers[number] = columns[number][tick] if name is None else sensed[name]
-            return float(run_formula(program, registers, memory, self._period))
+            return float(run_formula(program.operations, registers, memory, self._period))
 
         return compute
 

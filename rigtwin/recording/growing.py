@@ -9,12 +9,12 @@ from pathlib import Path
 from mcap.exceptions import InvalidMagic
 from mcap.opcode import Opcode
 from mcap.records import Chunk
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.reader import Gathered, Recording
-from rigtwin.recording.records import DAMAGE, Lost
+from rigtwin.recording.records import DAMAGE, Lost, take_apart
 
 _PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
@@ -107,7 +107,7 @@ class GrowingRecording:
         reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
         try:
             whole = next(reader.records)
-            parts = breakup_chunk(whole, validate_crc=True) if isinstance(whole, Chunk) else [whole]
+            parts = take_apart(whole) if isinstance(whole, Chunk) else [whole]
             for part in parts:
                 self._gathered.add(part)
         except InvalidMagic:

