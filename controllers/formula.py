@@ -222,7 +222,8 @@ class _Builder:
 @compilable
 def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
     """The formula's value at this tick. operations: of its program; registers: the program's, with
-    the inputs' values written into its first places; memory: what its blocks remember. Both are changed."""
+    the inputs' values written into its first places; memory: what its blocks remember. Both are
+    changed."""
     count = len(operations)
     first = len(registers) - count
     value = 0.0

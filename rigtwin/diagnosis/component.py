@@ -1,15 +1,14 @@
 """Component replays: recorded signals drive one component alone, and its output is put beside what
 was measured.
 
-All mechanics run in the twin's own model; a replay only prescribes more of its joints or forces
-than a test does.
+All mechanics are the diagnosis' own model of the quarter car; a replay only prescribes more of its
+joints or forces than a test does.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from scipy.interpolate import CubicSpline
 
@@ -23,22 +22,15 @@ from rigtwin.components.cylinder import (
     rest_state,
 )
 from rigtwin.description.configuration import Configuration
+from rigtwin.models.quarter_car import follow_plates
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import forward, integrate, kernel
-from rigtwin.simulation.mechanics import Handles, build, handles
+from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.plant import (
-    Contacts,
-    brace,
-    contacts,
-    drive,
     initial_deflection,
-    motor_force,
-    touch,
-    true_measurements,
 )
 
-FIXED = 1e6
-"""kg; a carriage this heavy goes where it is driven."""
+FIXED = 1e12
+"""kg; a carriage this heavy stays where it is."""
 AWAY = 1.0
 """m; a ground plate this far back does not touch the tyre."""
 
@@ -94,53 +86,6 @@ def replay_cylinder(
     return out
 
 
-@kernel
-def _mechanics(
-    mechanics: Handles,
-    contacts: Contacts,
-    motor_drive: Actuator,
-    motor_command: ActuatorState,
-    substeps: int,
-    ground: Array,
-    structure: Array,
-    carriage: Array,
-    voltage: Array,
-    force: Array,
-    load_cell_out: Array,
-    wheel_out: Array,
-) -> None:
-    """Motions have substeps·(ticks − 1) + 2 samples. An empty carriage array leaves the carriage
-    free."""
-    driven = len(carriage) > 0
-    ticks = len(voltage)
-    for tick in range(ticks):
-        following = force[min(tick + 1, ticks - 1)]
-        for substep in range(substeps):
-            now = tick * substeps + substep
-            mechanics.control[0] = condition(motor_drive, motor_command, voltage[tick])
-            drive(mechanics, mechanics.ground, ground[now], ground[now + 1])
-            drive(mechanics, mechanics.structure, structure[now], structure[now + 1])
-            if driven:
-                drive(mechanics, mechanics.carriage, carriage[now], carriage[now + 1])
-            mechanics.applied[mechanics.carriage] = 0.0
-            touch(mechanics, contacts)
-            if driven:
-                mechanics.applied[mechanics.carriage] = motor_force(mechanics)
-            else:
-                share = substep / substeps
-                load = (1.0 - share) * force[tick] + share * following
-                mechanics.applied[mechanics.carriage] -= load
-            brace(mechanics)
-            forward(mechanics.model, mechanics.data, 0, 1 if substep else 0)
-            if substep == 0:
-                true = true_measurements(mechanics)
-                load_cell_out[tick] = true.load_cell
-                wheel_out[tick] = true.structure_lvdt - true.suspension_lvdt
-                if tick == ticks - 1:
-                    return
-            integrate(mechanics.model, mechanics.data)
-
-
 def _interpolate(motion: Array, substeps: int) -> Array:
     """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity
     must not jump, or a motor that sticks would have to pass on the blow."""
@@ -155,36 +100,27 @@ def _run(
     configuration: Configuration,
     ground: Array,
     structure: Array,
-    carriage: Array | None,
     voltage: Array,
     force: Array,
     preload: float,
     wheel: float,
 ) -> Output:
-    """preload: motor force at the start, N; wheel: carriage position at the start, m."""
-    model = build(plant, configuration.timing.timestep)
-    data = mujoco.MjData(model)
-    view = handles(model, data)
-    view.qpos[view.carriage] = wheel
-    view.activation[0] = preload / view.motor_constant
-    substeps = configuration.substeps
-    conditioning = actuator(plant.motor, plant.computer, configuration.timing.timestep)
-    out = Output(np.empty(len(voltage)), np.empty(len(voltage)))
-    _mechanics(
-        mechanics=view,
-        contacts=contacts(plant, wheel, float(structure[0]) - wheel, preload),
-        motor_drive=conditioning,
-        motor_command=hold(conditioning, preload / plant.motor.constant),
-        substeps=substeps,
+    """force: on the carriage besides, N; preload: motor force at the start, N; wheel: carriage
+    position at the start, m."""
+    substeps, ticks = configuration.substeps, len(voltage)
+    count = substeps * (ticks - 1) + 1
+    pushed = np.interp(np.arange(count) / substeps, np.arange(ticks), force)
+    _, place, travel, load_cell = follow_plates(
+        plant=plant,
+        timestep=configuration.timing.timestep,
         ground=_interpolate(ground, substeps),
         structure=_interpolate(structure, substeps),
-        carriage=np.empty(0) if carriage is None else _interpolate(carriage, substeps),
-        voltage=np.ascontiguousarray(voltage),
-        force=np.ascontiguousarray(force),
-        load_cell_out=out.load_cell,
-        wheel_out=out.wheel,
-    )
-    return out
+        voltage=np.repeat(voltage, substeps)[:count],
+        pushed=pushed,
+        preload=preload,
+        start=wheel,
+    )[:, ::substeps]
+    return Output(load_cell, place - travel)
 
 
 def replay_carriage(
@@ -201,9 +137,8 @@ def replay_carriage(
         configuration=configuration,
         ground=ground,
         structure=nothing,
-        carriage=None,
         voltage=nothing,
-        force=force,
+        force=-force,
         preload=0.0,
         wheel=wheel,
     ).wheel
@@ -221,7 +156,6 @@ def replay_mechanics(
         configuration=configuration,
         ground=ground,
         structure=structure,
-        carriage=None,
         voltage=voltage,
         force=np.zeros_like(voltage),
         preload=preload,
@@ -243,7 +177,6 @@ def replay_motor(
         configuration=configuration,
         ground=nothing - AWAY,
         structure=travel,
-        carriage=nothing,
         voltage=voltage,
         force=nothing,
         preload=preload,

@@ -4,6 +4,7 @@ after a correction."""
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -57,17 +58,19 @@ def compute_levels(
     if evidence.machine.structure is not Structure.QUARTER_CAR:
         return _signal_levels(evidence, plant), None
     recording, nominal = evidence.recordings[0], evidence.configurations[0]
-    replays = _component_levels(recording, nominal, nominal._replace(plant=plant))
     noisy: Any = corrected.plant
     for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
         noisy = with_parameters(noisy, name, {"white": float(noise)})
-    return replays, _closed_loop(recording, nominal, corrected, noisy)
+    with Threads() as threads:
+        replays = _component_levels(recording, nominal, nominal._replace(plant=plant), threads)
+        loop = _closed_loop(recording, nominal, corrected, noisy, threads)
+        return replays(), loop()
 
 
 def _component_levels(
-    recording: Recording, before: Configuration, after: Configuration
-) -> dict[str, Level]:
-    """Each component's replay, in units of its noise floor."""
+    recording: Recording, before: Configuration, after: Configuration, threads: Threads
+) -> Callable[[], dict[str, Level]]:
+    """Each component's replay, in units of its noise floor; worked out until it is asked for."""
 
     def ratios(configuration: Configuration) -> dict[str, float]:
         replays = ComponentReplays(recording, configuration)
@@ -79,10 +82,14 @@ def _component_levels(
                 continue
         return found
 
-    with Threads() as threads:
-        one, *others = threads.map(ratios, dict.fromkeys((before, after)))
-    other = others[0] if others else one
-    return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
+    found = threads.begin(ratios, dict.fromkeys((before, after)))
+
+    def finish() -> dict[str, Level]:
+        one, *others = found
+        other = others[0] if others else one
+        return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
+
+    return finish
 
 
 def _signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
@@ -100,13 +107,17 @@ def _signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
 
 
 def _closed_loop(
-    recording: Recording, before: Configuration, after: Configuration, own: RigPlant
-) -> Level | None:
+    recording: Recording,
+    before: Configuration,
+    after: Configuration,
+    own: RigPlant,
+    threads: Threads,
+) -> Callable[[], Level | None]:
     """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra;
     None if the test is too short. own: the corrected plant with the noise that the recording has.
-    """
+    Worked out until it is asked for."""
     if recording.ticks * recording.period < SHORTEST:
-        return None
+        return lambda: None
     demands = np.column_stack(
         [recording.column("/command", name) for name in ("ground", "structure", "force")]
     )
@@ -117,26 +128,24 @@ def _closed_loop(
     nominal = before._replace(plant=_with_noise_of(own, before.plant))
     corrected = after._replace(plant=own)
     runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
-    with Threads() as threads:
-        found = dict(
-            zip(
-                runs,
-                threads.map(
-                    lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs
-                ),
-                strict=True,
-            )
+    results = threads.begin(
+        lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs
+    )
+
+    def finish() -> Level:
+        found = dict(zip(runs, results, strict=True))
+        one, other, again = (
+            found[nominal, SEEDS[0]],
+            found[corrected, SEEDS[0]],
+            found[corrected, SEEDS[1]],
         )
-    one, other, again = (
-        found[nominal, SEEDS[0]],
-        found[corrected, SEEDS[0]],
-        found[corrected, SEEDS[1]],
-    )
-    return Level(
-        _spectral_distance(measured, one),
-        _spectral_distance(measured, other),
-        _spectral_distance(other, again),
-    )
+        return Level(
+            _spectral_distance(measured, one),
+            _spectral_distance(measured, other),
+            _spectral_distance(other, again),
+        )
+
+    return finish
 
 
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:

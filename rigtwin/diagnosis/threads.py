@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -25,6 +25,10 @@ class Threads:
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         # Interrupted: what has not begun need not be done.
         self._pool.shutdown(wait=kind is None, cancel_futures=kind is not None)
+
+    def begin(self, function: Callable[[Item], Found], items: Iterable[Item]) -> Iterator[Found]:
+        """What a function makes of every item, begun at once and waited for when it is taken."""
+        return self._pool.map(function, items)
 
     def spread(self, function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
         """What a function makes of every item, in their order; nothing is told."""

@@ -18,6 +18,7 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
 PRICE = 20.0
@@ -134,17 +135,18 @@ def locate_disturbance(
     disturbances = [
         _Disturbance(component, evidence, plant) for component in evidence.models[0].components()
     ]
-    found = sorted(
-        (_fit_component(each, space, 1) for each in disturbances), key=lambda each: each.misfit
-    )
-    if follow:
-        foremost = [each.component for each in found[:FOLLOWED]]
-        again = [
-            _fit_component(each, space, ROUNDS)
-            for each in disturbances
-            if each.component in foremost
-        ]
-        found = sorted([*again, *found[FOLLOWED:]], key=lambda each: each.misfit)
+    with Threads() as threads:
+        found = sorted(
+            threads.map(lambda each: _fit_component(each, space, 1), disturbances),
+            key=lambda each: each.misfit,
+        )
+        if follow:
+            foremost = [each.component for each in found[:FOLLOWED]]
+            again = threads.map(
+                lambda each: _fit_component(each, space, ROUNDS),
+                [each for each in disturbances if each.component in foremost],
+            )
+            found = sorted([*again, *found[FOLLOWED:]], key=lambda each: each.misfit)
     return tuple(found)
 
 

@@ -34,7 +34,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
 from rigtwin.components.sensors import apply_sensor
-from rigtwin.components.yielding import share_of_load, solve_yielding, yielding_rate
+from rigtwin.components.yielding import share_of_load, solve_yielding
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
@@ -276,6 +276,9 @@ def _mechanics(
     x, v, force = start, 0.0, preload
     yielding = 0.0
     inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
+    # Out of the loop, or out of their tuple: in it they cost as much as the rest of a step.
+    rate, yielded, changing = 1.0 / h, now.yielded, now.changing
+    ground_fades, structure_fades = 1.0 / (now.ground_lag + h), 1.0 / (now.structure_lag + h)
     ground_share = share_of_load(now.ground_compliance, now.ground_lag, h)
     structure_share = share_of_load(now.structure_compliance, now.structure_lag, h)
     for tick in range(len(voltage)):
@@ -288,15 +291,11 @@ def _mechanics(
                 ground_there, structure_there = ground_onward[tick], structure_onward[tick]
             else:
                 ground_there, structure_there = ground[place + 1], structure[place + 1]
-            plate_velocity = (structure_there - structure_here) / h
-            ground_velocity = (ground_there - ground_here) / h
-            structure_now, ground_now = (
-                structure_here + now.yielded[1],
-                ground_here + now.yielded[0],
-            )
+            plate_velocity = (structure_there - structure_here) * rate
+            ground_velocity = (ground_there - ground_here) * rate
+            structure_now, ground_now = structure_here + yielded[1], ground_here + yielded[0]
             # How fast the plates would give up what they have yielded, without load.
-            ground_loss = yielding_rate(0.0, 0.0, now.yielded[0], now.ground_lag, h)
-            structure_loss = yielding_rate(0.0, 0.0, now.yielded[1], now.structure_lag, h)
+            ground_loss, structure_loss = -yielded[0] * ground_fades, -yielded[1] * structure_fades
             ground_velocity += ground_loss
             travel = structure_now - x
             deflection = ground_now - x
@@ -306,16 +305,17 @@ def _mechanics(
             )
             bias = beside = 0.0
             forward = backward = now.motor.coulomb
-            if now.changing:
+            if changing:
                 forward, backward = breakaway(now.rail, now.rail_gap, x, v, force)
                 rail = (h * forward, h * backward)
                 forward, backward = breakaway(
                     now.motor, now.motor_gap, travel, plate_velocity + yielding - v, force
                 )
                 motor = (h * forward, h * backward)
-                bias = now.cogging * math.sin(
-                    2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase
-                )
+                if now.cogging != 0.0:
+                    bias = now.cogging * math.sin(
+                        2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase
+                    )
             if now.gas.force > 0.0:
                 beside = spring_force(now.gas, -travel)
             free = carriage.mass * v + h * (
@@ -345,7 +345,7 @@ def _mechanics(
                 else:
                     rhs, total = free + push, inertia + resisted
                     velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
-                    dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) / h
+                    dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) * rate
                     cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
                 tyre = spring + damping * (ground_velocity - velocity)
                 if tyre >= 0.0:
@@ -361,13 +361,104 @@ def _mechanics(
                 )
                 continue
             yielding = structure_loss + structure_share * cell
-            now.yielded[0] += h * (ground_loss - ground_share * tyre)
-            now.yielded[1] += h * yielding
+            yielded[0] += h * (ground_loss - ground_share * tyre)
+            yielded[1] += h * yielding
             asked = condition(motor_drive, motor_command, voltage[tick])
             asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
             force += carriage.motor_share * (carriage.motor_constant * asked - force)
             v = velocity
             x += h * v
+
+
+def follow_plates(
+    plant: RigPlant,
+    timestep: float,
+    ground: Array,
+    structure: Array,
+    voltage: Array,
+    pushed: Array,
+    preload: float,
+    start: float,
+) -> Array:
+    """The plant between plates that move as prescribed, whatever loads them.
+
+    Parameters
+    ----------
+    plant
+        Its parameters; those of its cylinders do not count.
+    timestep
+        s.
+    ground, structure
+        m, at every timestep and at one more, shape (timesteps + 1,).
+    voltage, pushed
+        V, and a force on the carriage besides, N, shape (timesteps,).
+    preload
+        Motor force at the start, N.
+    start
+        Carriage position at the start, m.
+
+    Returns
+    -------
+    array
+        What ideal sensors would read, rows as in Measurements, shape (4, timesteps).
+    """
+    rigid = Cylinder()
+    plant = plant._replace(ground_cylinder=rigid, structure_cylinder=rigid)
+    return _integrate(
+        plant=plant,
+        plates=(Plate(ground, ground[1:]), Plate(structure, structure[1:])),
+        voltage=voltage,
+        pushed=pushed,
+        start=start,
+        travel=float(structure[0]) - start,
+        preload=preload,
+        timestep=timestep,
+        steps=1,
+    )
+
+
+def _integrate(
+    plant: RigPlant,
+    plates: tuple[Plate, Plate],
+    voltage: Array,
+    pushed: Array,
+    start: float,
+    travel: float,
+    preload: float,
+    timestep: float,
+    steps: int,
+) -> Array:
+    """plates: ground and structure, as they move unloaded; start, travel: of carriage and
+    suspension at the start, m."""
+    motor: Motor = plant.motor
+    carriage = Carriage(
+        timestep=timestep,
+        mass=plant.carriage.mass,
+        rail_viscous=plant.rail.viscous,
+        motor_viscous=motor.viscous,
+        motor_constant=motor.constant,
+        motor_share=1.0 - math.exp(-timestep / motor.time_constant),
+        voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
+    )
+    out = np.empty((4, len(voltage)))
+    ground, structure = plates
+    _mechanics(
+        carriage=carriage,
+        now=contacts(plant, start, travel, preload),
+        motor_drive=actuator(motor, plant.computer, timestep),
+        motor_command=hold(actuator(motor, plant.computer, timestep), preload / motor.constant),
+        start=start,
+        preload=preload,
+        steps=steps,
+        ground=ground.position,
+        ground_onward=ground.onward,
+        structure=structure.position,
+        structure_onward=structure.onward,
+        voltage=np.ascontiguousarray(voltage),
+        pushed=np.ascontiguousarray(pushed),
+        out=out,
+    )
+    return out
 
 
 class QuarterCarModel:
@@ -471,33 +562,16 @@ class QuarterCarModel:
             self._displace(ground, besides.ground),
             self._displace(structure, besides.structure),
         )
-        motor: Motor = plant.motor
-        carriage = Carriage(
-            timestep=timestep,
-            mass=plant.carriage.mass,
-            rail_viscous=plant.rail.viscous,
-            motor_viscous=motor.viscous,
-            motor_constant=motor.constant,
-            motor_share=1.0 - math.exp(-timestep / motor.time_constant),
-            voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
-        )
-        conditioning = actuator(motor, plant.computer, timestep)
-        out = np.empty((4, len(self._voltage)))
-        _mechanics(
-            carriage=carriage,
-            now=contacts(plant, start, 0.0, self._preload),
-            motor_drive=conditioning,
-            motor_command=hold(conditioning, self._preload / motor.constant),
-            start=start,
-            preload=self._preload,
-            steps=self._steps,
-            ground=ground.position,
-            ground_onward=ground.onward,
-            structure=structure.position,
-            structure_onward=structure.onward,
+        out = _integrate(
+            plant=plant,
+            plates=(ground, structure),
             voltage=self._voltage + besides.voltage,
             pushed=besides.force,
-            out=out,
+            start=start,
+            travel=0.0,
+            preload=self._preload,
+            timestep=timestep,
+            steps=self._steps,
         )
         return contain(out)
 
