@@ -271,7 +271,7 @@ FUNCTIONS = {
     "card": ("check_card", "serve_card", "release_card"),
     "faults": ("faults",),
     "effects": ("effects",),
-    "info": ("load", "Recording"),
+    "info": ("load", "Recording", "energy_error"),
     "plot": ("Recording.plot",),
     "video": ("Recording.video",),
     "watch": ("watch",),

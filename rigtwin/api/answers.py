@@ -19,6 +19,8 @@ from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
+from rigtwin.simulation.energy import EnergyError as EnergyError
+from rigtwin.simulation.energy import measure_energy
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
@@ -152,6 +154,35 @@ def compare(
     found = described_machine(recording, machine)
     base = twin_of(found, settings, (), effect_texts(effects))
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
+
+
+def energy_error(
+    recording: Recorded, *, machine: Machine | str | Path | None = None
+) -> EnergyError | None:
+    """The energy that the loop of a hybrid test puts into what it emulates: how far the test may be
+    believed.
+
+    Parameters
+    ----------
+    recording
+        Of the suspension rig with its models in the loop.
+    machine
+        That it is of; by default the one that it names.
+
+    Returns
+    -------
+    EnergyError or None
+        In J, and as a share of what the suspension's damper took up; None for other tests and other
+        machines.
+
+    Raises
+    ------
+    RigtwinError
+        If a channel is missing, or the recording's settings are unknown.
+    """
+    recording = the_recording(recording)
+    found = described_machine(recording, machine)
+    return measure_energy(recording, found.configuration_of(recording))
 
 
 def compare_recordings(

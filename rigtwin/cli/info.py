@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import textwrap
 from pathlib import Path
 
@@ -43,6 +44,10 @@ def execute(parsed: argparse.Namespace) -> int:
         )
     if recording.lateness:
         print(late(recording.lateness))
+    if recording.machine in rigtwin.machines():
+        with contextlib.suppress(rigtwin.RigtwinError):
+            if (energy := rigtwin.energy_error(recording)) is not None:
+                print(f"energy error: {energy}")
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
     for channel in channels_of(recording.columns):
         values = recording.column(channel.topic, channel.name)

@@ -89,6 +89,8 @@ def execute(parsed: argparse.Namespace) -> int:
         )
     seconds = recording.ticks * recording.period
     print(f"{experiment.name}: {seconds:.3f} s recorded in {path}; {recording.end}")
+    if (energy := rigtwin.energy_error(recording, machine=machine)) is not None:
+        print(f"energy error: {energy}")
     return 3 if recording.tripped else 0
 
 

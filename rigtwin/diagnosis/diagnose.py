@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.description.parts import parts
 from rigtwin.diagnosis.attribute import Attribution, attribute, prefer_held_out
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
@@ -54,6 +54,7 @@ from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.diagnosis.words import enumerate_words
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from rigtwin.simulation.energy import EnergyError, measure_energy
 from rigtwin.simulation.experiment import Experiment
 
 
@@ -258,6 +259,7 @@ def _diagnose(
         else (),
         traces=traces,
         nearest=find_nearest(found) if verdict == "unknown" else None,
+        energy=_energy(evidence),
     )
     return Diagnosis(
         answer,
@@ -353,6 +355,17 @@ def _places(
         if all(place.component != foremost.component for place in places.values()):
             places["left"] = place
     return sorted(places.values(), key=lambda place: -place.share)
+
+
+def _energy(evidence: Evidence) -> dict[str, EnergyError]:
+    measured = {
+        recording.path.name: measure_energy(recording, configuration)
+        for recording, configuration in zip(
+            evidence.recordings, evidence.configurations, strict=True
+        )
+        if evidence.machine.structure is Structure.QUARTER_CAR
+    }
+    return {name: each for name, each in measured.items() if each is not None}
 
 
 def _gap(

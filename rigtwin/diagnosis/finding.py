@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
+
+from rigtwin.simulation.energy import EnergyError
 
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
 VERDICTS: tuple[str, ...] = get_args(Verdict)
@@ -154,7 +157,7 @@ class Answer:
     what people should know; steps: what each effect changed as they were found one after another,
     the nominal machine first; units: of their signals; leftovers: where what is still left lies;
     traces: effects that close a little more of the gap, too small to be claimed; nearest: of an
-    unknown, what comes nearest to it."""
+    unknown, what comes nearest to it; energy: recording of a hybrid test → what its loop put in."""
 
     verdict: Verdict
     sentence: str
@@ -174,6 +177,7 @@ class Answer:
     leftovers: tuple[Place, ...] = ()
     traces: tuple[Finding, ...] = ()
     nearest: Nearest | None = None
+    energy: dict[str, EnergyError] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -200,6 +204,10 @@ class Answer:
             "units": dict(self.units),
             "leftovers": [asdict(place) for place in self.leftovers],
             "nearest": None if self.nearest is None else asdict(self.nearest),
+            "energy": {
+                name: {**asdict(each), "share": each.share if math.isfinite(each.share) else None}
+                for name, each in self.energy.items()
+            },
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }

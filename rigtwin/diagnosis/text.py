@@ -110,6 +110,7 @@ def describe(diagnosis: Answer) -> str:
     if diagnosis.not_observable:
         names = ", ".join(f"{each.kind}@{each.component}" for each in diagnosis.not_observable)
         lines.append(f"  could not be seen with these data: {names}")
+    lines += [f"  energy error of {name}: {each}" for name, each in diagnosis.energy.items()]
     lines += [f"  note: {note}" for note in diagnosis.notes]
     lines.append(f"  {diagnosis.seconds:.1f} s")
     return "\n".join(lines)
