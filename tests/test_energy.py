@@ -12,9 +12,12 @@ import pytest
 
 import rigtwin
 from controllers import Mode, Settings, Travel
+from controllers.compensated import Compensated
+from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.recording import Recording
 from rigtwin.simulation.energy import measure_energy
+from rigtwin.studies.stability.compensated import plate_compensator
 
 PERIOD, AMPLITUDE, SPEED = 0.001, 0.01, 2.0 * math.pi * 2.0
 SETTINGS = Settings(preload=0.0, filter_force=0.0, sprung_mass=100.0)
@@ -154,3 +157,22 @@ def test_a_diagnosis_of_a_hybrid_test_says_it(tmp_path):
     assert answer.document()["energy"]["d.mcap"]["structure"] == pytest.approx(expected.structure)
     assert f"energy error of d.mcap: {expected}" in str(answer)
     assert "Energy error of the hybrid test d.mcap" in answer._repr_html_()
+
+
+def test_of_a_compensated_test_with_its_settings():
+    """The plate's commands are not where it should be then; the models' own motion is."""
+    rig = rigtwin.machine("suspension-rig")
+    times = dict.fromkeys(("filter_position", "filter_velocity", "filter_force"), 2e-3)
+    settings = {"controller": times, "timing": {"duration": 6.0}}
+    experiment = rigtwin.experiments(rig)["drop"]
+    configuration = with_changes(experiment.configuration, settings)
+    cylinder, period = configuration.plant.structure_cylinder, configuration.timing.period
+    law = plate_compensator(cylinder, period)
+    plain = rigtwin.run(rig, "drop", settings=settings)
+    controller = Compensated(configuration.controller, period, law)
+    test = rigtwin.run(rig, "drop", settings=settings, controller=controller)
+    assert rigtwin.energy_error(test) is None
+    before, after = rigtwin.energy_error(plain), rigtwin.energy_error(test, settings=settings)
+    assert before is not None
+    assert after is not None
+    assert abs(after.structure) < 0.2 * before.structure

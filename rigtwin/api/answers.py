@@ -7,7 +7,8 @@ from pathlib import Path
 
 from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, the_machine, twin_of
 from rigtwin.api.recordings import the_recording
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.changes import with_changes
+from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
 from rigtwin.diagnosis.compare import Comparison, differences
@@ -21,7 +22,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 from rigtwin.simulation.energy import EnergyError as EnergyError
 from rigtwin.simulation.energy import measure_energy
-from rigtwin.simulation.experiment import find_experiment
+from rigtwin.simulation.experiment import experiments_of, find_experiment
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
 Recorded = reader.Recording | str | Path
@@ -157,7 +158,10 @@ def compare(
 
 
 def energy_error(
-    recording: Recorded, *, machine: Machine | str | Path | None = None
+    recording: Recorded,
+    *,
+    machine: Machine | str | Path | None = None,
+    settings: Settings = (),
 ) -> EnergyError | None:
     """The energy that the loop of a hybrid test puts into what it emulates: how far the test may be
     believed.
@@ -168,12 +172,15 @@ def energy_error(
         Of the suspension rig with its models in the loop.
     machine
         That it is of; by default the one that it names.
+    settings
+        Of a controller of your own that has the rig's models in it, such as one that compensates
+        delay: changes of its experiment's, since the recording does not say them.
 
     Returns
     -------
     EnergyError or None
         In J, and as a share of what the suspension's damper took up; None for other tests and other
-        machines.
+        machines, and for a controller of your own without its settings.
 
     Raises
     ------
@@ -182,7 +189,11 @@ def energy_error(
     """
     recording = the_recording(recording)
     found = described_machine(recording, machine)
-    return measure_energy(recording, found.configuration_of(recording))
+    own = OWN in recording.controller and bool(settings)
+    known = experiments_of(found)
+    start = known[recording.experiment].configuration if recording.experiment in known else None
+    base = with_changes(start or found.configuration, settings)
+    return measure_energy(recording, found.configuration_of(recording, base), own)
 
 
 def compare_recordings(

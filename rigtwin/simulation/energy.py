@@ -21,6 +21,8 @@ from controllers.gas_spring import gas_force
 from controllers.skyhook import semi_active_damping, skyhook_force
 from controllers.suspension import suspension_force
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import RigControl
+from rigtwin.description.machine import OWN
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
@@ -65,7 +67,9 @@ class EnergyError:
         return f"{size} ({parts})"
 
 
-def measure_energy(recording: Recording, configuration: Configuration) -> EnergyError | None:
+def measure_energy(
+    recording: Recording, configuration: Configuration, own: bool = False
+) -> EnergyError | None:
     """The energy error of a recorded test.
 
     Parameters
@@ -74,18 +78,29 @@ def measure_energy(recording: Recording, configuration: Configuration) -> Energy
         Of the suspension rig. What was sensed is without noise where a twin knows it.
     configuration
         The settings of the test.
+    own
+        Whether a controller of one's own has the rig's models in it, at these settings, and
+        commands other than what they say, as `controllers.compensated` does. Where the models'
+        plate should be is worked out from what was sensed then.
 
     Returns
     -------
     EnergyError or None
-        None where no model closes the loop, or the travel of its suspension is not the rig's own
-        (single mass tests).
+        None where no model closes the loop, the travel of its suspension is not the rig's own
+        (single mass tests), or the controller was another and nothing is known of it.
     """
     settings = configuration.controller
     closed = isinstance(settings, Settings) and settings.mode == Mode.MIL
     if not closed or settings.travel != Travel.WHEEL or recording.ticks < LEAST:
         return None
-    wanted = recording.column("/command", "structure")
+    if own:
+        control = RigControl()
+        inputs = [recording.column(*channel) for channel in control.channels]
+        wanted = control.replay(settings, inputs, recording.period)[1]
+    elif OWN in recording.controller:
+        return None
+    else:
+        wanted = recording.column("/command", "structure")
     if "/truth" in recording.columns:
         plate, travel, force = (
             recording.column("/truth", name) for name in ("structure", "suspension", "load_cell")
