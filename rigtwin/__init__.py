@@ -22,12 +22,10 @@ if TYPE_CHECKING:
         Changes,
         Comparison,
         Diagnosis,
-        EnergyError,
         calibrate,
         compare,
         compare_recordings,
         diagnose,
-        energy_error,
         what_changed,
     )
     from rigtwin.api.card import (
@@ -38,6 +36,7 @@ if TYPE_CHECKING:
         serve_card,
         write_table,
     )
+    from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
     from rigtwin.api.look import look, show_live, show_look
     from rigtwin.api.machines import (
@@ -161,12 +160,10 @@ _MODULES = {
         "Changes",
         "Comparison",
         "Diagnosis",
-        "EnergyError",
         "calibrate",
         "compare",
         "compare_recordings",
         "diagnose",
-        "energy_error",
         "what_changed",
     ),
     "card": (
@@ -177,6 +174,7 @@ _MODULES = {
         "serve_card",
         "write_table",
     ),
+    "energy": ("EnergyError", "energy_error"),
     "faults": ("Campaign", "faults"),
     "look": ("look", "show_live", "show_look"),
     "session": (

@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from rigtwin.api.machines import Effects, Settings, effect_texts, machine_of, the_machine, twin_of
+from rigtwin.api.machines import (
+    Effects,
+    Settings,
+    described_machine,
+    effect_texts,
+    machine_of,
+    twin_of,
+)
 from rigtwin.api.recordings import the_recording
-from rigtwin.description.changes import with_changes
-from rigtwin.description.machine import OWN, Machine, Structure
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
 from rigtwin.diagnosis.compare import Comparison, differences
@@ -20,9 +26,7 @@ from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
-from rigtwin.simulation.energy import EnergyError as EnergyError
-from rigtwin.simulation.energy import measure_energy
-from rigtwin.simulation.experiment import experiments_of, find_experiment
+from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
 Recorded = reader.Recording | str | Path
@@ -157,45 +161,6 @@ def compare(
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 
 
-def energy_error(
-    recording: Recorded,
-    *,
-    machine: Machine | str | Path | None = None,
-    settings: Settings = (),
-) -> EnergyError | None:
-    """The energy that the loop of a hybrid test puts into what it emulates: how far the test may be
-    believed.
-
-    Parameters
-    ----------
-    recording
-        Of the suspension rig with its models in the loop.
-    machine
-        That it is of; by default the one that it names.
-    settings
-        Of a controller of your own that has the rig's models in it, such as one that compensates
-        delay: changes of its experiment's, since the recording does not say them.
-
-    Returns
-    -------
-    EnergyError or None
-        In J, and as a share of what the suspension's damper took up; None for other tests and other
-        machines, and for a controller of your own without its settings.
-
-    Raises
-    ------
-    RigtwinError
-        If a channel is missing, or the recording's settings are unknown.
-    """
-    recording = the_recording(recording)
-    found = described_machine(recording, machine)
-    own = OWN in recording.controller and bool(settings)
-    known = experiments_of(found)
-    start = known[recording.experiment].configuration if recording.experiment in known else None
-    base = with_changes(start or found.configuration, settings)
-    return measure_energy(recording, found.configuration_of(recording, base), own)
-
-
 def compare_recordings(
     first: Recorded, second: Recorded
 ) -> tuple[dict[str, Residual], tuple[str, ...]]:
@@ -254,9 +219,3 @@ def _several(given: Recorded | Sequence[Recorded]) -> Iterator[reader.Recording]
     several = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for each in several:
         yield the_recording(each)
-
-
-def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
-    if given is None:
-        return machine_of(recording)
-    return the_machine(given)

@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.api.answers import described_machine
-from rigtwin.api.machines import Settings, twin_of
+from rigtwin.api.machines import Settings, described_machine, twin_of
 from rigtwin.api.recordings import load, the_recording
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine

@@ -68,6 +68,11 @@ def machine_of(recording: reader.Recording) -> Machine:
     return catalogue.find(recording.machine)
 
 
+def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
+    """The machine that was said, or the one that a recording names."""
+    return machine_of(recording) if given is None else the_machine(given)
+
+
 def experiments(of: Machine | str | Path) -> dict[str, Experiment]:
     """The experiments that a machine's description names: name → experiment."""
     return experiments_of(the_machine(of))

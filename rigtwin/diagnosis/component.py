@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rigtwin.components import Carriage, Cylinder, GasSpring, Motor, Rail, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
@@ -23,7 +22,7 @@ from rigtwin.components.cylinder import (
 )
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.quarter_car import follow_plates
-from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.arrays import Array, interpolate
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.plant import (
     initial_deflection,
@@ -90,8 +89,8 @@ def _interpolate(motion: Array, substeps: int) -> Array:
     """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity
     must not jump, or a motor that sticks would have to pass on the blow."""
     ticks = len(motion)
-    spline = CubicSpline(np.arange(ticks), motion)
-    fine = spline(np.arange(substeps * (ticks - 1) + 1) / substeps)
+    times = np.arange(substeps * (ticks - 1) + 1) / substeps
+    fine = interpolate(np.arange(ticks, dtype=float), motion, times)
     return np.append(fine, 2 * fine[-1] - fine[-2])
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rigtwin.components import (
     UNLIMITED,
@@ -43,7 +42,7 @@ from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_m
 from rigtwin.models.model import Form
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.models.start import find_slopes, fit_start, read_start, start_error
-from rigtwin.numerics.arrays import Array, contain
+from rigtwin.numerics.arrays import Array, contain, interpolate
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smallest_step, smooth, white_noise
 
@@ -228,7 +227,7 @@ class CoupledModel:
                 position = recover_motion(mover, signal, self._period)
             position = (position - self._zero[name]) / self._along[name][place]
             position = np.append(position, 2.0 * position[-1] - position[-2])
-            found[place] = position if self._steps == 1 else CubicSpline(time, position)(fine)
+            found[place] = position if self._steps == 1 else interpolate(time, position, fine)
         return found
 
     def _condition(self, plant: Plant, names: Sequence[str]) -> Array:

@@ -9,9 +9,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
-from scipy.optimize import minimize_scalar
-from scipy.signal import welch
 
 from rigtwin.numerics.arrays import Array
 
@@ -93,6 +90,8 @@ def remove_mains(signal: Array, period: float, frequency: float) -> Array:
     def power(candidate: float) -> float:
         return -abs(np.sum(window * centred * np.exp(-2j * math.pi * candidate * time)))
 
+    from scipy.optimize import minimize_scalar  # Late: so are scipy.signal and scipy.ndimage below.
+
     found = minimize_scalar(
         power,
         bounds=(peak - width, peak + width),
@@ -114,6 +113,9 @@ def _remove_line(
 
 def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
     """One-sided power spectral density, mean included: frequencies in Hz, density in unit²/Hz."""
+    # Loading it takes half a second, which most commands need not wait for.
+    from scipy.signal import welch
+
     return welch(signal, 1.0 / period, nperseg=min(4096, len(signal)), detrend=False)  # type: ignore[arg-type]
 
 
@@ -232,6 +234,8 @@ def smooth(signal: Array, period: float) -> tuple[Array, float]:
 
 def _straighten_rests(motion: Array, error: float, window: int) -> Array:
     """The motion with stretches in which it stays within its error straightened."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     span = maximum_filter1d(motion, window) - minimum_filter1d(motion, window)
     still = np.diff(np.concatenate([[0], (span < STILL * error).astype(np.int8), [0]]))
     found = motion.copy()
