@@ -22,6 +22,7 @@ from rigtwin.diagnosis.compare import compare as compare_with_twin
 from rigtwin.diagnosis.compare import compare_recordings as find_differences
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
@@ -41,6 +42,7 @@ def diagnose(
     settings: Settings = (),
     without: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
+    first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Diagnosis:
     """Says why recordings of one machine and its twin disagree.
 
@@ -58,6 +60,9 @@ def diagnose(
         Effects that are taken out of the twin first, such as "coulomb@rail".
     progress
         Called with a stage's name and the steps done in it.
+    first_look
+        Called after a second or two with what the gap is and which effects may be behind it, while
+        the judgement goes on.
 
     Returns
     -------
@@ -81,7 +86,9 @@ def diagnose(
     found = described_machine(several[0], machine)
     base = twin_of(found, settings, without)
     tests = [find_experiment(found, name) for name in found.next_tests]
-    return find_reasons(found, several, base, apart, tests, progress)
+    return find_reasons(
+        found, several, base, apart, tests, progress=progress, first_look=first_look
+    )
 
 
 def what_changed(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import time
 from pathlib import Path
 
 from rigtwin.cli.options import add_json, add_machine, add_settings, settings_of
@@ -80,6 +82,7 @@ def execute(parsed: argparse.Namespace) -> int:
     from rigtwin.errors import RigtwinError
     from rigtwin.render.browser import find_browser
 
+    begun = time.perf_counter()
     reports = [each for each in (parsed.html, parsed.pdf, parsed.png) if each is not None]
     outputs = (parsed.json, parsed.save_twin, parsed.save_mjcf, *reports)
     if parsed.changed and (parsed.held_out or any(outputs[1:])):
@@ -104,6 +107,10 @@ def execute(parsed: argparse.Namespace) -> int:
             bar.set_description(stage, refresh=False)
             bar.update(steps)
 
+        def show(look: rigtwin.FirstLook) -> None:
+            seconds = time.perf_counter() - begun
+            bar.write(f"first look, {seconds:.1f} s: {look}", file=sys.stderr)
+
         if parsed.changed:
             changes = rigtwin.what_changed(
                 recordings,
@@ -122,6 +129,7 @@ def execute(parsed: argparse.Namespace) -> int:
             settings=settings_of(parsed),
             without=parsed.without,
             progress=progress,
+            first_look=show,
         )
     # Files first: whoever reads the terminal may stop reading.
     said = [str(diagnosis)]

@@ -12,6 +12,7 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.beginnings import fit_beginnings
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
+from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge, Judged
@@ -82,6 +83,7 @@ def attribute(
     evidence: Evidence,
     progress: Callable[[int], object] = lambda _: None,
     thresholds: Thresholds = STANDARD,
+    first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Attribution:
     """Searches the whole library for what explains the evidence.
 
@@ -93,6 +95,8 @@ def attribute(
         Called with the number of fits done since its last call.
     thresholds
         What figures are held against.
+    first_look
+        Called once every effect has been tried and before any is fitted.
 
     Returns
     -------
@@ -104,7 +108,8 @@ def attribute(
     coarse = Fitter(searched.halve_steps())
     with Threads(progress) as threads:
         least = detection_limit(evidence, thresholds)
-        search = Search(coarse, Fitter(searched), effects, least, thresholds, threads)
+        fitter = Fitter(searched)
+        search = Search(coarse, fitter, effects, least, thresholds, threads, told=first_look)
         nothing, tried = search.fit_singles()
         silent = tuple(
             effect for effect in effects if coarse.largest_response(effect) < thresholds.detected

@@ -54,7 +54,7 @@ def fit_beginnings(search: Search, tried: Sequence[Fit]) -> list[Fit]:
         part = evidence.beginning(share)
         coarse = Fitter(part.halve_steps())
         least = detection_limit(part, search.thresholds)
-        here = replace(search, coarse=coarse, fitter=Fitter(part), least=least)
+        here = replace(search, coarse=coarse, fitter=Fitter(part), least=least, told=lambda _: None)
         carried = _follow(carried, here)
         if missed < PATIENCE and not (carried and _suffices(carried[0], part, search)):
             carried = _best([*carried, *_look(here)], search)

@@ -39,6 +39,7 @@ from rigtwin.diagnosis.findings import (
     find_traces,
     list_unobservable,
 )
+from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.join import join
 from rigtwin.diagnosis.leftover import leftovers, steps
@@ -98,6 +99,7 @@ def diagnose(
     tests: Sequence[Experiment] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     thresholds: Thresholds = STANDARD,
+    first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Diagnosis:
     """Says why recordings of one machine and its twin disagree.
 
@@ -118,6 +120,9 @@ def diagnose(
         Called with a stage's name and the steps done in it.
     thresholds
         What the stages hold their figures against.
+    first_look
+        Called as soon as every effect has been tried: what the gap is, and its suspects; of a
+        machine of several joints that do not act on each other, once for each.
 
     Returns
     -------
@@ -141,7 +146,7 @@ def diagnose(
         def diagnose_part(part: Machine) -> Diagnosis:
             evidence = Evidence(part, recordings, configurations)
             apart = Evidence(part, held_out, others) if held_out else None
-            return _diagnose(evidence, apart, tests, progress, thresholds, started)
+            return _diagnose(evidence, apart, tests, progress, first_look, thresholds, started)
 
         found = [diagnose_part(part) for part in parts(machine)]
         if len(found) == 1:
@@ -155,10 +160,14 @@ def _diagnose(
     held_out: Evidence | None,
     tests: Sequence[Experiment],
     progress: Callable[[str, int], object],
+    first_look: Callable[[FirstLook], object],
     thresholds: Thresholds,
     started: float,
 ) -> Diagnosis:
-    found = attribute(evidence, lambda steps: progress("fitting effects", steps), thresholds)
+    def fitted(steps: int) -> None:
+        progress("fitting effects", steps)
+
+    found = attribute(evidence, fitted, thresholds, first_look)
     if held_out is not None:
         found = prefer_held_out(found, evidence, held_out, thresholds)
     best = found.best.fit if found.best is not None else _nothing(found, evidence)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.ranking import penalised_cost
@@ -38,7 +39,7 @@ def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> fl
 @dataclass(frozen=True)
 class Search:
     """What a search needs. coarse, fitter: on evidence of half as many steps, and on all;
-    threads: that fit side by side."""
+    threads: that fit side by side; told: called with the first look."""
 
     coarse: Fitter
     fitter: Fitter
@@ -46,6 +47,7 @@ class Search:
     least: float
     thresholds: Thresholds
     threads: Threads
+    told: Callable[[FirstLook], object] = lambda _: None
 
     def cost(self, fit: Fit) -> float:
         return penalised_cost(fit, self.thresholds.price)
@@ -54,6 +56,7 @@ class Search:
         """The nominal plant and each effect alone, the best again with the tolerances taken at
         them."""
         screened = self.threads.map(self.coarse.screen, self.effects)
+        self.told(look_first(self.coarse, screened, self.least, self.thresholds))
         most = max((each.promise for each in screened), default=0.0)
         worth = self.thresholds.promising * max(most, self.least)
         singles = self.threads.map(
