@@ -183,6 +183,11 @@ def test_actuator_conditioning_in_closed_form():
     swing = sine - 1.0
     uneven = through(ForceActuator(gain=1.2, gain_asymmetry=0.4), swing)
     assert np.max(np.abs(uneven - 1.2 * np.where(swing > 0.0, 1.2, 0.8) * swing)) < 1e-12
+    lame = through(ForceActuator(deadband=0.1, deadband_asymmetry=0.15), swing)
+    upper, lower = np.maximum(swing - 0.175, 0.0), np.minimum(swing + 0.025, 0.0)
+    assert np.max(np.abs(lame - upper - lower)) < 1e-12
+    one_sided = through(ForceActuator(deadband_asymmetry=-0.4), swing)
+    assert np.max(np.abs(one_sided - np.maximum(swing, 0.0) - np.minimum(swing + 0.2, 0.0))) < 1e-12
 
 
 def test_sensor_in_closed_form():

@@ -49,6 +49,7 @@ SIZES = {
     "delay": 0.02,
     "saturation": 14.0,
     "deadband": 3.0,
+    "deadband_asymmetry": 6.0,
     "rate_limit": 120.0,
 }
 """Each effect's magnitude; large, so that a law that is not there is seen."""
@@ -102,7 +103,12 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
             "Ns^2/m^2",
         ):
             size *= scale
-        if sort == "pendulum" and effect.kind.name in ("saturation", "deadband", "rate_limit"):
+        if sort == "pendulum" and effect.kind.name in (
+            "saturation",
+            "deadband",
+            "deadband_asymmetry",
+            "rate_limit",
+        ):
             size *= scale
         if sort == "pendulum" and effect.kind.name in ("mass", "armature"):
             size = 1.5 * machine.plant.mass.mass

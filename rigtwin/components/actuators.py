@@ -11,7 +11,8 @@ from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 class ForceActuator(NamedTuple):
     """Command to force: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
     `constant`, then the limit of the force, in that order. The gain is larger by the share
-    ½·gain_asymmetry of positive commands, and smaller of negative ones."""
+    ½·gain_asymmetry of positive commands, and smaller of negative ones; the deadband reaches
+    ½·deadband_asymmetry further to positive commands, and less far to negative ones."""
 
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
@@ -26,6 +27,9 @@ class ForceActuator(NamedTuple):
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
     deadband: Annotated[float, Quantity("unit of the command", 0.0, UNLIMITED, NONE)] = 0.0
+    deadband_asymmetry: Annotated[
+        float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, NONE)
+    ] = 0.0
     saturation: Annotated[float, Quantity("unit of the command", 1e-9, UNLIMITED, NONE)] = UNLIMITED
     rate_limit: Annotated[float, Quantity("unit of the command/s", 1e-9, UNLIMITED, NONE)] = (
         UNLIMITED

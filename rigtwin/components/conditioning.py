@@ -36,8 +36,9 @@ from rigtwin.numerics.delay import delay_sample, ring
 
 class Actuator(NamedTuple):
     """low, high: of the command. delay: in timesteps. zero_centred: whether the deadband lies about
-    zero (an amplifier) or about the last position (a valve's overlap). uneven: share of the gain
-    that positive commands have more and negative ones less. rate: greatest change a timestep.
+    zero (an amplifier) or about the last position (a valve's overlap). reach: by how much further
+    it goes to positive commands, and less far to negative ones. uneven: share of the gain that
+    positive commands have more and negative ones less. rate: greatest change a timestep.
     share: of the way to its input that the lag goes in a timestep."""
 
     neutral: bool
@@ -46,6 +47,7 @@ class Actuator(NamedTuple):
     delay: float
     deadband: float
     zero_centred: bool
+    reach: float
     gain: float
     uneven: float
     saturation: float
@@ -67,10 +69,12 @@ def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float)
     delay = of.delay + computer.delay
     rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
     uneven = 0.5 * of.gain_asymmetry if isinstance(of, ForceActuator) else 0.0
+    reach = 0.5 * of.deadband_asymmetry if isinstance(of, ForceActuator) else 0.0
     deadband, saturation = (
         (0.0, UNLIMITED) if isinstance(of, Servo) else (of.deadband, of.saturation)
     )
-    neutral = (delay, deadband, of.gain, uneven, saturation, rate, of.lag) == (
+    neutral = (delay, deadband, reach, of.gain, uneven, saturation, rate, of.lag) == (
+        0.0,
         0.0,
         0.0,
         1.0,
@@ -87,6 +91,7 @@ def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float)
         delay=delay / timestep,
         deadband=deadband,
         zero_centred=not isinstance(of, Cylinder | Servo),
+        reach=reach,
         gain=of.gain,
         uneven=uneven,
         saturation=saturation,
@@ -111,7 +116,8 @@ def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float
     """Deadband, gain and saturation."""
     band = conditioning.deadband
     if conditioning.zero_centred:
-        passed = math.copysign(max(abs(command) - band, 0.0), command)
+        edge = max(band + math.copysign(conditioning.reach, command * conditioning.reach), 0.0)
+        passed = math.copysign(max(abs(command) - edge, 0.0), command)
     else:
         passed = min(max(state.memory[1], command - band), command + band)
         state.memory[1] = passed
@@ -160,6 +166,17 @@ def _deadband(at: Context) -> Starts:
     placed = at.effect.of in (PositionActuator, Servo)
     size = at.scales.stroke if placed else max(at.swing.largest[0], 1e-12)
     return Starts.single([share * size for share in (0.003, 0.01, 0.03, 0.1, 0.3)], 0.001 * size)
+
+
+def _uneven_deadband(at: Context) -> Starts:
+    """Of which one side alone, or most of it, has none."""
+    size = max(at.swing.largest[0], 1e-12)
+    starts = [
+        (2.0 * sign * share * size, share * size)
+        for share in (0.01, 0.03, 0.1, 0.3)
+        for sign in (-1.0, 1.0)
+    ]
+    return Starts(tuple(starts), (0.001 * size, 0.001 * size))
 
 
 def _yielding(_: Context) -> Starts:
@@ -244,6 +261,14 @@ KINDS = (
             Cylinder: fixed_starts((1e-4, 5e-4, 2e-3, 6e-3), 2e-5),
             **_each(_deadband, *DESCRIBED_ACTUATORS),
         },
+    ),
+    Kind(
+        "deadband_asymmetry",
+        "deadband that differs by direction",
+        ("deadband_asymmetry", "deadband"),
+        "command without effect within a band that reaches further to positive commands",
+        _each(_uneven_deadband, ForceActuator),
+        "command without effect within a band that reaches further to negative commands",
     ),
     Kind(
         "rate_limit",

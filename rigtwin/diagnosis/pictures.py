@@ -414,6 +414,7 @@ PICTURES: dict[str, str] = {
     "offset": "line",
     "saturation": "line",
     "deadband": "line",
+    "deadband_asymmetry": "line",
     "position_gain": "time",
     "force_limit": "time",
     "rate_limit": "time",

@@ -11,7 +11,11 @@ from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 LATE = ("lag", "delay", "two_lags", "resonance")
 """Kinds that make a signal late, each in its own way."""
-CONTAINED = {"two_lags": ("lag",), "mount": ("compliance", "relaxation")}
+CONTAINED = {
+    "two_lags": ("lag",),
+    "mount": ("compliance", "relaxation"),
+    "deadband_asymmetry": ("deadband",),
+}
 """Kind → the simpler ones that it becomes at the end of its range, or where little else acts."""
 
 

@@ -33,8 +33,17 @@ JUDGED = 4
 """Explanations of each number of parameters that are judged at first."""
 
 
-RARE = ("backlash", "compliance", "mount", "cogging", "relaxation", "drag", "load_friction")
-"""Kinds that few guides have; what is left of other friction may be taken for them."""
+RARE = (
+    "backlash",
+    "compliance",
+    "mount",
+    "cogging",
+    "relaxation",
+    "drag",
+    "load_friction",
+    "deadband_asymmetry",
+)
+"""Kinds that few machines have; what is left of other friction may be taken for them."""
 
 
 @dataclass(frozen=True)
