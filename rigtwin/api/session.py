@@ -337,7 +337,15 @@ def run_session(
     except OSError as error:
         raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     with _alone(folder):
-        return _run_tests(tests, folder, run, resume, real, prepare or check, told)
+        return _run_tests(
+            tests=tests,
+            folder=folder,
+            run=run,
+            resume=resume,
+            real=real,
+            prepare=prepare or check,
+            told=told,
+        )
 
 
 @contextmanager

@@ -99,10 +99,29 @@ def give_way(
     limits = dry_limits(dry_friction, speed, load)
     compliance = guide.mount_compliance
     position, slope = guess_position(
-        guide, spring, rest, share, period, inner, speed, slider, viscous, limits, outer
+        guide=guide,
+        spring=spring,
+        rest=rest,
+        share=share,
+        period=period,
+        inner=inner,
+        speed=speed,
+        slider=slider,
+        viscous=viscous,
+        limits=limits,
+        outer=outer,
     )
     force, by, relaxed = resist_at(
-        guide, spring, rest, share, period, inner, slider, viscous, limits, position
+        guide=guide,
+        spring=spring,
+        rest=rest,
+        share=share,
+        period=period,
+        inner=inner,
+        slider=slider,
+        viscous=viscous,
+        limits=limits,
+        position=position,
     )
     error = position + compliance * force - outer
     # What resists grows with the position, so the guide is no further off than the error is large.
@@ -119,7 +138,16 @@ def give_way(
         if not low < following < high:
             following = 0.5 * (low + high)
         force, by, relaxed = resist_at(
-            guide, spring, rest, share, period, inner, slider, viscous, limits, following
+            guide=guide,
+            spring=spring,
+            rest=rest,
+            share=share,
+            period=period,
+            inner=inner,
+            slider=slider,
+            viscous=viscous,
+            limits=limits,
+            position=following,
         )
         changed = following + compliance * force - outer
         if following != position:

@@ -101,13 +101,33 @@ def solve_yielding(
     tuple
         v in m/s, load in N.
     """
-    still = timestep * rod_load(0.0, free, share, force, viscous, forward, backward) - rhs
+    still = (
+        timestep
+        * rod_load(
+            v=0.0,
+            free=free,
+            share=share,
+            force=force,
+            viscous=viscous,
+            forward=forward,
+            backward=backward,
+        )
+        - rhs
+    )
     if still + rail[0] < 0.0:
         left = rhs - rail[0]
     elif still - rail[1] > 0.0:
         left = rhs + rail[1]
     else:
-        return 0.0, rod_load(0.0, free, share, force, viscous, forward, backward)
+        return 0.0, rod_load(
+            v=0.0,
+            free=free,
+            share=share,
+            force=force,
+            viscous=viscous,
+            forward=forward,
+            backward=backward,
+        )
     # Below `slow` the plate runs ahead of the carriage, above `fast` behind it, and in between the
     # rod sticks.
     slow, fast = free + share * (force - forward), free + share * (force + backward)
@@ -118,4 +138,12 @@ def solve_yielding(
         v = (left - timestep * (force + backward - slope * fast)) / (inertia + timestep * slope)
     else:
         v = (left + timestep * free / share) / (inertia + timestep / share)
-    return v, rod_load(v, free, share, force, viscous, forward, backward)
+    return v, rod_load(
+        v=v,
+        free=free,
+        share=share,
+        force=force,
+        viscous=viscous,
+        forward=forward,
+        backward=backward,
+    )

@@ -48,7 +48,9 @@ class JoinedReplays:
                 )
         if len(self._mistakes) > before:
             return None
-        return self._put_together(where, name, table, movers, rows, joints, ())
+        return self._put_together(
+            where=where, name=name, table=table, movers=movers, rows=rows, joints=joints, free=()
+        )
 
     def read_coupled(
         self, where: str, name: str, table: Mapping[str, Any], movers: list[str], rows: list[Row]
@@ -97,7 +99,15 @@ class JoinedReplays:
             self._mistakes.note(where, "band is for joints that all move as measured")
         if len(self._mistakes) > before:
             return None
-        return self._put_together(where, name, table, movers, rows, [*free, *held], tuple(free))
+        return self._put_together(
+            where=where,
+            name=name,
+            table=table,
+            movers=movers,
+            rows=rows,
+            joints=[*free, *held],
+            free=tuple(free),
+        )
 
     def _put_together(
         self,

@@ -146,7 +146,15 @@ def diagnose(
         def diagnose_part(part: Machine) -> Diagnosis:
             evidence = Evidence(part, recordings, configurations)
             apart = Evidence(part, held_out, others) if held_out else None
-            return _diagnose(evidence, apart, tests, progress, first_look, thresholds, started)
+            return _diagnose(
+                evidence=evidence,
+                held_out=apart,
+                tests=tests,
+                progress=progress,
+                first_look=first_look,
+                thresholds=thresholds,
+                started=started,
+            )
 
         found = [diagnose_part(part) for part in parts(machine)]
         if len(found) == 1:

@@ -263,13 +263,13 @@ def _phase(view: View) -> Picture:
         "the prediction with the effect (a delay is a straight line)."
     )
     return _picture(
-        view,
-        "phase",
-        ("frequency", "Hz"),
-        (f"{view.sensor_name}, phase", "rad"),
-        curves,
-        caption,
-        (False, False),
+        view=view,
+        form="phase",
+        x=("frequency", "Hz"),
+        y=(f"{view.sensor_name}, phase", "rad"),
+        curves=curves,
+        caption=caption,
+        logarithmic=(False, False),
     )
 
 
@@ -324,13 +324,13 @@ def _spectrum(view: View) -> Picture:
         + ("; the level should lie on the solid line." if told is not None else ".")
     )
     return _picture(
-        view,
-        "spectrum",
-        ("frequency", "Hz"),
-        (f"{view.sensor_name}, residual", f"{view.unit}/√Hz"),
-        curves,
-        caption,
-        (True, True),
+        view=view,
+        form="spectrum",
+        x=("frequency", "Hz"),
+        y=(f"{view.sensor_name}, residual", f"{view.unit}/√Hz"),
+        curves=curves,
+        caption=caption,
+        logarithmic=(True, True),
     )
 
 

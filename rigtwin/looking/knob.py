@@ -60,10 +60,26 @@ def knob_of(slider: Slider) -> Knob:
     if slider.low > 0.0 and slider.high > WIDE * slider.low:
         low, high = math.log10(slider.low), math.log10(slider.high)
         unit = "" if slider.unit == "1" else slider.unit
-        return Knob(slider, low, high, _step(low, high), True, 1.0, unit)
+        return Knob(
+            slider=slider,
+            low=low,
+            high=high,
+            step=_step(low, high),
+            logarithmic=True,
+            factor=1.0,
+            unit=unit,
+        )
     factor, unit = shorten(max(abs(slider.low), abs(slider.high)), slider.unit)
     low, high = factor * slider.low, factor * slider.high
-    return Knob(slider, low, high, _step(low, high), False, factor, unit)
+    return Knob(
+        slider=slider,
+        low=low,
+        high=high,
+        step=_step(low, high),
+        logarithmic=False,
+        factor=factor,
+        unit=unit,
+    )
 
 
 def _step(low: float, high: float) -> float:

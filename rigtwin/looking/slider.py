@@ -65,13 +65,13 @@ def sliders_of(
         least = min(here, *(min(value, WIDER * value) for value in own))
         found.append(
             Slider(
-                effect.name,
-                parameter,
-                units[number],
-                max(low, least),
-                min(high, most),
-                nominal,
-                start,
+                effect=effect.name,
+                parameter=parameter,
+                unit=units[number],
+                low=max(low, least),
+                high=min(high, most),
+                nominal=nominal,
+                start=start,
             )
         )
     return tuple(found)

@@ -411,15 +411,15 @@ def advance(
     """One control period with the commands held."""
     if state.plain:
         advance_plain(
-            state.mechanics,
-            state.substeps,
-            state.ground,
-            state.ground_state,
-            state.structure,
-            state.structure_state,
-            ground_command,
-            structure_command,
-            voltage,
+            mechanics=state.mechanics,
+            substeps=state.substeps,
+            ground=state.ground,
+            ground_state=state.ground_state,
+            structure=state.structure,
+            structure_state=state.structure_state,
+            ground_command=ground_command,
+            structure_command=structure_command,
+            voltage=voltage,
         )
         state.ground_command.memory[3] = ground_command
         state.structure_command.memory[3] = structure_command
