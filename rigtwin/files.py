@@ -79,6 +79,16 @@ def keep_apart(out: str | Path, *inputs: Path) -> Path:
     return path
 
 
+def recordable(out: str | Path) -> Path:
+    """A file that a recording can be written to and read from again. Raises RigtwinError for a
+    device or a pipe, before a test runs for nothing."""
+    path = Path(out)
+    if path.exists() and not path.is_file():
+        what = "a folder" if path.is_dir() else "no file but a device or a pipe"
+        raise RigtwinError(f"cannot record to {path}: it is {what}")
+    return path
+
+
 def parse_toml(text: str) -> dict[str, Any]:
     """The tables of a TOML. Raises ValueError if it is none; integers have 64 bits there, and
     Python cannot even print those of thousands of digits."""

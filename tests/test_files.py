@@ -176,3 +176,14 @@ def test_what_an_mjcf_includes_must_be_a_file(tmp_path):
     model.write_text(text.replace("<worldbody>", '<include file="/dev/zero"/><worldbody>', 1))
     with pytest.raises(RigtwinError, match="it includes /dev/zero; expected a file"):
         rigtwin.machine(tmp_path / "bench.toml")
+
+
+@pytest.mark.parametrize("out", ["/dev/null", "{folder}/pipe"])
+def test_a_recording_needs_a_file_before_the_test_runs(tmp_path, capsys, monkeypatch, out):
+    """It is read again when it is whole, which neither a device nor a pipe can be."""
+    os.mkfifo(tmp_path / "pipe")
+    path = out.format(folder=tmp_path)
+    monkeypatch.setattr("rigtwin.api.running._record", pytest.fail)
+    assert main(["run", "drop", "--out", path]) == 1
+    said = capsys.readouterr().err
+    assert said == f"rigtwin: cannot record to {path}: it is no file but a device or a pipe\n"

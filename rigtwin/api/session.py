@@ -17,6 +17,7 @@ from rigtwin.api.recordings import Recording, load
 from rigtwin.description.changes import read_toml, with_changes
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
+from rigtwin.files import recordable
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
@@ -204,10 +205,10 @@ def run_on_twin(
         if real_time:
             timed = InRealTime(twin, test.configuration.timing.period)
             ended = record_in_real_time(
-                timed, test, Path(path), asked, guarded=False, live=live, progress=progress
+                timed, test, recordable(path), asked, guarded=False, live=live, progress=progress
             )
         else:
-            ended = record_at_leisure(twin, test, Path(path), asked, progress)
+            ended = record_at_leisure(twin, test, recordable(path), asked, progress)
     return _result(Path(path), ended)
 
 

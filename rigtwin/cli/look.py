@@ -78,6 +78,8 @@ def _page(parsed: argparse.Namespace, out: Path) -> Page | LivePage:
     import rigtwin
 
     if parsed.live:
+        if not parsed.recording.exists():
+            print(f"waiting for {parsed.recording}", flush=True)
         return rigtwin.show_live(
             parsed.recording,
             port=parsed.port,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
+from rigtwin.files import keep_apart, recordable
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
@@ -58,7 +58,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     RigtwinError
         Before anything is written.
     """
-    keep_apart(out, *data, map_path)
+    recordable(keep_apart(out, *data, map_path))
     wanted = load(map_path)
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one, they are told by it")
