@@ -285,6 +285,20 @@ def test_what_a_sensor_shows_by_itself_is_read_off(text, value):
     assert found.value == pytest.approx(value, rel=0.1)
 
 
+def test_a_coarse_bit_is_not_taken_for_hum():
+    """It makes more of a line that lies within it, or less, by where the signal stands."""
+    recording = rigtwin.run(
+        "suspension-rig",
+        "road10",
+        effects={"quantisation@load_cell": 24.3},
+        settings={"timing": {"duration": 8.0}},
+    )
+    evidence = evidence_of(recording)
+    predicted = evidence.predict(RIG.plant)
+    (found,) = find_outstanding(RIG, evidence.recordings, predicted, RIG.plant)
+    assert f"{found.kind}@{found.component}" == "quantisation@load_cell"
+
+
 @SLOW
 def test_noise_that_all_sensors_share_is_the_laboratorys():
     louder = [

@@ -110,6 +110,9 @@ def find_outstanding(
                 continue
             if kind == "noise" and table[name]["resolution"] > table[name]["white"]:
                 continue
+            # A line within one bit reads as anything up to the bit, by where the signal stands.
+            if kind == "hum" and table[name]["resolution"] > table[name]["hum"]:
+                continue
             # Without another sensor there is nothing that says what the laboratory has more.
             others = [other for key, other in ratios.items() if key != name] or [1.0]
             if ratio > OUTSTANDING * max(1.0, float(np.median(others))):
