@@ -41,6 +41,7 @@ moved_by = "valve"
 observe = ["encoder"]
 """
 PERIOD, DURATION = 2e-3, 20.0
+SLOW = pytest.mark.slow
 
 
 def through(command: float, forward: float, backward: float) -> float:
@@ -80,7 +81,10 @@ def diagnosed(folder: Path, forward: float, backward: float, nominal: str) -> ri
     return rigtwin.diagnose(tests[0], machine=machine, held_out=tests[1])
 
 
-@pytest.mark.parametrize("nominal", ["known", "rough"])
+NOMINAL = pytest.mark.parametrize("nominal", ["known", pytest.param("rough", marks=SLOW)])
+
+
+@NOMINAL
 def test_one_that_differs_by_direction_is_found(tmp_path, nominal):
     answer = diagnosed(tmp_path, 0.08, 0.02, nominal)
     (effect,) = answer.effects
@@ -90,7 +94,7 @@ def test_one_that_differs_by_direction_is_found(tmp_path, nominal):
     assert effect.parameters["deadband_asymmetry"].value == pytest.approx(0.06, rel=0.05)
 
 
-@pytest.mark.parametrize("nominal", ["known", "rough"])
+@NOMINAL
 def test_an_even_one_stays_one(tmp_path, nominal):
     answer = diagnosed(tmp_path, 0.05, 0.05, nominal)
     (effect,) = answer.effects
