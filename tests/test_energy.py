@@ -176,3 +176,7 @@ def test_of_a_compensated_test_with_its_settings():
     assert before is not None
     assert after is not None
     assert abs(after.structure) < 0.2 * before.structure
+
+
+def test_other_machines_have_none():
+    assert rigtwin.energy_error(rigtwin.run("emps", "positioning")) is None

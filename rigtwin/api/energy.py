@@ -7,7 +7,7 @@ from pathlib import Path
 from rigtwin.api.machines import Settings, described_machine
 from rigtwin.api.recordings import the_recording
 from rigtwin.description.changes import with_changes
-from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.recording import reader
 from rigtwin.simulation.energy import EnergyError as EnergyError
 from rigtwin.simulation.energy import measure_energy
@@ -46,6 +46,8 @@ def energy_error(
     """
     recording = the_recording(recording)
     found = described_machine(recording, machine)
+    if found.structure is not Structure.QUARTER_CAR:
+        return None
     own = OWN in recording.controller and bool(settings)
     known = experiments_of(found)
     start = known[recording.experiment].configuration if recording.experiment in known else None

@@ -90,8 +90,7 @@ def measure_energy(
         (single mass tests), or the controller was another and nothing is known of it.
     """
     settings = configuration.controller
-    closed = isinstance(settings, Settings) and settings.mode == Mode.MIL
-    if not closed or settings.travel != Travel.WHEEL or recording.ticks < LEAST:
+    if settings.mode != Mode.MIL or settings.travel != Travel.WHEEL or recording.ticks < LEAST:
         return None
     if own:
         control = RigControl()
