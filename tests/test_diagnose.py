@@ -180,6 +180,7 @@ def drifting(recording: Recording, rate: float) -> Recording:
     return replace_sensors(recording, suspension_lvdt=moved)
 
 
+@SLOW
 def test_what_something_unnamed_at_its_component_explains_alone_is_not_named():
     evidence = evidence_of(drifting(recorded("imposed", (), 20.0), 8e-5))
     offset, gain = (find(name, evidence.plant) for name in ("offset@suspension_lvdt", "gain@motor"))

@@ -19,7 +19,10 @@ def looks_at(**effects: float) -> tuple[list[rigtwin.FirstLook], rigtwin.Diagnos
 
 @pytest.mark.parametrize(
     ("name", "value", "sensor"),
-    [("coulomb__rail", 90.0, "suspension_lvdt"), ("gain__load_cell", 1.05, "load_cell")],
+    [
+        ("coulomb__rail", 90.0, "suspension_lvdt"),
+        pytest.param("gain__load_cell", 1.05, "load_cell", marks=pytest.mark.slow),
+    ],
 )
 def test_what_is_there_is_among_the_suspects(name, value, sensor):
     found, answer = looks_at(**{name: value})

@@ -73,6 +73,7 @@ def test_an_effect_from_a_time_on_gives_an_alarm_and_its_name(changed):
     assert EFFECT[0] in str(alarm)
 
 
+@pytest.mark.slow
 def test_with_its_effect_in_the_twin_there_is_no_alarm(tmp_path):
     path = tmp_path / "known.mcap"
     settings = [LENGTH, {"rail": {"coulomb": EFFECT[1]}}]
