@@ -35,7 +35,7 @@ def posed(wanted: np.ndarray, plate: np.ndarray, travel: np.ndarray, force: np.n
         period=PERIOD,
         time=times,
         columns={"/command": commands, "/sensor": sensed},
-        controller={},
+        controller={"mode": "mil"},
     )
 
 
@@ -127,9 +127,16 @@ def test_a_delay_of_the_plate_puts_energy_in():
 def test_where_no_model_closes_the_loop_there_is_none(change):
     configuration = Configuration()
     told = configuration.controller._replace(**change)
-    signal = np.zeros(10)
+    signal = np.zeros(100)
     recording = posed(signal, signal, signal, signal)
     assert measure_energy(recording, configuration._replace(controller=told)) is None
+
+
+def test_where_nobody_said_what_the_controller_did_there_is_none():
+    signal = np.zeros(100)
+    recording = posed(signal, signal, signal, signal)
+    assert measure_energy(recording, Configuration()) is not None
+    assert measure_energy(replace(recording, controller={}), Configuration()) is None
 
 
 @pytest.mark.parametrize("experiment", ["drop", "road10"])

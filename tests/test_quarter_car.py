@@ -13,7 +13,8 @@ from rigtwin.description.settings import Safety
 from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
-from rigtwin.models.quarter_car import Disturbances, QuarterCarModel, motor_friction, solve_velocity
+from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
+from rigtwin.models.quarter_car_motion import motor_friction, solve_velocity
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin

@@ -21,12 +21,10 @@ from rigtwin.components.cylinder import (
     rest_state,
 )
 from rigtwin.description.configuration import Configuration
-from rigtwin.models.quarter_car import follow_plates
+from rigtwin.models.quarter_car_motion import follow_plates
 from rigtwin.numerics.arrays import Array, interpolate
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import (
-    initial_deflection,
-)
+from rigtwin.simulation.plant import initial_deflection
 
 FIXED = 1e12
 """kg; a carriage this heavy stays where it is."""

@@ -32,6 +32,8 @@ from rigtwin.signals.noise import remove_mains
 BAND = 40.0
 """Hz, up to which a sensed travel counts: of the rate above it most is an LVDT's noise, which would
 pass for motion that the damper takes up."""
+TRUE = ("structure", "suspension", "load_cell")
+"""What a twin knows of plate, travel and force."""
 LEAST = 64
 """Ticks of the shortest test that is looked at: a filter needs room."""
 MATERIAL = 1e-6
@@ -96,14 +98,13 @@ def measure_energy(
         control = RigControl()
         inputs = [recording.column(*channel) for channel in control.channels]
         wanted = control.replay(settings, inputs, recording.period)[1]
-    elif OWN in recording.controller:
+    elif not recording.controller or OWN in recording.controller:
         return None
     else:
         wanted = recording.column("/command", "structure")
-    if "/truth" in recording.columns:
-        plate, travel, force = (
-            recording.column("/truth", name) for name in ("structure", "suspension", "load_cell")
-        )
+    truth = recording.columns.get("/truth", {})
+    if all(name in truth for name in TRUE):
+        plate, travel, force = (truth[name] for name in TRUE)
     else:
         # The mains' line is in force and motion alike, so that their product does not average out.
         mains = configuration.plant.mains.frequency
