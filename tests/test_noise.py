@@ -36,6 +36,14 @@ def test_mains_is_taken_out_and_the_mean_stays(frequency):
     assert np.mean(left) == pytest.approx(np.mean(slow), abs=1e-2)
 
 
+@pytest.mark.parametrize("rate", [10.0, 25.0, 50.0, 60.0, 100.0])
+def test_a_line_that_was_sampled_too_slowly_to_show_is_left_alone(rate: float):
+    # Of 50 samples a second the line would be a constant, and an offset would be taken for it.
+    time = np.arange(0.0, 20.0, 1.0 / rate)
+    signal = 3.0 + np.sin(2.0 * np.pi * 0.7 * time) + time**2
+    assert remove_mains(signal, 1.0 / rate, 50.0) == pytest.approx(signal, abs=1e-12)
+
+
 def test_band_holds_the_middle_of_the_power():
     low, high = band(np.sin(2 * np.pi * 5.0 * TIME), 1e-3)
     assert 4.5 <= low <= high <= 5.5

@@ -74,8 +74,11 @@ def remove_mains(signal: Array, period: float, frequency: float) -> Array:
     Returns
     -------
     Array
-        Shape (ticks,).
+        Shape (ticks,). The signal as it is where it was sampled too slowly to show the line: of 50
+        samples a second the line would be a constant.
     """
+    if frequency + MAINS_SEARCH >= 0.5 / period:
+        return signal.copy()
     count = len(signal)
     time = np.arange(count) * period
     centred = signal - np.mean(signal)
