@@ -13,7 +13,7 @@ from rigtwin.components.guide import resists
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.held_out_judge import Judged
-from rigtwin.diagnosis.selection import choose, conclude
+from rigtwin.diagnosis.selection import choose, conclude, tell_apart
 from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.models.start import find_slopes, fit_start, read_start
 
@@ -85,6 +85,29 @@ def test_the_simplest_of_those_that_do_as_well_is_chosen():
     assert chosen(none, one, explain(0.05, "coulomb", "viscous")) == {"coulomb", "viscous"}
 
 
+def test_beyond_what_leaves_nothing_but_noise_nothing_is_chosen():
+    none, one = explain(1.0), replace(explain(0.006, "coulomb"), complete=True)
+    two = explain(0.003, "coulomb", "stiffness")
+    assert chosen(none, one, two) == chosen(none, one, replace(two, complete=True)) == {"coulomb"}
+    assert chosen(none, explain(0.006, "coulomb"), two) == {"coulomb", "stiffness"}
+
+
+@pytest.mark.parametrize(("without", "apart"), [(0.3, True), (0.12, False)])
+def test_effects_of_like_responses_are_told_apart_where_both_are_missed(
+    without: float, apart: bool
+):
+    alike = replace(explain(0.1, "coulomb", "viscous"), collinear=True)
+    pool = [explain(1.0), explain(0.4, "coulomb"), explain(without, "viscous"), alike]
+    # What takes the place of one of them does not put them in doubt.
+    pool.append(explain(0.11, "coulomb", "stiffness"))
+    rules = SelectionRules()
+    assert tell_apart(pool, DAMPER.plant, rules)[3].doubtful is not apart
+    assert tell_apart([pool[0], pool[1], alike], DAMPER.plant, rules)[2].doubtful
+    assert kinds(conclude(pool[:4], DAMPER.plant, rules).chosen) == (
+        {"coulomb", "viscous"} if apart else {"viscous"}
+    )
+
+
 def test_what_few_machines_have_must_account_for_much():
     none, one = explain(1.0), explain(0.04, "coulomb")
     assert chosen(none, one, explain(0.025, "coulomb", "backlash")) == {"coulomb"}
@@ -147,11 +170,23 @@ def swing(start: np.ndarray) -> np.ndarray:
     )
 
 
+def test_a_start_is_not_led_astray_by_derivatives_that_hold_nearby_only():
+    # What swings over tells nothing of the way there: a step must do better to be taken.
+    def turning(start: np.ndarray) -> np.ndarray:
+        return np.sin(40.0 * start[1] + TIME)
+
+    first, error = np.array((0.0, 0.0)), np.array((1e-3, 0.05))
+    slopes = find_slopes(turning, first, error, turning(first))
+    measured = turning(np.array((0.0, 0.09)))
+    found = fit_start(turning, measured, first, error, 1e-3, slopes, turning(first))
+    assert np.sum((turning(found) - measured) ** 2) <= np.sum((turning(first) - measured) ** 2)
+
+
 def test_a_free_swings_start_is_found_beneath_coarse_bits():
     truth = np.array((0.6, 0.3))
     measured = np.round(swing(truth) / 1.5e-3) * 1.5e-3
     first, error = np.array(read_start(measured, 5e-3)), np.array((1.5e-3, 0.1))
-    slopes = find_slopes(swing, first, error)
-    found = fit_start(swing, measured, first, error, 1e-3, slopes)
+    slopes = find_slopes(swing, first, error, swing(first))
+    found = fit_start(swing, measured, first, error, 1e-3, slopes, swing(first))
     assert found == pytest.approx(truth, abs=2e-3)
     assert abs(found[1] - truth[1]) < abs(first[1] - truth[1])

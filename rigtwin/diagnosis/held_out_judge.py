@@ -43,7 +43,8 @@ class Judged:
     widths: standard errors of its values by the jackknife over stretches of the recordings; floor:
     error below which no model is better than another; pieces: independent ones that what is left
     consists of; size: number of parameters, and of bits that say which of the places looked at they
-    were found from; cancels: whether two of its effects undo each other, or cannot be told apart;
+    were found from; cancels: whether two of its effects undo each other; collinear: whether the
+    responses of two can hardly be told apart;
     bounded: whether a value stands at the end of the range that it is searched in; complete:
     whether it leaves nothing but noise.
     """
@@ -55,6 +56,7 @@ class Judged:
     pieces: float = math.e
     size: float = 0.0
     cancels: bool = False
+    collinear: bool = False
     bounded: bool = False
     complete: bool = False
 
@@ -62,6 +64,11 @@ class Judged:
     def errors(self) -> Array:
         """rms of what is left, in units of the signals' own, of each recording."""
         return np.sqrt(np.mean(self.power, axis=1))
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether two of its effects undo each other, or can hardly be told apart."""
+        return self.cancels or self.collinear
 
     @property
     def score(self) -> float:
@@ -182,7 +189,8 @@ class HeldOutJudge:
             floor=self._floor,
             pieces=count_independent(evidence, fit),
             size=float(sum(self._size(effect) for effect in fit.effects)),
-            cancels=self._are_collinear(fit, jacobian, here, widths) or self._cancels(fit),
+            cancels=self._cancels(fit),
+            collinear=self._are_collinear(fit, jacobian, here, widths),
             bounded=self.fitter.is_bounded(fit),
             complete=fit.misfit
             <= (1.0 + self.rules.complete) * evidence.expected_misfit(fit.plant),

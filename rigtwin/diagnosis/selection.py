@@ -31,6 +31,8 @@ ROUNDS = 5
 """Times that an explanation is chosen and its neighbours are judged too."""
 JUDGED = 4
 """Explanations of each number of parameters that are judged at first."""
+ROUNDING = 1e-6
+"""Difference of two sizes that is none."""
 
 
 RARE = (
@@ -90,7 +92,7 @@ class Selection:
             for each in self.pool
             if effect in each.fit.effects
             and each.score <= self.chosen.score + self.rules.alike
-            and not each.cancels
+            and not each.doubtful
             and not each.bounded
         ]
         return tuple(
@@ -153,7 +155,7 @@ def choose(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Judge
     fair = [
         each
         for each in pool
-        if not each.cancels and not each.bounded and _is_steady(each, plant, rules)
+        if not each.doubtful and not each.bounded and _is_steady(each, plant, rules)
     ]
     price = rules.price_of(max(each.pieces for each in fair))
     likely = drop_unlikely(pool, rules)
@@ -164,9 +166,9 @@ def choose(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Judge
         margins = (_margin(effect, each, rivals, price, rules) for effect in each.fit.effects)
         return min(margins, default=math.inf)
 
-    margins = [(each, least_margin(each)) for each in fair if each in likely]
+    margins = [(each, least_margin(each)) for each in _keep_simplest(fair, likely)]
     necessary = [each for each, margin in margins if margin >= rules.necessary]
-    best = min(necessary, key=lambda each: _cost(each, price))
+    best = min(necessary or [each for each, _ in margins], key=lambda each: _cost(each, price))
     # Nothing is given up for what does far worse, only because one of its effects is in doubt.
     doubted = [
         each
@@ -174,6 +176,37 @@ def choose(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Judge
         if margin > 0.0 and _cost(each, price) < _cost(best, price) - rules.least
     ]
     return min(doubted, key=lambda each: _cost(each, price), default=best)
+
+
+def _keep_simplest(fair: Sequence[Judged], likely: Sequence[Judged]) -> list[Judged]:
+    """Those of both; where some leave nothing but noise, the simplest of these: however little more
+    another leaves, nothing asks for it."""
+    kept = [each for each in fair if each in likely]
+    sufficient = [each for each in kept if each.complete]
+    least = min((each.size for each in sufficient), default=math.inf)
+    return [each for each in sufficient if each.size < least + ROUNDING] or kept
+
+
+def tell_apart(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> list[Judged]:
+    """The pool, with effects taken as told apart, however alike their responses, where the same
+    explanation was tried without any one of them and does much worse; arguments as of `choose`."""
+    price = rules.price_of(max(each.pieces for each in pool))
+    tried = {frozenset(each.fit.effects): each for each in pool}
+
+    def is_missed(effect: Effect, each: Judged) -> bool:
+        rest = tuple(own for own in each.fit.effects if own != effect)
+        if is_possible(rest, plant) and frozenset(rest) not in tried:
+            return False
+        fewer = [other for effects, other in tried.items() if effects <= set(rest)]
+        least = min((_cost(other, price) for other in fewer), default=-math.inf)
+        return least >= _cost(each, price) + rules.apart
+
+    return [
+        replace(each, collinear=False)
+        if each.collinear and all(is_missed(effect, each) for effect in each.fit.effects)
+        else each
+        for each in pool
+    ]
 
 
 def _is_steady(each: Judged, plant: Plant, rules: SelectionRules) -> bool:
@@ -208,7 +241,7 @@ def drop_unlikely(pool: Sequence[Judged], rules: SelectionRules) -> list[Judged]
         Those whose effects do not undo each other or stand at a bound, and in which everything that
         few machines have accounts for a good share of the signals, or for all that is left.
     """
-    possible = [each for each in pool if not each.cancels and not each.bounded]
+    possible = [each for each in pool if not each.doubtful and not each.bounded]
 
     def is_likely(effect: Effect, each: Judged) -> bool:
         others = set(each.fit.effects) - {effect}
@@ -311,7 +344,7 @@ def select(
     }
     tried_starts: set[tuple[tuple[Effect, ...], Values]] = set()
     for _ in range(ROUNDS):
-        chosen = choose(list(pool.values()), fitter.plant, rules)
+        chosen = choose(tell_apart(list(pool.values()), fitter.plant, rules), fitter.plant, rules)
         best = min(pool.values(), key=lambda each: each.score)
         simple = sorted(pool.values(), key=lambda each: each.score + PRICE * each.size)
         near = [pair for each in simple[:SHAKEN] for pair in _shake(each.fit, fitter)]
@@ -339,6 +372,7 @@ def select(
 
 def conclude(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Selection:
     """What is chosen of everything judged, and what does as well; arguments as of `choose`."""
+    pool = tell_apart(pool, plant, rules)
     chosen = choose(pool, plant, rules)
     ranked = sorted(pool, key=lambda each: each.score)
     alike = tuple(
@@ -346,7 +380,7 @@ def conclude(pool: Sequence[Judged], plant: Plant, rules: SelectionRules) -> Sel
         for each in ranked
         if each is not chosen
         and len(each.fit.effects) == len(chosen.fit.effects)
-        and not each.cancels
+        and not each.doubtful
         and not each.bounded
         and _is_as_good(each, chosen, rules.alike, rules.slack)
     )

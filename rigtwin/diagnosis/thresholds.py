@@ -50,7 +50,9 @@ class SelectionRules:
     collinear: float = 0.95
     """Cosine of two responses from which only one of them is claimed,"""
     surely: float = 100.0
-    """unless both magnitudes are off nominal by that many standard errors."""
+    """unless both magnitudes are off nominal by that many standard errors,"""
+    apart: float = 0.5
+    """or the explanation does so much worse without either, price included."""
     necessary: float = 0.05
     """Price included, by how much every explanation without an effect must do worse,"""
     rarely: float = 0.11

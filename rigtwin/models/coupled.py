@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -36,38 +35,20 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_motion import Contacts, Inputs, Servos, State, advance
+from rigtwin.models.coupled_start import CoupledStart, Seen, Sense
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
 from rigtwin.models.model import Form
 from rigtwin.models.multibody import Multibody, inertia_at
-from rigtwin.models.start import find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array, contain, interpolate
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smallest_step, smooth, white_noise
+from rigtwin.signals.noise import smooth, white_noise
 
 SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
 """Parameters of a guide that alone do nothing."""
-FIRMNESS = 1e-3
-"""Weight of where the MJCF has a joint against a sensor that sees where it is."""
-SHOWS = 10.0
-"""χ² from which the error of a start shows."""
 THINNED = 5e-3
 """Share of a signal's own swing that longer steps may change for a search."""
-FORGOTTEN = 0.02
-"""Share of its greatest effect below which a start's error does no more."""
-
-
-@dataclass(frozen=True)
-class Judged:
-    """How a start is fitted. rows: to which; held: to what each is predicted at best; errors: of
-    the start as it is read, shape (2 · free joints,); slopes: of the rows by each error, of the
-    nominal machine: near enough for others."""
-
-    rows: tuple[int, ...]
-    held: Array
-    errors: Array
-    slopes: Array
 
 
 class CoupledModel:
@@ -116,20 +97,19 @@ class CoupledModel:
             for name in self._leaders
             if measures(getattr(plant, name)) == "position"
         }
-        self._seen = [
-            name
+        seen = {
+            name: self._seen_by(name, kind)
             for name, component in components.items()
-            if measures(getattr(plant, name)) == "position"
+            if (kind := measures(getattr(plant, name))) in ("position", "velocity")
             and component.channel in replay_channels(recording)
             and self._along[name].any()
-        ]
+        }
+        self._start = CoupledStart(seen, self._bodies.place(), self._loose, self._period)
         self._loosest = self._find_loosest()
         self._changed: dict[tuple[object, ...], Multibody] = {}
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Array] = {}
-        self._remembered = self._ticks
-        self._judged: Judged | None = None
-        self._judged = self._find_judged()
+        self._judge_start()
 
     @property
     def band(self) -> float:
@@ -172,7 +152,7 @@ class CoupledModel:
         free = len(self._free)
         data = self._bodies.data()
         bodies = self._bodies.bodies(data, self._turning(plant))
-        inertia = inertia_at(bodies, self._read_start(plant)[0])[:free, :free]
+        inertia = inertia_at(bodies, self._start.read(plant)[0])[:free, :free]
         found = np.full(len(self._guides), 1.0)
         for number, name in enumerate(self._guides):
             along = self._along[name][:free]
@@ -303,92 +283,37 @@ class CoupledModel:
 
     # Where it starts
 
-    def _read_start(self, plant: Plant) -> Array:
-        """Positions and velocities as the first samples have them, shape (2, coordinates). A joint
-        that no sensor sees is where the MJCF has it, at rest."""
-        size = self._bodies.coordinates
-        rows: list[Array] = [FIRMNESS * np.eye(size)]
-        still = np.zeros((size, 2))
-        still[:, 0] = FIRMNESS * self._bodies.place()
-        values: list[Array] = [still]
-        for name in self._seen:
-            sensor = getattr(plant, name)
-            measured = self._read[name][0] if name in self._read else self._column(name)
-            place, speed = read_start(measured, self._period)
-            rows.append(self._along[name][None])
-            position = (place - sensor.offset) / sensor.gain - self._zero[name]
-            values.append(np.array([[position, speed / sensor.gain]], float))
-        found = np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
-        return np.array(found.T, np.float64, order="C")
-
     def _start_of(self, plant: Plant) -> Array:
         """Positions and velocities, shape (2, coordinates)."""
-        start = self._read_start(plant)
-        if self._judged is None:
-            return start
+        if not self._start.fitted:
+            return self._start.read(plant)
         key = self._key(plant)
         if key not in self._starts:
-            judged = self._judged
-            measured = self._measured(judged.rows)
-            sense, first = (
-                self._sense_from(plant, start, judged.rows),
-                start[:, : self._loose].ravel(),
-            )
-            # A model that is far off elsewhere too is no reason to start otherwise.
-            left = np.sqrt(np.mean((sense(first) - measured).reshape(len(judged.rows), -1) ** 2, 1))
-            held = np.repeat(np.maximum(judged.held, left), self._remembered)
-            found = fit_start(sense, measured, first, judged.errors, held, judged.slopes)
-            fitted = start.copy()
-            fitted[:, : self._loose] = found.reshape(2, -1)
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
+            found = self._start.find(plant, self._sense_from(plant))
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
         return self._starts[key]
 
-    def _measured(self, rows: Sequence[int]) -> Array:
-        """What starts are fitted to: rows, one after another."""
-        columns = [self._recording.column(*self.rows[number].channel) for number in rows]
-        return np.concatenate([column[: self._remembered] for column in columns])
-
-    def _sense_from(
-        self, plant: Plant, start: Array, rows: Sequence[int]
-    ) -> Callable[[Array], Array]:
-        """The same rows from any start of what is free, shape (2 · free joints,)."""
+    def _sense_from(self, plant: Plant) -> Sense:
+        """What is observed from any start, for so many ticks."""
         move, besides = self._prepare(plant, {}), self._no_force()
+        return lambda start, ticks: self._sense(plant, contain(move(start, *besides, ticks)))
 
-        def sense(first: Array) -> Array:
-            begin = start.copy()
-            begin[:, : self._loose] = first.reshape(2, -1)
-            moved = contain(move(begin, *besides, self._remembered))
-            return self._sense(plant, moved)[list(rows)].ravel()
+    def _judge_start(self) -> None:
+        """Find out whether the error of a start as it is read shows."""
+        rough, plant = self._machine.rough, self._configuration.plant
+        rows = {
+            number: (
+                self._seen_by(row.name, row.kind),
+                self._machine.form_of(row) if rough else 0.0,
+            )
+            for number, row in enumerate(self.rows)
+            if row.kind in ("position", "velocity")
+        }
+        self._start.judge(plant, rows, self._sense_from(plant))
 
-        return sense
-
-    def _find_judged(self) -> Judged | None:
-        """How a start is fitted; None where the error of one as it is read does not show."""
-        rows = [n for n, row in enumerate(self.rows) if row.kind == "position"]
-        if not rows:
-            return None
-        held, noises = [], []
-        for number in rows:
-            row = self.rows[number]
-            measured = self._recording.column(*row.channel)
-            noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
-            noises.append(noise)
-            form = self._machine.form_of(row) if self._machine.rough else 0.0
-            held.append(max(form * float(np.std(measured)), noise, 1e-300))
-        error = start_error(float(np.max(noises)), self._period, self._ticks)
-        errors = np.repeat(error, self._loose)
-        plant = self._configuration.plant
-        start = self._read_start(plant)
-        sense = self._sense_from(plant, start, rows)
-        slopes = find_slopes(sense, start[:, : self._loose].ravel(), errors)
-        by_row = slopes.reshape(len(rows), self._ticks, -1)
-        size = np.max(np.abs(by_row) / np.array(held)[:, None, None], axis=(0, 2))
-        if float(np.sum(size**2)) <= SHOWS:
-            return None
-        remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
-        self._remembered = remembered
-        slopes = by_row[:, :remembered].reshape(-1, slopes.shape[1])
-        return Judged(tuple(rows), np.array(held), errors, slopes)
+    def _seen_by(self, name: str, kind: str) -> Seen:
+        measured = self._read[name][0] if name in self._read else self._column(name)
+        return Seen(kind, self._along[name], self._zero[name], measured)
 
     # How it moves
 
@@ -400,7 +325,7 @@ class CoupledModel:
             *self._heavy,
             *self._bases(),
             *self._replay.moved_by,
-            *self._seen,
+            *self._start.sensors,
             "computer",
         }
         return tuple(getattr(plant, name) for name in sorted(names))

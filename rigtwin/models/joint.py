@@ -29,11 +29,12 @@ from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.model import Form
-from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
+from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smallest_step, smooth, white_noise
+from rigtwin.signals.noise import smooth, white_noise
 
 KEPT = 24
 """Motions that are kept."""
@@ -43,9 +44,6 @@ SMALL = 0.02
 """Share of a signal's swing that is a small disturbance."""
 LIGHTEST = 1e-12
 """kg or kg m², of what still moves under a finite force."""
-SHOWS, FORGOTTEN = 10.0, 0.02
-"""χ² from which the error of a start shows, and share of its greatest effect below which it does no
-more."""
 SEED = 7
 """Of the noise whose way through the machine is followed."""
 NO_COMMAND = formula("0", {})
@@ -132,11 +130,8 @@ class JointModel:
             and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
         self._last: dict[tuple[object, ...], Array] = {}
-        self._started_by = self._find_position_sensor()
-        self._start, self._start_error = self._read_start(), (0.0, 0.0)
         self._starts: dict[tuple[object, ...], Start] = {}
-        self._remembered = recording.ticks
-        self._held = self._find_held()
+        self._start = self._find_start()
 
     @property
     def band(self) -> float:
@@ -168,71 +163,39 @@ class JointModel:
         """s, from one tick that is predicted to the next."""
         return self.every * self._period
 
-    def _find_position_sensor(self) -> str | None:
-        """The sensor that says where the joint is at the start."""
-        rows = [row.name for row in self.rows if row.kind == "position"]
-        for name in (*rows, *self._sensors):
-            if measures(getattr(self._machine.plant, name)) == "position":
-                return name
-        return None
-
-    def _read_start(self) -> Start:
-        """As the first samples have it."""
-        if self._started_by is None:
-            return 0.0, 0.0
-        return read_start(self._recording.column(*self._start_channel), self._period)
-
-    @property
-    def _start_channel(self) -> tuple[str, str]:
-        assert self._started_by is not None
-        channel = self._machine.components[self._started_by].channel
+    def _find_start(self) -> JointStart | None:
+        """By a sensor of the position, or else of the velocity; fitted where a pushed joint in open
+        loop needs it."""
+        if not self._free:
+            return None
+        rows = {row.name: row for row in self.rows if row.kind in ("position", "velocity")}
+        plant, components = self._configuration.plant, self._machine.components
+        kinds = {name: measures(getattr(plant, name)) for name in (*rows, *self._sensors)}
+        name = min(kinds, key=lambda name: kinds[name] != "position", default=None)
+        if name is None:
+            return None
+        channel = components[name].channel
         assert channel is not None
-        return channel
+        start = JointStart(name, kinds[name], self._recording.column(*channel), self._period)
+        if name in rows and self._control is None and self._machine.rough:
+            move = self._prepare_pushed(plant, getattr(plant, self._mover.name))
+            nominal = getattr(self._machine.plant, name)
+            start.judge(nominal, move, self._machine.form_of(rows[name]), self._command)
+        return start
 
     def _start_of(self, plant: Plant) -> Start:
         """Position and velocity at the start, where a sensor's zero is no place of the joint."""
-        if self._started_by is None:
-            return self._start
-        sensor = getattr(plant, self._started_by)
-        start = (self._start[0] - sensor.offset) / sensor.gain, self._start[1] / sensor.gain
-        if not self._held:
-            return start
+        if self._start is None:
+            return AT_REST
+        sensor = getattr(plant, self._start.name)
+        if not self._start.fitted:
+            return self._start.find(sensor, None)
         key = self._key(plant)
         if key not in self._starts:
-            measured = self._recording.column(*self._start_channel)[: self._remembered]
-            measured = (measured - sensor.offset) / sensor.gain
-            predict, first = self._predict_from_starts(plant), np.array(start)
-            error = np.array(self._start_error)
-            slopes = find_slopes(predict, first, error)
-            found = fit_start(predict, measured, first, error, self._held, slopes)
-            fitted = float(found[0]), float(found[1])
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: fitted}
+            move = self._prepare_pushed(plant, getattr(plant, self._mover.name))
+            found = self._start.find(sensor, move)
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
         return self._starts[key]
-
-    def _predict_from_starts(self, plant: Plant) -> Callable[[Array], Array]:
-        """The position from any start, for as long as a start is remembered."""
-        integrate = self._prepare_pushed(plant, getattr(plant, self._mover.name))
-        besides = np.zeros(self._remembered)
-        return lambda start: contain(integrate((float(start[0]), float(start[1])), besides)[0])
-
-    def _find_held(self) -> float:
-        """To what the position is predicted at best where the start's error shows in it; 0 where it
-        does not, or where nobody asks for it."""
-        open_loop = self._free and self._control is None and self._machine.rough
-        row = next((row for row in self.rows if row.name == self._started_by), None)
-        if row is None or not open_loop:
-            return 0.0
-        measured = self._recording.column(*row.channel)
-        noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
-        self._start_error = start_error(noise, self._period, len(measured))
-        held = max(self._machine.form_of(row) * float(np.std(measured)), noise)
-        position, velocity = self._start
-        faster = np.array([position, velocity + self._start_error[1]])
-        predict = self._predict_from_starts(self._configuration.plant)
-        change = predict(faster) - predict(np.array(self._start))
-        size = np.abs(change)
-        self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
-        return held if float(change @ change) > SHOWS * held**2 else 0.0
 
     def _parts(self, plant: Plant) -> tuple[Guide, Inertia]:
         replay = self._replay
@@ -265,8 +228,8 @@ class JointModel:
         names = [replay.guide, replay.mass, replay.rotor, self._mover.name, "computer"]
         if self._control is not None:
             names += self._sensors
-        if self._started_by is not None and self._started_by not in names:
-            names.append(self._started_by)
+        if self._start is not None and self._start.name not in names:
+            names.append(self._start.name)
         return tuple(getattr(plant, name) for name in names if name is not None)
 
     def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:

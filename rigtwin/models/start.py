@@ -8,8 +8,10 @@ import numpy as np
 
 from rigtwin.numerics.arrays import Array
 
-STEPS, LIKELY = 2, 10.0
+STEPS, LIKELY = 4, 10.0
 """Gauss-Newton steps, and errors of the first samples within which a start lies."""
+SHARES, ENOUGH = (1.0, 0.25), 1e-5
+"""Of a step that are tried, and of the cost that a further step must save."""
 BEGINNING = 0.03
 """s, from which a start is read."""
 FEWEST = 8
@@ -66,7 +68,9 @@ def _ticks(period: float, count: int) -> int:
     return min(max(FEWEST, round(BEGINNING / period)), count)
 
 
-def find_slopes(predict: Callable[[Array], Array], first: Array, error: Array) -> Array:
+def find_slopes(
+    predict: Callable[[Array], Array], first: Array, error: Array, here: Array
+) -> Array:
     """How a prediction changes with each unknown of a start by its error.
 
     Parameters
@@ -75,13 +79,14 @@ def find_slopes(predict: Callable[[Array], Array], first: Array, error: Array) -
         What is measured, shape (n,), from a start.
     first, error
         The start as it was read, and its error, shape (unknowns,).
+    here
+        What is predicted of it, shape (n,).
 
     Returns
     -------
     array
         Shape (n, unknowns).
     """
-    here = predict(first)
     return np.stack([predict(first + step) - here for step in np.diag(error)], axis=1)
 
 
@@ -92,6 +97,7 @@ def fit_start(
     error: Array,
     held: float | Array,
     slopes: Array,
+    here: Array,
 ) -> Array:
     """The start with which a machine goes as measured.
 
@@ -109,20 +115,34 @@ def fit_start(
         To what it is predicted at best; a number, or shape (n,).
     slopes
         As `find_slopes` has them.
+    here
+        What is predicted of `first`, shape (n,).
 
     Returns
     -------
     array
-        Positions and velocities, shape (unknowns,); `first` if the prediction runs away.
+        Positions and velocities, shape (unknowns,).
     """
     columns = (slopes.T / held).T
     # A start is known well enough to begin with that the derivatives there do for all steps.
     normal = columns.T @ columns + np.eye(len(first)) / LIKELY**2
-    start = first
+
+    def weigh(predicted: Array, moved: Array) -> tuple[Array, float]:
+        """What is left of a prediction, and its cost, from so many errors beside `first`."""
+        left = (measured - predicted) / held
+        return left, float(left @ left + moved @ moved / LIKELY**2)
+
+    moved = np.zeros(len(first))
+    left, cost = weigh(here, moved)
     for _ in range(STEPS):
-        gradient = columns.T @ ((measured - predict(start)) / held)
-        gradient -= (start - first) / error / LIKELY**2
-        start = start + error * np.linalg.solve(normal, gradient)
-        if not np.isfinite(start).all():
-            return first
-    return start
+        step, before = np.linalg.solve(normal, columns.T @ left - moved / LIKELY**2), cost
+        for share in SHARES:
+            # Of what swings over or sticks the derivatives may say nothing.
+            tried = moved + share * step
+            there, other = weigh(predict(first + error * tried), tried)
+            if other < cost:
+                moved, left, cost = tried, there, other
+                break
+        if before - cost <= ENOUGH * before:
+            break
+    return first + error * moved

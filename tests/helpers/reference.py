@@ -37,3 +37,26 @@ def coulomb_carriage(
         position = midpoint + 0.5 * step * new
         velocity = new
     return out
+
+
+def swing_dry(
+    mass: float, lever: float, friction: float, start: tuple[float, float], time: Array
+) -> Array:
+    """Rate of a point mass that swings about a hinge with set-valued dry friction; Moreau's time
+    stepping in 50 steps a sample.
+
+    mass kg, lever m, friction Nm, start rad and rad/s; returns rad/s at those times, evenly apart.
+    """
+    fine, inertia = 50, mass * lever**2
+    step = float(time[1] - time[0]) / fine
+    angle, rate = start
+    out = np.empty(len(time))
+    for number in range(len(time)):
+        out[number] = rate
+        for _ in range(fine):
+            middle = angle + 0.5 * step * rate
+            free = rate - step * 9.81 / lever * np.sin(middle)
+            impulse = step * friction / inertia
+            rate = free - min(max(free, -impulse), impulse)
+            angle = middle + 0.5 * step * rate
+    return out
