@@ -78,7 +78,8 @@ def test_a_pendulum_has_its_inertia_and_gravity(tmp_path: Path):
     # more.
     assert joint.inertia == pytest.approx(1.5 * 0.4**2 / 3, rel=0.06)
     load = np.interp(0.5, joint.positions, joint.gravity)
-    assert load == pytest.approx(1.5 * 9.81 * 0.2 * np.sin(0.5), rel=1e-3)
+    # What is lost between the places at which it is worked out acts as a spring on a free swing.
+    assert load == pytest.approx(1.5 * 9.81 * 0.2 * np.sin(0.5), rel=1e-5)
 
 
 def test_a_rotor_behind_a_gear_has_inertia_and_no_weight(tmp_path: Path):

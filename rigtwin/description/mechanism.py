@@ -22,7 +22,7 @@ OBJECTS = {
     "contact": mujoco.mjtObj.mjOBJ_PAIR,
 }
 """Element of an MJCF that can be a component → MuJoCo's name for it."""
-GRID = 181
+GRID = 1441
 """Positions at which a joint's gravity load is worked out."""
 TURN = float(np.pi)
 """rad; how far to either side a joint without a range turns."""
