@@ -75,7 +75,8 @@ def describe_attributed(
 
     def confidence(effect: Effect) -> float:
         if effect in supports:
-            return thresholds.selection.confidence(supports[effect].margin)
+            support = supports[effect]
+            return thresholds.selection.confidence(support.margin, support.left)
         return min(surest, _probability(found.ranking, effect))
 
     return [

@@ -71,6 +71,10 @@ class SelectionRules:
     )
     """Margin of an effect, and how often one of such a margin was right, or one of its class, on
     machines of other physics than the library's (docs/confidence.md)."""
+    measured: float = 0.3
+    """Share of the signals that is left at most where that was measured,"""
+    beyond: float = 0.85
+    """and what it was on real machines of which more is left."""
     jackknifed: float = 4.0
     """Standard errors by the jackknife to either side that an interval has at least."""
     needed: float = 0.03
@@ -83,10 +87,12 @@ class SelectionRules:
     """and its magnitudes, from recording to recording, are off nominal by that many standard
     errors."""
 
-    def confidence(self, margin: float) -> float:
-        """Of an effect without which everything does worse by a margin."""
+    def confidence(self, margin: float, left: float) -> float:
+        """Of an effect without which everything does worse by a margin, where an explanation leaves
+        that much of the signals."""
         margins, shares = zip(*self.calibration, strict=True)
-        return float(np.interp(margin, margins, shares))
+        most = self.beyond if left > self.measured else 1.0
+        return min(float(np.interp(margin, margins, shares)), most)
 
     def price_of(self, pieces: float) -> float:
         """Of a parameter, where what is left consists of so many independent pieces."""
