@@ -27,7 +27,7 @@ def moved(guide: Guide, position: np.ndarray, mass: float = 0.0, spring: float =
     velocity = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, velocity, np.gradient(velocity, PERIOD)]))
     out = np.empty(len(position))
-    inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0)
+    inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0, turns=False)
     inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, out)
     return out
 

@@ -37,7 +37,7 @@ MASS, LEVER, COULOMB, ZERO = 2.5, 0.4, 0.02, 1.2
 
 
 def swung(start: tuple[float, float], zero: float, coulomb: float) -> Recording:
-    rate = swing_dry(MASS, LEVER, coulomb, start, np.arange(0.0, SECONDS, PERIOD))
+    _, rate, _ = swing_dry(MASS, LEVER, coulomb, start, np.arange(0.0, SECONDS, PERIOD))
     rate = rate + zero + 2e-3 * np.random.default_rng(4).standard_normal(rate.size)
     columns = {"/command": {"push": np.zeros(rate.size)}, "/sensor": {"rate": rate}}
     time = np.arange(rate.size) * PERIOD
@@ -56,6 +56,7 @@ def test_a_swing_that_a_gyro_alone_sees_starts_where_it_did(
     assert model.move(machine.plant)[:2, 0] == pytest.approx(start, abs=5e-3)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_friction_and_the_zero_of_a_gyro_are_found(tmp_path: Path) -> None:
     machine = described(tmp_path, "fork", PENDULUM, TOML)
     answer = rigtwin.diagnose(swung((0.25, 0.3), ZERO, COULOMB), machine=machine)
@@ -89,7 +90,7 @@ moved_by = ["drive_1", "drive_2"]
 observe = ["angle_1", "angle_2"]
 """
     machine = described(tmp_path, "arm", mjcf, toml)
-    torques = np.zeros((2, 1500))
+    torques = np.zeros((2, 400))
     start = (0.3, -0.5), (0.4, 0.2)
     _, rates = integrate(torques, *start)
     noise = 1e-3 * np.random.default_rng(3).standard_normal(rates.shape)

@@ -10,10 +10,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from controllers.compiled import compilable
 from rigtwin.components.actuators import ForceActuator
 from rigtwin.components.effect import Context, Kind, Starts, shares_of_nominal
 from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
 
 
 class Servo(NamedTuple):
@@ -86,6 +90,15 @@ def push(law: Push, command: float, position: float, speed: float) -> float:
     if law.position_gain > 0.0:
         force = pull(law, command, position) - law.damping_gain * speed
     return min(max(force, -law.limit), law.limit)
+
+
+@kernel
+def push_all(law: Push, commands: Array, positions: Array, speeds: Array) -> Array:
+    """The same from tick to tick, each shape (ticks,)."""
+    forces = np.empty(len(commands))
+    for tick in range(len(commands)):
+        forces[tick] = push(law, commands[tick], positions[tick], speeds[tick])
+    return forces
 
 
 def _damping_gain(at: Context) -> Starts:

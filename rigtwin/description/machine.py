@@ -91,6 +91,12 @@ class Joint:
     rest: float
     armature: float = 0.0
 
+    @property
+    def goes_round(self) -> bool:
+        """Whether its range is a whole turn, after which all is as before."""
+        whole = self.positions[-1] - self.positions[0]
+        return self.turns and math.isclose(whole, 2.0 * math.pi)
+
 
 @dataclass(frozen=True)
 class ReplayOf:

@@ -60,6 +60,8 @@ STEPPED = 0.05
 """Share of what a rough model is held to that twice the integration steps may change."""
 SMOOTHED = 8
 """Lines to either side over which a signal's spectrum is averaged."""
+UNKNOWN = 10
+"""Ticks at either end at which a measured motion's acceleration is not known."""
 WIDELY = 32
 """The same for noise, of which one draw is taken."""
 
@@ -444,6 +446,14 @@ class Evidence:
                 rfft(each.fade * difference, each.length, axis=1)[:, : len(each.frequency)]
                 * each.weight
             )
+
+    def missing_force(self, plant: Plant) -> Array | None:
+        """What would have to act besides for what goes by itself to go as measured, N, all
+        recordings one after another; None where nothing goes by itself. The ends are left out,
+        where accelerations are not known."""
+        parts = [model.missing_force(plant) for model in self.models]
+        known = [part[UNKNOWN:-UNKNOWN] for part in parts if part is not None]
+        return np.concatenate(known) if len(known) == len(parts) else None
 
     def residual(self, plant: Plant) -> Array:
         """Measured less predicted."""

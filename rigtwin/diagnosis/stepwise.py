@@ -13,6 +13,7 @@ from itertools import product
 
 from rigtwin.components import Effect, Guide
 from rigtwin.description.machine import Structure
+from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.fit import Fit, Values, clashes, with_values, without_each
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.held_out_judge import HeldOutJudge
@@ -134,12 +135,12 @@ def _fit_regulars(growth: Growth, threads: Threads) -> list[Fit]:
         values = [v for v in search.starts(effect).values if v[0] > 0.0]
         return values[min(number, len(values) - 1)]
 
-    tries = threads.map(
-        lambda number: search.refine(
-            tuple(chosen), [start_of(effect, int(number)) for effect in chosen]
-        ),
-        range(GATEWAY_STARTS),
-    )
+    starts = [
+        tuple(start_of(effect, number) for effect in chosen) for number in range(GATEWAY_STARTS)
+    ]
+    if (balanced := balance_forces(search, chosen)) is not None:
+        starts.append(balanced)
+    tries = threads.map(lambda values: search.refine(tuple(chosen), values), starts)
     found = [min(tries, key=growth.cost)]
     while len(found[-1].effects) > 1:
         fewer = search.predict_without(found[-1])[:LEAST_MISSED]

@@ -112,6 +112,11 @@ class Joints:
     def undetermined(self) -> None:
         """None, as of each."""
 
+    def missing_force(self, plant: Plant) -> Array | None:
+        parts = [each.missing_force(plant) for each in self._joints]
+        known = [part for part in parts if part is not None]
+        return np.concatenate(known) if known else None
+
     def propagated_noise(self, plant: Plant) -> Array | None:
         parts = [each.propagated_noise(plant) for each in self._joints]
         if all(part is None for part in parts):

@@ -525,6 +525,9 @@ class CoupledModel:
     def undetermined(self) -> None:
         """None: joints that go by themselves are judged at rest too."""
 
+    def missing_force(self, plant: Plant) -> None:
+        """None: joints that act on each other are searched from what they are told."""
+
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of the measured motions makes of what is observed."""
         random = np.random.default_rng(SEED)

@@ -26,6 +26,8 @@ from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
+FURTHEST = 1e12
+"""Spacings of a grid beyond which a position is none."""
 SHORTEST = 1.0
 """Times step² / inertia, below which a mount's compliance cannot be told from a rigid one."""
 RIGID = 1e6
@@ -34,13 +36,14 @@ RIGID = 1e6
 
 class Inertia(NamedTuple):
     """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions;
-    rest: where the guide's spring is slack."""
+    rest: where the guide's spring is slack; turns: whether the grid's end is its beginning."""
 
     mass: float
     first: float
     spacing: float
     load: Array
     rest: float
+    turns: bool
 
 
 class Loop(NamedTuple):
@@ -73,11 +76,13 @@ def gravity(inertia: Inertia, position: float) -> float:
     float
         N.
     """
-    place = (position - inertia.first) / inertia.spacing
+    place, last = (position - inertia.first) / inertia.spacing, len(inertia.load) - 1
+    # Of what ran away there is no place.
+    if inertia.turns and abs(place) < FURTHEST:
+        place -= math.floor(place / last) * last
     if not place > 0.0:
-        # Of what ran away there is no place.
         place = 0.0
-    place = min(place, len(inertia.load) - 1.000001)
+    place = min(place, last - 1e-6)
     whole = int(place)
     part = place - whole
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]

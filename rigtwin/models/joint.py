@@ -17,12 +17,12 @@ from rigtwin.components import (
     Pusher,
     measures,
 )
-from rigtwin.components.conditioning import actuator, hold
+from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import Sensor, apply_sensor, start_transducer, transducer
-from rigtwin.components.servo import push_law
+from rigtwin.components.servo import push_all, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
@@ -131,6 +131,7 @@ class JointModel:
         ]
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Start] = {}
+        self._smoothed: dict[str, tuple[Array, float]] = {}
         self._start = self._find_start()
 
     @property
@@ -209,7 +210,7 @@ class JointModel:
         spacing = (joint.positions[-1] - joint.positions[0]) / max(len(joint.gravity) - 1, 1)
         guide = Guide(*(float(value) for value in guide))
         mass = max(float(mass), LIGHTEST)
-        return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest)
+        return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest, joint.goes_round)
 
     def _share_of_mass(self, plant: Plant) -> float:
         """How many times the MJCF's bodies there are; gravity acts on them, not on a rotor."""
@@ -455,6 +456,39 @@ class JointModel:
             _, inertia = self._parts(plant)
             force = inertia.mass * np.gradient(moved[1], self._apart)
         return Motion(moved[0], moved[1], force)
+
+    def missing_force(self, plant: Plant) -> Array | None:
+        """Where a sensor of its position sees a pushed joint: the force that its measured motion
+        takes, less its actuator's."""
+        row = next((row for row in self.rows if row.kind == "position"), None)
+        if row is None or not self._free:
+            return None
+        if row.name not in self._smoothed:
+            self._smoothed[row.name] = smooth(self._recording.column(*row.channel), self._period)
+        measured, error = self._smoothed[row.name]
+        sensor, mover = getattr(plant, row.name), getattr(plant, self._mover.name)
+        position = recover_motion(sensor, measured, self._period)
+        guide, inertia = self._parts(plant)
+        velocity = np.gradient(position, self._period)
+        motion = np.stack([position, velocity, np.gradient(velocity, self._period)])
+        taken = np.zeros(len(position))
+        inverse_dynamics(
+            guide=guide,
+            dry_friction=friction(guide),
+            inertia=inertia,
+            spring=1.0 / self._softest(guide, inertia, position, motion[2], error),
+            period=self._period,
+            motion=np.ascontiguousarray(motion),
+            out=taken,
+        )
+        channel = self._mover.channel
+        assert channel is not None
+        # As the actuator got it, in a closed loop too.
+        commanded = np.ascontiguousarray(self._recording.column(*channel))
+        conditioning = actuator(mover, plant.computer, self._period)
+        command = np.zeros(len(position))
+        condition_all(conditioning, hold(conditioning, float(commanded[0])), commanded, 1, command)
+        return taken - push_all(push_law(mover), command, position, velocity)
 
     def undetermined(self) -> None:
         """None: a joint alone is judged at rest too."""

@@ -77,6 +77,11 @@ class Model(Protocol[P]):
         (rows, ticks); None if there are none."""
         ...
 
+    def missing_force(self, plant: P) -> Array | None:
+        """What would have to act besides on a joint for it to go as it was measured to, N, shape
+        (ticks,); None where nothing that goes by itself is observed."""
+        ...
+
     def halve_steps(self) -> Model[P]:
         """With half the integration steps, if it can be."""
         ...

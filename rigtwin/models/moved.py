@@ -296,6 +296,9 @@ class MovedModel:
         (position, speed, _), _, force = self._passage(component, plant)
         return Motion(position, speed, force)
 
+    def missing_force(self, plant: Plant) -> None:
+        """None: nothing goes by itself."""
+
     def undetermined(self) -> NDArray[np.bool_]:
         """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both
         ends, accelerations are not known."""

@@ -264,6 +264,9 @@ class QuarterCarModel:
     def undetermined(self) -> None:
         """None: what moves the wheel is known throughout."""
 
+    def missing_force(self, plant: RigPlant) -> None:
+        """None: what it is made of is known well."""
+
     def propagated_noise(self, plant: RigPlant) -> None:
         """Sensors' noise reaches the plant only through recorded commands, which are known
         exactly."""

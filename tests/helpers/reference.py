@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 
@@ -40,22 +43,32 @@ def coulomb_carriage(
 
 
 def swing_dry(
-    mass: float, lever: float, friction: float, start: tuple[float, float], time: Array
+    mass: float,
+    lever: float,
+    friction: float,
+    start: tuple[float, float],
+    time: Array,
+    viscous: float = 0.0,
+    push: Callable[[float, float, float], float] = lambda *_: 0.0,
 ) -> Array:
-    """Rate of a point mass that swings about a hinge with set-valued dry friction; Moreau's time
-    stepping in 50 steps a sample.
+    """A point mass that swings about a hinge with set-valued dry friction; Moreau's time stepping
+    in 50 steps a sample.
 
-    mass kg, lever m, friction Nm, start rad and rad/s; returns rad/s at those times, evenly apart.
+    mass kg, lever m, friction Nm, viscous Nms/rad, start rad and rad/s; push: Nm, by time, angle
+    and rate at a sample, held until the next. Returns angle, rate and push at those times, which
+    are evenly apart.
     """
     fine, inertia = 50, mass * lever**2
     step = float(time[1] - time[0]) / fine
     angle, rate = start
-    out = np.empty(len(time))
-    for number in range(len(time)):
-        out[number] = rate
+    out = np.empty((3, len(time)))
+    for number, now in enumerate(time):
+        torque = push(float(now), angle, rate)
+        out[:, number] = angle, rate, torque
         for _ in range(fine):
             middle = angle + 0.5 * step * rate
-            free = rate - step * 9.81 / lever * np.sin(middle)
+            load = torque - mass * 9.81 * lever * math.sin(middle) - viscous * rate
+            free = rate + step * load / inertia
             impulse = step * friction / inertia
             rate = free - min(max(free, -impulse), impulse)
             angle = middle + 0.5 * step * rate
