@@ -111,8 +111,8 @@ def interval(of: Blocks) -> Interval:
 @dataclass(frozen=True)
 class Validation:
     """What a correction does on data held out of its fit. kept: effects that do not worsen them;
-    rejected: those that do; halves: the fits to each half of the recordings, where they were
-    made."""
+    rejected: those that do; idle: those that together close nothing of the gap there; halves: the
+    fits to each half of the recordings, where they were made."""
 
     predicted: float
     held_out: Interval
@@ -121,6 +121,7 @@ class Validation:
     data: str
     halves: tuple[Fit, ...] = ()
     fit: Fit | None = None
+    idle: tuple[Effect, ...] = ()
 
 
 def halves(recordings: Sequence[Recording]) -> tuple[list[Array], list[Array]]:
@@ -180,6 +181,7 @@ def validate(
         How far the gap shrinks there, and which effects stay.
     """
     everything = [np.ones(recording.ticks) for recording in evidence.recordings]
+    idle: Effects = ()
     if other is not None:
         inside = blocks(evidence, evidence.plant, fit.plant, everything)
         predicted = (
@@ -203,6 +205,7 @@ def validate(
             rejected = tuple(effect for effect in whole_fit.effects if effect not in kept)
         else:
             kept, rejected = reject_worsening(fit.effects, blocks_with, thresholds.worse)
+            kept, idle = drop_idle(kept, interval(blocks_with(kept)))
         apart = _fit_halves(evidence, fit)[1] if evidence.machine.rough else []
         return Validation(
             predicted=predicted,
@@ -212,6 +215,7 @@ def validate(
             data=data,
             halves=tuple(apart),
             fit=fit,
+            idle=idle,
         )
     parts, fits = _fit_halves(evidence, fit)
     predictions, outcomes = [], []
@@ -235,14 +239,15 @@ def validate(
     if not evidence.machine.rough:
         # Of a rough model the explanation was chosen by what is held out of its fit already.
         kept, rejected = reject_worsening(fit.effects, blocks_across, thresholds.worse)
-    data = "each half, fitted to the other"
+        kept, idle = drop_idle(kept, interval(blocks_across(kept)))
     return Validation(
-        float(np.mean(predictions)),
-        interval(blocks_across(kept)),
-        kept,
-        rejected,
-        data,
-        tuple(fits),
+        predicted=float(np.mean(predictions)),
+        held_out=interval(blocks_across(kept)),
+        kept=kept,
+        rejected=rejected,
+        data="each half, fitted to the other",
+        halves=tuple(fits),
+        idle=idle,
     )
 
 
@@ -274,6 +279,12 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
         if effect in kept
     ]
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
+
+
+def drop_idle(kept: Effects, closed: Interval) -> tuple[Effects, Effects]:
+    """(kept, idle) effects: of a correction that surely closes nothing of the gap on what is held
+    out, none stays. closed: share of the gap that it closes there."""
+    return ((), kept) if closed.high < 0.0 else (kept, ())
 
 
 def reject_worsening(

@@ -191,6 +191,9 @@ def _diagnose(
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
+    if validation.idle:
+        names = " and ".join(effect.name for effect in validation.idle)
+        notes.append(f"{names} not named: it closes nothing of the gap on held-out data")
     plant = with_effects(evidence.plant, best, validation.kept)
     progress("looking where", 1)
     disturbed = locate_disturbance(evidence, plant, validation.kept, follow=found.unknown)
