@@ -197,12 +197,13 @@ def _diagnose(
     plant = with_effects(evidence.plant, best, validation.kept)
     progress("looking where", 1)
     disturbed = locate_disturbance(evidence, plant, validation.kept, follow=found.unknown)
+    most = (1.0 + thresholds.unexplained) * found.expected
     something = (
         found.unknown
-        or bool(validation.rejected)
+        # What was taken for a gap by chance, and is rejected, leaves none.
+        or (bool(validation.rejected) and found.nothing.misfit > most)
         or disturbed[0].gained > thresholds.something * found.expected
     )
-    most = (1.0 + thresholds.unexplained) * found.expected
     if something and (instead := _find_instead(evidence, validation.kept, most)):
         names = " and ".join(effect.name for effect in validation.kept)
         notes.append(
