@@ -10,8 +10,7 @@ import pytest
 import rigtwin
 from rigtwin.models.choose import model_of
 from rigtwin.recording import Recording
-from tests.helpers.arm import MJCF
-from tests.helpers.coupled import described, integrate, recording
+from tests.helpers.coupled import ARM, arm, described, integrate, recording
 from tests.helpers.reference import swing_dry
 
 PENDULUM = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
@@ -68,28 +67,7 @@ def test_friction_and_the_zero_of_a_gyro_are_found(tmp_path: Path) -> None:
 
 
 def test_an_arm_that_gyros_alone_see_starts_where_it_did(tmp_path: Path) -> None:
-    mjcf = MJCF.replace(
-        "<sensor>",
-        '<actuator><motor name="drive_1" joint="shoulder"/><motor name="drive_2" joint="elbow"/>'
-        "</actuator><sensor>",
-    ).replace("jointpos", "jointvel")
-    toml = """
-[machine]
-name = "arm"
-model = "arm.xml"
-[components]
-shoulder = { joint = "shoulder" }
-elbow = { joint = "elbow" }
-drive_1 = { actuator = "drive_1", effects = [] }
-drive_2 = { actuator = "drive_2", effects = [] }
-angle_1 = { sensor = "angle_1", effects = [] }
-angle_2 = { sensor = "angle_2", effects = [] }
-[[replays]]
-free = ["shoulder", "elbow"]
-moved_by = ["drive_1", "drive_2"]
-observe = ["angle_1", "angle_2"]
-"""
-    machine = described(tmp_path, "arm", mjcf, toml)
+    machine = arm(tmp_path, mjcf=ARM.replace("jointpos", "jointvel"))
     torques = np.zeros((2, 400))
     start = (0.3, -0.5), (0.4, 0.2)
     _, rates = integrate(torques, *start)
