@@ -156,9 +156,9 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
         before = tab.ask("overall()")
         with running.tab(page.url) as second:
             assert opened(second).wait_for("overall()") == before
-        marked = tab.ask("Array.from(traces()[0][0])")
+        tab.ask("marked = JSON.stringify(Array.from(traces()[0][0])); true")
         drag(tab, "time, s", [0.5], steps=0)
-        assert tab.ask("Array.from(traces()[0][0])") != marked
+        assert tab.wait_for("JSON.stringify(Array.from(traces()[0][0])) !== marked")
         left, y, width, _ = tab.wait_for("box(after('play', 0))")
         seen = tab.ask("scrubbed()")
         tab.click(left + width / 2, y)
