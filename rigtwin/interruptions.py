@@ -10,6 +10,23 @@ from multiprocessing import resource_tracker
 
 
 @contextmanager
+def deferred() -> Iterator[None]:
+    """Lets an interruption come behind what runs here, not within: a compiled function that is
+    handed its arguments loses one, and says that something of them is missing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if came:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextmanager
 def held_back() -> Iterator[None]:
     """Keeps interruptions back. A process that is started meanwhile never gets one, not even while
     it imports its packages; this one gets it behind."""
@@ -18,16 +35,10 @@ def held_back() -> Iterator[None]:
         return
     # It is started with the first process, and lets interruptions through when it is.
     resource_tracker.ensure_running()
-    came: list[int] = []
-    first = threading.current_thread() is threading.main_thread()
     # A mask is a thread's own: another thread may take the signal, and the first one handles it.
-    usual = signal.signal(signal.SIGINT, lambda number, _: came.append(number)) if first else None
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if first:
-            signal.signal(signal.SIGINT, usual)
-        if came:
-            signal.raise_signal(signal.SIGINT)
+    with deferred():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -13,7 +13,7 @@ import pytest
 
 import rigtwin
 from rigtwin.cli import main
-from rigtwin.interruptions import held_back
+from rigtwin.interruptions import deferred, held_back
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
@@ -77,3 +77,16 @@ def test_a_referee_that_still_records_says_nothing_of_an_interruption(tmp_path, 
     with pytest.raises(KeyboardInterrupt):
         rigtwin.blindcheck(2, seed=1, folder=tmp_path, workers=1, progress=interrupt)
     assert capfd.readouterr().err == ""
+
+
+def test_an_interruption_comes_behind_what_it_would_spoil() -> None:
+    done = []
+
+    @deferred()
+    def work() -> None:
+        signal.raise_signal(signal.SIGINT)
+        done.append("all of it")
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert done == ["all of it"]

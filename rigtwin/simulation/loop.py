@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -30,6 +31,7 @@ from controllers import (
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
+from rigtwin.interruptions import deferred
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sample_sensors
@@ -255,21 +257,23 @@ def run_compiled(
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
-        done, number, column = _ticks(
-            plant=twin.simulation.state,
-            controlling=controlling,
-            limits=configuration.safety,
-            limit_memory=limit_memory,
-            sensing=twin.sensing,
-            memory=memory,
-            held=twin.held,
-            demands=asked,
-            missed=twin.misses(len(asked)),
-            disturbance=twin.disturbance.take(len(asked)),
-            commands_out=commands,
-            measured_out=measured,
-            truth_out=truth,
-        )
+        # The first may have to be compiled, which can be interrupted.
+        with deferred() if first > 0 else nullcontext():
+            done, number, column = _ticks(
+                plant=twin.simulation.state,
+                controlling=controlling,
+                limits=configuration.safety,
+                limit_memory=limit_memory,
+                sensing=twin.sensing,
+                memory=memory,
+                held=twin.held,
+                demands=asked,
+                missed=twin.misses(len(asked)),
+                disturbance=twin.disturbance.take(len(asked)),
+                commands_out=commands,
+                measured_out=measured,
+                truth_out=truth,
+            )
         trip = Trip(number)
         yield Block(first, commands[:done], measured[:done], truth[:done], trip, column)
         if trip != Trip.NONE:
