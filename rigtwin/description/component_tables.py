@@ -51,6 +51,8 @@ MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
 """What is measured → its unit where the joint slides, and where it turns."""
+TAKEN = ("computer", "mains", "controller", "safety", "timing", "road")
+"""Names of other groups of settings."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 QUARTER_CAR = {
@@ -90,7 +92,7 @@ class Components:
         if not isinstance(table, Mapping):
             self.mistakes.note(where, "expected a table")
             return
-        if not NAME.fullmatch(name) or name in ("computer", "mains", "controller"):
+        if not NAME.fullmatch(name) or name in TAKEN:
             self.mistakes.note(
                 where, f"{name!r} cannot be a component's name; expected letters, digits and _"
             )

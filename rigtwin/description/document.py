@@ -14,6 +14,7 @@ from controllers.formula import Formula, formula
 from rigtwin.components import Computer, Mains, RigPlant
 from rigtwin.description.component_tables import MOVING, Components
 from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
+from rigtwin.description.limits import read_limits
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
@@ -22,7 +23,7 @@ from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
 
-TABLES = ("machine", "components", "controller", "replays", "mains", "experiments")
+TABLES = ("machine", "components", "controller", "replays", "mains", "experiments", "limits")
 NOMINAL = ("known", "rough")
 """How well the nominal values are known."""
 
@@ -100,6 +101,9 @@ class _Reader:
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
         experiments = self._experiments()
+        limits = read_limits(self._document.get("limits", {}), components.found, self._mistakes)
+        if self._document.get("limits") and structure is Structure.QUARTER_CAR:
+            note("[limits]", "the suspension rig has its own, the settings of safety")
         if self._mistakes:
             return None
         reader.tolerate_timing(replays)
@@ -122,6 +126,7 @@ class _Reader:
             sources=components.sources,
             told=components.told,
             experiments=experiments,
+            limits=limits,
             next_tests=self._next_tests(),
             overlooked=()
             if structure is Structure.QUARTER_CAR

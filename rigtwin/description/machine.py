@@ -127,6 +127,7 @@ class Machine:
     rough: whether nominal values are only a start; form: share of a signal that no model is held
     to, None for the usual one; told: `component.parameter` → setting of the recording's controller
     that says its value; experiments: Python module that has them, or tables of the description;
+    limits: settings of what ends a test, a NamedTuple;
     next_tests: those that a diagnosis may propose; overlooked: what of the MJCF is not taken into
     account, a line each.
     """
@@ -146,6 +147,7 @@ class Machine:
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
     told: Mapping[str, str] = field(default_factory=dict, repr=False)
     experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
+    limits: Any = field(default_factory=Nothing)
     next_tests: tuple[str, ...] = ()
     overlooked: tuple[str, ...] = ()
 
@@ -161,7 +163,9 @@ class Machine:
         if self.structure is Structure.QUARTER_CAR:
             return Configuration(plant=self.plant, controller=settings)
         nothing: Any = Nothing()
-        return Configuration(plant=self.plant, controller=settings, safety=nothing, road=nothing)
+        return Configuration(
+            plant=self.plant, controller=settings, safety=self.limits, road=nothing
+        )
 
     def configuration_of(
         self, recording: Recording, base: Configuration | None = None

@@ -115,8 +115,29 @@ def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
     tuple
         A NamedTuple whose fields say that any number is allowed.
     """
-    made = namedtuple("Settings", list(values), defaults=list(values.values()))  # type: ignore[misc]
-    made.__annotations__ = {
-        name: Annotated[float, Quantity("1", -1e300, 1e300, source)] for name in values
-    }
+    meaning = Quantity("1", -1e300, 1e300, source)
+    return group_of({name: (value, meaning) for name, value in values.items()})
+
+
+def group_of(values: Mapping[str, tuple[float, Quantity]]) -> tuple[float, ...]:
+    """Numbers by name, each with what it means, as a group of settings.
+
+    Parameters
+    ----------
+    values
+        Name → number and meaning.
+
+    Returns
+    -------
+    tuple
+        A NamedTuple, which other processes can be given.
+    """
+    nominal = [value for value, _ in values.values()]
+    made = namedtuple("Settings", list(values), defaults=nominal)  # type: ignore[misc]
+    meanings = {name: meaning for name, (_, meaning) in values.items()}
+    made.__annotations__ = {name: Annotated[float, each] for name, each in meanings.items()}
+    made.__reduce__ = lambda group: (  # type: ignore[method-assign, assignment]
+        group_of,
+        ({name: (value, meanings[name]) for name, value in group._asdict().items()},),
+    )
     return made()

@@ -231,12 +231,16 @@ class CoupledModel:
         found = self._condition(plant, self._pushers)
         for number, name in enumerate(self._pushers):
             mover: ForceActuator = getattr(plant, name)
-            limit = min(mover.force_limit, UNLIMITED)
+            limit = self._limit(plant, name)
             found[number] = np.clip(mover.constant * found[number], -limit, limit)
         return found
 
-    def _serve(self, plant: Plant) -> Servos:
-        """The servos, with their commands."""
+    def _limit(self, plant: Plant, name: str) -> float:
+        """Of a force actuator, N."""
+        return min(getattr(plant, name).force_limit, UNLIMITED)
+
+    def _serve(self, plant: Plant, commands: Array) -> Servos:
+        """The servos. commands: as conditioned, at the steps, shape (servos, steps)."""
         size, names = self._bodies.coordinates, self._servos
         laws = [push_law(getattr(plant, name)) for name in names]
         return Servos(
@@ -244,7 +248,20 @@ class CoupledModel:
             levers=np.array([self._along[name] for name in names]).reshape(-1, size),
             zero=np.array([self._zero[name] for name in names]),
             inertia=np.array([self._felt(self._along[name]) for name in names]),
-            commands=self._condition(plant, names),
+            commands=commands,
+        )
+
+    def _inputs(self, plant: Plant, pushes: Array, commands: Array) -> Inputs:
+        """What moves it besides measured motions: forces of the force actuators and commands of the
+        servos at the steps, shape (actuators, steps) and (servos, steps)."""
+        size = self._bodies.coordinates
+        return Inputs(
+            prescribed=self._prescribe(plant, {}),
+            pushes=pushes,
+            levers=np.array([self._along[name] for name in self._pushers]).reshape(-1, size),
+            besides=np.zeros((size, self._ticks)),
+            on=np.zeros((len(self._guides), self._ticks)),
+            servos=self._serve(plant, commands),
         )
 
     def _contacts(self, plant: Plant, forces: Array) -> Contacts:
@@ -342,25 +359,24 @@ class CoupledModel:
         """The motion as a function of the start, of other forces on coordinates and on guides, and
         of ticks."""
         multibody, turning = self._bodies_of(plant), self._turning(plant)
-        pushes, servos = self._push(plant), self._serve(plant)
-        contacts, prescribed = self._contacts(plant, pushes), self._prescribe(plant, shifts)
-        size = multibody.coordinates
-        levers = np.array([self._along[name] for name in self._pushers]).reshape(-1, size)
+        inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
+        inputs = inputs._replace(prescribed=self._prescribe(plant, shifts)) if shifts else inputs
+        contacts, size = self._contacts(plant, inputs.pushes), multibody.coordinates
 
         def move(start: Array, besides: Array, on: Array, ticks: int) -> Array:
             data: mujoco.MjData = multibody.data()
             bodies = multibody.bodies(data, turning)
-            state = begin(contacts, start, prescribed, self._held, self._period / self._steps)
+            h = self._period / self._steps
+            state = begin(contacts, start, inputs.prescribed, self._held, h)
             out = np.zeros((3, size, ticks))
-            inputs = Inputs(prescribed, pushes, levers, besides, on, servos)
             advance(
                 bodies=bodies,
                 contacts=contacts,
                 free=self._free,
                 held=self._held,
                 state=state,
-                inputs=inputs,
-                h=self._period / self._steps,
+                inputs=inputs._replace(besides=besides, on=on),
+                h=h,
                 steps=self._steps,
                 first=0,
                 last=ticks,

@@ -12,51 +12,19 @@ from rigtwin.components import measures
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration, flatten
-from rigtwin.description.control import Channel
+from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
+from rigtwin.description.limits import Tripped, find_trip
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Structure
 from rigtwin.errors import RigtwinError
-from rigtwin.models.coupled_twin import move_freely
+from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
+from rigtwin.models.coupled_twin import move_commanded, move_freely
+from rigtwin.models.demands import Columns, check_demands, list_sensed, list_wanted
 from rigtwin.models.moved_twin import move_together
-from rigtwin.models.mujoco import MujocoModel, Tick
-from rigtwin.numerics.arrays import RUNAWAY, Array
+from rigtwin.models.mujoco import MujocoModel
+from rigtwin.numerics.arrays import Array, runs_away
 from rigtwin.recording import Recording, Writer
 from rigtwin.simulation.runner import RunResult
-
-Columns = dict[str, dict[str, Array]]
-
-
-def demanded_channels(machine: Machine) -> list[Channel]:
-    """What a test has to demand of a machine.
-
-    Parameters
-    ----------
-    machine
-        Its description.
-
-    Returns
-    -------
-    list of channels
-        Commands that no described controller computes, what the controller is given besides its own
-        sensors, and motions that are prescribed.
-    """
-    found: list[Channel] = []
-    for replay in machine.replays:
-        if machine.structure in TOGETHER:
-            channels = [machine.components[name].channel for name in replay.moved_by]
-            found += [channel for channel in channels if channel is not None]
-            continue
-        mover = machine.components[replay.moved_by[0]]
-        own = {
-            c.channel
-            for c in machine.components.values()
-            if c.joint == replay.joint.name and c.element == "sensor"
-        }
-        if replay.closed and machine.control is not None:
-            found += [channel for channel in machine.control.channels if channel not in own]
-        elif mover.channel is not None:
-            found.append(mover.channel)
-    return list(dict.fromkeys(found))
 
 
 def run_machine(
@@ -89,7 +57,7 @@ def run_machine(
     effects
         That the machine has and the operator does not know of, as `--effect` takes them.
     controller
-        That commands the machine's actuator instead of the described one.
+        That commands the machine's actuators instead of the described one.
 
     Returns
     -------
@@ -102,29 +70,13 @@ def run_machine(
         Before anything is written, if a demand is missing or not a number, or an effect is unknown.
     """
     actual = apply_effects(configuration, effects)
-    wanted = demanded_channels(machine)
-    if controller is not None:
-        # A controller of one's own takes whatever demands it knows.
-        wanted = [("/command", name) for name in demands]
-    columns = _check_demands(machine, wanted, demands)
-    ticks = len(next(iter(next(iter(columns.values())).values())))
-    random = np.random.default_rng([seed, 3])
-    if machine.structure in TOGETHER:
-        _move(machine, actual, columns, ticks, random)
-    for replay in () if machine.structure in TOGETHER else machine.replays:
-        _simulate(
-            machine=machine,
-            replay=replay,
-            configuration=actual,
-            columns=columns,
-            ticks=ticks,
-            random=random,
-            controller=controller,
-        )
+    columns, trip = simulate_machine(machine, actual, demands, seed, controller)
+    ticks = next(len(signal) for names in columns.values() for signal in names.values())
     settings = flatten(configuration)
     told = settings.get("controller", {}) if controller is None else {OWN: True}
     fields = {topic: tuple(names) for topic, names in columns.items()}
     period = configuration.timing.period
+    reason = FINISHED if trip is None else trip.reason
     with Writer(path, experiment, period, told, machine.name, fields) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
         tables = {
@@ -135,8 +87,71 @@ def run_machine(
             writer.append(
                 **{topic: table[first : first + BLOCK] for topic, table in tables.items()}
             )
-        writer.finish(FINISHED)
-    return RunResult(path, ticks, FINISHED, False)
+        writer.finish(reason)
+    return RunResult(path, ticks, reason, trip is not None)
+
+
+def simulate_machine(
+    machine: Machine,
+    configuration: Configuration,
+    demands: Mapping[str, Array],
+    seed: int,
+    controller: Tick | None = None,
+) -> tuple[Columns, Tripped | None]:
+    """Runs a test on the twin of a described machine in memory.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        What it is, effects included.
+    demands, seed, controller
+        As of `run_machine`.
+
+    Returns
+    -------
+    tuple
+        Topic → field → signal, until the test was over, and which of its limits ended it early, if
+        one did.
+
+    Raises
+    ------
+    RigtwinError
+        If a demand is missing or not a number, or the machine runs away without meeting a limit.
+    """
+    wanted, outputs = list_wanted(machine, demands, controller)
+    columns = check_demands(machine, wanted, demands)
+    signals = [signal for names in columns.values() for signal in names.values()]
+    ticks = len(signals[0]) if signals else configuration.ticks
+    random = np.random.default_rng([seed, 3])
+    if machine.structure in TOGETHER:
+        moving = [*machine.replays[0].free] or [machine.name]
+        sound = _move(machine, configuration, columns, ticks, random, outputs, controller)
+        away = [] if sound else moving
+    else:
+        away = [
+            replay.joint.name
+            for replay in machine.replays
+            if not _simulate(
+                machine=machine,
+                replay=replay,
+                configuration=configuration,
+                columns=columns,
+                ticks=ticks,
+                random=random,
+                controller=controller,
+            )
+        ]
+    trip = find_trip(machine, configuration, columns)
+    if away and trip is None:
+        raise RigtwinError(f"{machine.name}: {', '.join(away)}: runs away; nothing holds it")
+    if trip is not None:
+        columns = {
+            topic: {name: signal[: trip.tick + 1] for name, signal in names.items()}
+            for topic, names in columns.items()
+        }
+    return columns, trip
 
 
 TOGETHER = {Structure.MOVED: move_together, Structure.COUPLED: move_freely}
@@ -144,39 +159,6 @@ TOGETHER = {Structure.MOVED: move_together, Structure.COUPLED: move_freely}
 BLOCK = 250
 """Ticks that are written at a time."""
 FINISHED = "completed"
-
-
-def _check_demands(
-    machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]
-) -> Columns:
-    columns: Columns = {}
-    names = {f"{topic}.{name}" for topic, name in wanted} | {name for _, name in wanted}
-    if unknown := [name for name in demands if name not in names]:
-        there = ", ".join(name for _, name in wanted)
-        raise RigtwinError(
-            f"{machine.name}: nothing takes the demand {unknown[0]!r}; there are {there}"
-        )
-    lengths = set()
-    for topic, name in wanted:
-        given = demands.get(f"{topic}.{name}", demands.get(name))
-        if given is None:
-            there = ", ".join(name for _, name in wanted)
-            raise RigtwinError(
-                f"{machine.name}: no demand for {topic}.{name}; a test gives {there}"
-            )
-        values = np.asarray(given, float)
-        if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
-            raise RigtwinError(
-                f"{machine.name}: demand {name}: expected finite numbers, one a tick"
-            )
-        lengths.add(len(values))
-        columns.setdefault(topic, {})[name] = values
-    if len(lengths) > 1:
-        raise RigtwinError(
-            f"{machine.name}: demands have {', '.join(map(str, sorted(lengths)))} "
-            "ticks; expected one length"
-        )
-    return columns
 
 
 def _simulate(
@@ -187,8 +169,9 @@ def _simulate(
     ticks: int,
     random: np.random.Generator,
     controller: Tick | None,
-) -> None:
-    """Adds what one joint does to the columns."""
+) -> bool:
+    """Adds what one joint does to the columns, and says whether it stayed within what a machine can
+    do."""
     period, plant = configuration.timing.period, configuration.plant
     mover = machine.components[replay.moved_by[0]]
     assert mover.channel is not None
@@ -227,10 +210,6 @@ def _simulate(
         moved = model.prescribe(plant, columns[mover.channel[0]][mover.channel[1]])
     else:
         moved = model.move(plant)
-    if not np.isfinite(moved).all() or np.max(np.abs(moved[:2])) >= RUNAWAY:
-        raise RigtwinError(
-            f"{machine.name}: joint {replay.joint.name} runs away; the loop is not stable"
-        )
     if output is not None:
         columns["/command"][output] = moved[3]
     for name, (topic, field) in sensors:
@@ -243,6 +222,7 @@ def _simulate(
             )
             reading = _round(plant, name, reading)
         columns.setdefault(topic, {})[field] = reading
+    return not runs_away(moved)
 
 
 def _move(
@@ -251,8 +231,11 @@ def _move(
     columns: Columns,
     ticks: int,
     random: np.random.Generator,
-) -> None:
-    """Puts what the sensors of joints that act on each other read into the columns."""
+    outputs: Sequence[str],
+    controller: Tick | None,
+) -> bool:
+    """Puts what the sensors of joints that act on each other read into the columns, and what a
+    controller commands; says whether all stayed within what a machine can do."""
     plant, period = configuration.plant, configuration.timing.period
     channels = {
         name: component.channel
@@ -262,13 +245,37 @@ def _move(
     demands = {
         name: columns[channel[0]][channel[1]]
         for name, channel in channels.items()
-        if name in machine.replays[0].moved_by
+        if name in machine.replays[0].moved_by and name not in outputs
     }
-    move = TOGETHER[machine.structure]
-    for name, reading in move(machine, configuration, demands).items():
+    if not outputs:
+        found = TOGETHER[machine.structure](machine, configuration, demands)
+        noise = {name: _noise(plant, name, ticks, period, random) for name in found.signals}
+    else:
+        sensors = [name for name in channels if measures(getattr(plant, name))]
+        noise = {name: _noise(plant, name, ticks, period, random) for name in sensors}
+        command = _command(machine, configuration, columns, controller)
+        found = move_commanded(machine, configuration, demands, outputs, command, noise, ticks)
+    for name, signal in found.signals.items():
         topic, field = channels[name]
-        noisy = reading + _noise(plant, name, ticks, period, random)
-        columns.setdefault(topic, {})[field] = _round(plant, name, noisy)
+        if name in found.whole:
+            columns.setdefault(topic, {})[field] = signal
+            continue
+        columns.setdefault(topic, {})[field] = _round(plant, name, signal + noise[name])
+    return found.sound
+
+
+def _command(
+    machine: Machine, configuration: Configuration, columns: Columns, controller: Tick | None
+) -> Command:
+    """What commands joints that act on each other."""
+    if controller is not None:
+        return command_by_function(controller, columns)
+    control = machine.control
+    assert isinstance(control, FormulaControl)
+    read = list_sensed(machine)
+    sensors = {c.channel: name for name, c in machine.components.items() if c.channel in read}
+    settings = configuration.controller._asdict()
+    return command_by_formula(control, settings, columns, sensors, configuration.timing.period)
 
 
 def _round(plant: Plant, name: str, reading: Array) -> Array:

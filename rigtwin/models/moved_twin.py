@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
@@ -10,9 +13,20 @@ from rigtwin.models.moved import MovedModel
 from rigtwin.numerics.arrays import Array
 
 
+@dataclass(frozen=True)
+class Moved:
+    """What a twin did. signals: component → reading or command, shape (ticks,); sound: whether all
+    motions stayed within what a machine can do; whole: of which signals noise and bits are
+    part."""
+
+    signals: Mapping[str, Array]
+    sound: bool
+    whole: frozenset[str] = frozenset()
+
+
 def move_together(
     machine: Machine, configuration: Configuration, motions: dict[str, Array]
-) -> dict[str, Array]:
+) -> Moved:
     """What the sensors read, noise and bits apart.
 
     Parameters
@@ -26,8 +40,8 @@ def move_together(
 
     Returns
     -------
-    dict
-        Component → reading, shape (ticks,): of the motions' sensors and of the observed forces'.
+    Moved
+        What the motions' sensors read, and those of the observed forces.
     """
     (replay,) = machine.replays
     plant, period = configuration.plant, configuration.timing.period
@@ -38,4 +52,4 @@ def move_together(
     forces = MovedModel(machine, replay, recording).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
         found[row.name] = apply_sensor(getattr(plant, row.name), force, period)
-    return found
+    return Moved(found, True)

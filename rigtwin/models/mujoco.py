@@ -13,14 +13,20 @@ from collections.abc import Callable, Mapping
 import mujoco
 import numpy as np
 
-from controllers.formula import run as run_formula
 from rigtwin.components import Guide, Pusher, measures
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
 from rigtwin.components.mount import give_way
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import start_transducer, transduce, transducer
 from rigtwin.components.servo import pull, push, push_law
+from rigtwin.models.commanding import (
+    Command,
+    Readings,
+    Tick,
+    command_by_formula,
+    command_by_function,
+    commands_of,
+)
 from rigtwin.models.guided import Inertia
 from rigtwin.models.joint import JointModel
 from rigtwin.models.start import Start
@@ -35,8 +41,6 @@ OFF = (
     | mujoco.mjtDisableBit.mjDSBL_LIMIT
     | mujoco.mjtDisableBit.mjDSBL_ACTUATION
 )
-Tick = Callable[[Mapping[str, float], Mapping[str, float]], float]
-"""A controller's command for what its sensors read and for what is demanded, by name."""
 
 
 class MujocoModel(JointModel):
@@ -177,49 +181,27 @@ class MujocoModel(JointModel):
         """The command of a tick for the joint's position and velocity, as the controller sees
         them."""
         names = self._sensors or self.sensors_of_joint()
-        parts = [getattr(plant, name) for name in names]
-        models = [transducer(part, self._period) for part in parts]
-        states = [start_transducer(each) for each in models]
-        self.read = {name: np.zeros(self._recording.ticks) for name in names}
+        ticks, columns = self._recording.ticks, self._recording.columns
+        readings = Readings(plant, names, self.sensor_noise, self._period, ticks)
+        self.read = readings.signals
+        rates = {name: measures(getattr(plant, name)) == "velocity" for name in names}
+        channel = self._machine.components[self._replay.moved_by[0]].channel
+        output = [self._replay.moved_by[0] if channel is None else channel[1]]
+        recorded = self._command
+        own: Command = lambda tick, _: float(recorded[tick])  # noqa: E731
+        if self.controller is not None:
+            own = command_by_function(self.controller, columns)
+        elif self._control is not None:
+            components = self._machine.components
+            sensors = {c: name for name in names if (c := components[name].channel) is not None}
+            own = command_by_formula(self._control, self._settings, columns, sensors, self._period)
 
-        def sense(tick: int, position: float, velocity: float) -> dict[str, float]:
-            found = {}
-            for name, part, each, state in zip(names, parts, models, states, strict=True):
-                true = velocity if measures(part) == "velocity" else position
-                value = transduce(each, state, true)
-                if name in self.sensor_noise:
-                    value += float(self.sensor_noise[name][tick])
-                if part.resolution > 0.0:
-                    value = round(value / part.resolution) * part.resolution
-                found[name] = self.read[name][tick] = value
+        def command(tick: int, position: float, velocity: float) -> float:
+            true = {name: velocity if rate else position for name, rate in rates.items()}
+            (found,) = commands_of(own(tick, readings.take(tick, true)), output)
             return found
 
-        control = self._control
-        if self.controller is not None:
-            own, demanded = self.controller, self._recording.columns.get("/command", {})
-            return lambda tick, x, v: float(
-                own(sense(tick, x, v), {name: float(c[tick]) for name, c in demanded.items()})
-            )
-        if control is None:
-
-            def recorded(tick: int, position: float, velocity: float) -> float:
-                sense(tick, position, velocity)
-                return float(self._command[tick])
-
-            return recorded
-        program = control.formula.with_settings(self._settings)
-        registers, memory = program.registers.copy(), control.formula.memory()
-        by_channel = {self._machine.components[name].channel: name for name in names}
-        columns = [self._recording.column(*channel) for channel in control.channels]
-
-        def compute(tick: int, position: float, velocity: float) -> float:
-            sensed = sense(tick, position, velocity)
-            for number, channel in enumerate(control.channels):
-                name = by_channel.get(channel)
-                registers[number] = columns[number][tick] if name is None else sensed[name]
-            return float(run_formula(program.operations, registers, memory, self._period))
-
-        return compute
+        return command
 
     def sensors_of_joint(self) -> list[str]:
         """The sensors of the joint's position and velocity."""

@@ -21,6 +21,11 @@ def contain(signals: Array) -> Array:
     return np.clip(np.nan_to_num(signals, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
 
 
+def runs_away(motion: Array) -> bool:
+    """Whether positions and velocities, the first two rows, go where nothing can."""
+    return not np.isfinite(motion).all() or float(np.max(np.abs(motion[:2]))) >= RUNAWAY
+
+
 def interpolate(time: Array, values: Array, at: Array) -> Array:
     """A signal between its samples, by a cubic spline; time: shape (ticks,), increasing."""
     from scipy.interpolate import CubicSpline  # Late: it takes a quarter of a second.

@@ -22,12 +22,14 @@ from rigtwin.components.effect import Scales, Starts, Swing
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Joint, Machine, Structure
 from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.fit import is_possible, with_values
 from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.diagnosis.swing import swings
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
-from rigtwin.models.machine_twin import demanded_channels, run_machine
+from rigtwin.models.demands import demanded_channels
+from rigtwin.models.machine_twin import run_machine
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording, reader
@@ -148,7 +150,9 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
     if machine.structure is Structure.MOVED:
         # Nothing is integrated from tick to tick.
         timing = timing._replace(period=max(timing.period, SPARSE))
-    configuration = machine.configuration._replace(timing=timing)
+    # What its sensors can show does not depend on where a test would have to end.
+    nothing: Any = Nothing()
+    configuration = machine.configuration._replace(timing=timing, safety=nothing)
     time = np.arange(configuration.ticks) * timing.period
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         for number, reach in enumerate(REACHES, 1):

@@ -1,0 +1,168 @@
+"""Limits of a described machine: what its sensors read and its actuators are told within a test,
+beyond which the test is over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rigtwin.components.quantity import Quantity
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Component, Machine
+from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.settings import Nothing, group_of
+from rigtwin.numerics.arrays import Array
+
+LOW, HIGH = "_low", "_high"
+"""What a limit's two settings end in, after its component's name."""
+UNBOUNDED = 1e12
+SOURCE = "the description's limits"
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Of one channel. low, high: in its unit; name: of its component; channel: topic and field."""
+
+    name: str
+    channel: tuple[str, str]
+    low: float
+    high: float
+    unit: str
+
+    def reach(self, signal: Array) -> float:
+        """How far a signal, shape (ticks,), went from the middle of the limits, where 1 is at one
+        of them."""
+        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
+        return float(np.max(np.abs(signal - middle))) / half
+
+
+@dataclass(frozen=True)
+class Tripped:
+    """What ended a test early. tick: of the first value beyond a limit; reason: one line."""
+
+    tick: int
+    reason: str
+
+
+def read_limits(table: object, components: Mapping[str, Component], mistakes: Mistakes) -> Any:
+    """The limits as a description's table has them, as a group of settings.
+
+    Parameters
+    ----------
+    table
+        Component → [low, high], or one number for both sides.
+    components
+        By name.
+    mistakes
+        Where those of the table are noted.
+
+    Returns
+    -------
+    tuple
+        A NamedTuple, `NAME_low` and `NAME_high` for each component.
+    """
+    if not isinstance(table, Mapping):
+        mistakes.note("[limits]", "expected a table, such as position = [-0.2, 0.2]")
+        return Nothing()
+    limited = {name: c for name, c in components.items() if c.channel is not None}
+    values: dict[str, tuple[float, Quantity]] = {}
+    for name, given in table.items():
+        where = f"[limits] {name}"
+        if name not in limited:
+            mistakes.note(where, f"no sensor or actuator of that name; {near(name, limited)}")
+            continue
+        ends = given if isinstance(given, list) else [given, given]
+        if len(ends) != 2:
+            mistakes.note(where, f"{str(given)[:40]}: expected [low, high], or a number")
+            continue
+        low, high = (mistakes.number(where, end, -UNBOUNDED, UNBOUNDED) for end in ends)
+        low = low if isinstance(given, list) else -high
+        if not low < high:
+            expected = "low below high" if isinstance(given, list) else "a number above 0"
+            mistakes.note(where, f"{str(given)[:40]}: expected {expected}")
+        meaning = Quantity(limited[name].unit or "1", -UNBOUNDED, UNBOUNDED, SOURCE)
+        values |= {name + LOW: (low, meaning), name + HIGH: (high, meaning)}
+    return group_of(values) if values else Nothing()
+
+
+def limits_of(machine: Machine, configuration: Configuration) -> Iterator[Limit]:
+    """The limits of a test.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        Of the test.
+
+    Yields
+    ------
+    Limit
+        Of each channel that has one.
+    """
+    told = configuration.safety._asdict()
+    for name, component in machine.components.items():
+        if component.channel is not None and name + LOW in told:
+            ends = told[name + LOW], told[name + HIGH]
+            yield Limit(name, component.channel, *ends, component.unit)
+
+
+def find_trip(
+    machine: Machine, configuration: Configuration, columns: Mapping[str, Mapping[str, Array]]
+) -> Tripped | None:
+    """What ends a test early, if anything does.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        Of the test.
+    columns
+        Topic → field → signal, shape (ticks,), as recorded.
+
+    Returns
+    -------
+    Tripped or None
+        The first.
+    """
+    found: list[Tripped] = []
+    for limit in limits_of(machine, configuration):
+        topic, field = limit.channel
+        if field not in columns.get(topic, {}):
+            continue
+        signal = columns[topic][field]
+        for beyond, said in (
+            (~np.isfinite(signal), "is not a finite number"),
+            (signal > limit.high, f"above {limit.high:g} {limit.unit}".rstrip()),
+            (signal < limit.low, f"below {limit.low:g} {limit.unit}".rstrip()),
+        ):
+            if beyond.any():
+                found.append(Tripped(int(np.argmax(beyond)), f"trip: {limit.name} {said}"))
+    return min(found, key=lambda trip: trip.tick, default=None)
+
+
+def largest_reach(
+    machine: Machine, configuration: Configuration, columns: Mapping[str, Mapping[str, Array]]
+) -> float:
+    """The largest share of a limit that a test reached; 0 of a machine without limits.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        Of the test.
+    columns
+        Topic → field → signal, shape (ticks,), as recorded.
+    """
+    reached = [
+        limit.reach(columns[limit.channel[0]][limit.channel[1]])
+        for limit in limits_of(machine, configuration)
+        if limit.channel[1] in columns.get(limit.channel[0], {})
+    ]
+    return max((each for each in reached if math.isfinite(each)), default=0.0)

@@ -1,0 +1,202 @@
+"""Controllers of joints that act on each other, and limits that end a test."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete
+
+import rigtwin
+from rigtwin.cli import main
+from rigtwin.description.document import examine
+
+MODEL = """<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="cart">
+      <inertial pos="0 0 0" mass="1.2" diaginertia="0.003 0.003 0.003"/>
+      <joint name="rail" type="slide" axis="1 0 0" damping="2.0"/>
+      <body name="pole">
+        <inertial pos="0 0 0.25" mass="0.25" diaginertia="0.0055 0.0055 0.0001"/>
+        <joint name="pivot" type="hinge" axis="0 -1 0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="drive" joint="rail"/>
+  </actuator>
+  <sensor>
+    <jointpos name="place" joint="rail"/>
+    <jointvel name="pace" joint="rail"/>
+    <jointpos name="angle" joint="pivot"/>
+    <jointvel name="rate" joint="pivot"/>
+  </sensor>
+</mujoco>
+"""
+TABLES = """[machine]
+name = "upright"
+model = "upright.xml"
+nominal = "known"
+[components.rail]
+joint = "rail"
+[components.pivot]
+joint = "pivot"
+[components.drive]
+actuator = "drive"
+command = "force"
+[components.place]
+sensor = "place"
+[components.pace]
+sensor = "pace"
+[components.angle]
+sensor = "angle"
+[components.rate]
+sensor = "rate"
+[[replays]]
+name = "both"
+free = ["rail", "pivot"]
+moved_by = ["drive"]
+observe = ["place", "angle"]
+[experiments.step]
+duration = 3.0
+period = 1e-3
+[experiments.step.demands]
+reference = "0.01"
+"""
+PERIOD, TICKS = 1e-3, 3000
+NAMES = ("place", "angle", "pace", "rate")
+
+
+def linear() -> tuple[np.ndarray, np.ndarray]:
+    """Cart and upright pole about rest, worked out by hand: states as NAMES."""
+    cart, pole, arm, inertia, damping, gravity = 1.2, 0.25, 0.25, 0.0055, 2.0, 9.81
+    # The pole leans towards -x for a positive angle: x_tip = x - arm * angle.
+    mass = np.array([[cart + pole, -pole * arm], [-pole * arm, inertia + pole * arm**2]])
+    stiff = np.array([[0.0, 0.0], [0.0, -pole * gravity * arm]])
+    damp = np.array([[damping, 0.0], [0.0, 0.0]])
+    inverse = np.linalg.inv(mass)
+    states = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ stiff, -inverse @ damp]])
+    return states, np.concatenate([np.zeros((2, 1)), inverse @ [[1.0], [0.0]]])
+
+
+STATES, INPUT = linear()
+GAIN = np.asarray(control.lqr(STATES, INPUT, np.diag([40.0, 10.0, 1.0, 1.0]), [[0.1]])[0])[0]
+
+
+def lqr(sensed: dict[str, float], demanded: dict[str, float]) -> float:
+    off = [sensed["place"] - demanded["reference"], *(sensed[name] for name in NAMES[1:])]
+    return -sum(k * each for k, each in zip(GAIN, off, strict=True))
+
+
+def machine(folder: Path, more: str = "", tables: str = TABLES) -> rigtwin.Machine:
+    (folder / "upright.xml").write_text(MODEL)
+    path = folder / "upright.toml"
+    path.write_text(tables + more)
+    return rigtwin.machine(path)
+
+
+def by_formula() -> str:
+    gains = "\n".join(f"k{number} = {gain!r}" for number, gain in enumerate(map(float, GAIN)))
+    terms = "k0 * (reference - place) - k1 * angle - k2 * pace - k3 * rate"
+    return f'[controller]\noutput = "force"\nformula = "{terms}"\n[controller.settings]\n{gains}\n'
+
+
+def step(configuration: rigtwin.Configuration, seed: int) -> dict[str, np.ndarray]:
+    return {"reference": np.full(TICKS, 0.01)}
+
+
+def test_a_pole_is_kept_upright_as_the_linear_loop_has_it(tmp_path: Path) -> None:
+    made = rigtwin.run(machine(tmp_path), step, controller=lqr)
+    ahead, push, *_ = cont2discrete((STATES, INPUT, np.eye(4), np.zeros((4, 1))), PERIOD)
+    state, expected = np.zeros(4), np.zeros((4, TICKS))
+    for tick in range(TICKS):
+        expected[:, tick] = state
+        state = ahead @ state + push[:, 0] * (-GAIN @ (state - [0.01, 0.0, 0.0, 0.0]))
+    assert made.end == "completed"
+    assert expected[0, -1] == pytest.approx(0.01, rel=0.05)
+    for name, signal in zip(NAMES[:2], expected, strict=False):
+        error = np.max(np.abs(made[f"/sensor.{name}"] - signal))
+        assert error < 0.01 * np.max(np.abs(signal))
+
+
+def test_a_formula_commands_as_the_same_in_python_does(tmp_path: Path) -> None:
+    ours = rigtwin.run(machine(tmp_path), step, controller=lqr)
+    formula = rigtwin.run(machine(tmp_path, by_formula()), "step")
+    assert formula["/command.force"] == pytest.approx(ours["/command.force"], abs=1e-9)
+
+
+def test_commands_played_back_move_the_machine_the_same(tmp_path: Path) -> None:
+    of = machine(tmp_path)
+    led = rigtwin.run(of, step, controller=lqr)
+    played = rigtwin.run(of, lambda *_: {"force": led["/command.force"]})
+    for name in NAMES:
+        assert np.array_equal(played[f"/sensor.{name}"], led[f"/sensor.{name}"])
+
+
+def test_a_controller_that_gives_no_number_is_told_so(tmp_path: Path) -> None:
+    with pytest.raises(rigtwin.RigtwinError, match="the controller gave 'much'; expected a number"):
+        rigtwin.run(machine(tmp_path), step, controller=lambda *_: "much")
+    with pytest.raises(rigtwin.RigtwinError, match=r"gave \{'push': 1.0\}; expected a number"):
+        rigtwin.run(machine(tmp_path), step, controller=lambda *_: {"push": 1.0})
+
+
+LIMITS = "[limits]\nplace = [-0.1, 0.004]\nangle = 0.5\n"
+
+
+def test_a_limit_ends_the_test_at_the_first_tick_beyond_it(tmp_path: Path) -> None:
+    whole = rigtwin.run(machine(tmp_path), step, controller=lqr)["/sensor.place"]
+    made = rigtwin.run(machine(tmp_path, LIMITS), step, controller=lqr)
+    first = int(np.argmax(whole > 0.004))
+    assert made.end == "trip: place above 0.004 m"
+    assert made.tripped
+    assert np.array_equal(made["/sensor.place"], whole[: first + 1])
+
+
+def test_what_falls_meets_a_limit_before_it_runs_away(tmp_path: Path) -> None:
+    of = machine(tmp_path, LIMITS)
+    fall = rigtwin.run(of, lambda *_: {"force": np.full(TICKS, -0.5)})
+    assert fall.end == "trip: angle below -0.5 rad"
+    wider = {"safety": {"angle_low": -50.0}}
+    fall = rigtwin.run(of, lambda *_: {"force": np.full(TICKS, -0.5)}, settings=wider)
+    assert fall.end == "trip: place below -0.1 m"
+
+
+def test_limits_go_to_other_processes(tmp_path: Path) -> None:
+    safety = machine(tmp_path, LIMITS).configuration.safety
+    assert pickle.loads(pickle.dumps(safety)) == safety
+    assert safety._asdict()["angle_low"] == -0.5
+
+
+def test_a_trip_has_an_exit_code_of_its_own(tmp_path: Path, capsys) -> None:
+    path = machine(tmp_path, by_formula() + LIMITS).path
+    out = tmp_path / "step.mcap"
+    assert main(["run", "step", "--machine", str(path), "--out", str(out)]) == 3
+    assert "trip: place above 0.004 m" in capsys.readouterr().out
+    assert main(["run", "step", "--machine", str(path), "--set", "safety.place_high=0.1"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "plaice = 1",
+            "[limits] plaice: no sensor or actuator of that name; did you mean 'place'?",
+        ),
+        ("place = [1, 2, 3]", "expected [low, high], or a number"),
+        ("place = [0.1, -0.1]", "expected low below high"),
+        ("place = -0.1", "expected a number above 0"),
+        ('place = ["a", 1]', "expected a number from"),
+        ("rail = 1", "[limits] rail: no sensor or actuator of that name"),
+    ],
+)
+def test_a_limit_that_cannot_be_is_refused(tmp_path: Path, line: str, said: str) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL)
+    path = tmp_path / "upright.toml"
+    path.write_text(f"{TABLES}[limits]\n{line}\n")
+    _, mistakes = examine(path)
+    assert len(mistakes) >= 1
+    assert said in mistakes[0]
