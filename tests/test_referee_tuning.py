@@ -6,13 +6,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments import EXPERIMENTS, find
+from experiments import find
+from machines import DEFAULT_MACHINE
 from referee.reference_drive import drive
 from referee.reference_plant import Truth
 from referee.reference_rig import run
 from referee.test_signals import draw_demands
 from referee.tuning import Case, check, draw_rig, text
 from rigtwin.cli import main
+from rigtwin.description.catalogue import find as find_machine
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate
@@ -21,8 +23,7 @@ from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.evaluation import compare
-from rigtwin.studies.tuning.measures import Trial
-from rigtwin.studies.tuning.run import LIMITS, TRIP
+from rigtwin.studies.tuning.run import LIMITS, TRIP, rig_trial
 from rigtwin.studies.tuning.study_file import parse_study
 
 
@@ -46,7 +47,7 @@ def test_without_a_defect_it_is_the_twin_to_a_few_percent():
     demands = experiment.demands(configuration, 2)
 
     def error(ran) -> float:
-        found = Trial(configuration, ran.commands, ran.truth).tracking
+        found = rig_trial(configuration, ran.commands, ran.truth).tracking
         return found.force_e1 + found.force_e2
 
     assert error(drive(Truth(), configuration, demands, 2)) == pytest.approx(
@@ -91,7 +92,7 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     monkeypatch.setattr(module, "diagnose_rig", lambda _: answer)
     said: list[Case] = []
     with Store(tmp_path / "s.sqlite") as store:
-        study = parse_study("s", STUDY, EXPERIMENTS)
+        study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
         found = check(Bench(study, store, Here()), 1, 4, show=said.append)
         made = len(store)
         again = check(Bench(study, store, Here()), 1, 4)
@@ -106,7 +107,7 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
 
 
 def test_what_is_better_is_counted_by_its_interval():
-    study = parse_study("s", STUDY, EXPERIMENTS)
+    study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
 
     def case(number: int, after: list[float], trips: float = 0.0) -> Case:
         def rows(values: list[float]) -> list[dict[str, float]]:

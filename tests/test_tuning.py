@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from controllers import Settings
-from experiments import EXPERIMENTS
 from experiments import find as experiment
 from experiments.tuning import STUDIES, find_study
+from machines import DEFAULT_MACHINE
 from rigtwin.cli import main
+from rigtwin.description.catalogue import find
 from rigtwin.description.changes import from_toml, override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml, load_posterior
@@ -29,7 +30,7 @@ from rigtwin.studies.tuning.bench import Bench, Score, quantile
 from rigtwin.studies.tuning.evaluation import compare, median_interval
 from rigtwin.studies.tuning.measures import MEASURES, Trial
 from rigtwin.studies.tuning.parameter import Parameter, values_at
-from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
+from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, rig_trial, run
 from rigtwin.studies.tuning.scenario import (
     APART,
     NOMINAL,
@@ -74,7 +75,7 @@ UNIT = {"between": [0, 1]}
 
 
 def read(tables: dict[str, object]) -> Study:
-    return parse_study("s", tables, EXPERIMENTS)
+    return parse_study("s", tables, find(DEFAULT_MACHINE))
 
 
 def draw_frictions(study: Study, rig: Rig, count: int) -> np.ndarray:
@@ -90,7 +91,7 @@ def sine_test(amplitude: float, frequency: float, column: int) -> Trial:
     sensed[:, 2] = 0.004
     table = sensed if column < 4 else commands
     table[:, column % 4] += amplitude * np.sin(2 * np.pi * frequency * time)
-    return Trial(Configuration(), commands, sensed)
+    return rig_trial(Configuration(), commands, sensed)
 
 
 def figure(name: str, test: Trial) -> float:
@@ -338,8 +339,8 @@ def test_what_was_diagnosed_is_not_varied_again():
         ('[posterior.intervals]\n"motor.coulomb" = [-inf, inf]', r"\] about its value, 14"),
         ('[posterior.intervals]\n"motor.coulomb" = [100, 200]', r"\] about its value, 14"),
         ('[posterior.intervals]\n"motor.coulomb" = [1, 2, 3]', r"expected \[low, high\]"),
-        ("[timing]\nduration = 3", "a rig is described by"),
-        ('[[posterior.otherwise]]\neffect = "kp"\nchanges.controller.kp = 3', "a rig is described"),
+        ("[timing]\nduration = 3", "a machine is described by"),
+        ('[[posterior.otherwise]]\neffect = "kp"\nchanges.controller.kp = 3', "a machine is described"),
         ('[[posterior.otherwise]]\neffect = "a\\nb"', "a name of one line"),
     ],
 )

@@ -62,6 +62,7 @@ def identifiability(of: Machine | str | Path) -> Identifiability:
 def tune(
     study: str,
     *,
+    machine: Machine | str | Path | None = None,
     settings: Sequence[str] = (),
     twin: str | Path | None = None,
     out: str | Path | None = None,
@@ -80,6 +81,9 @@ def tune(
     ----------
     study
         By name, or the path of its file, docs/tuning.md.
+    machine
+        Whose controller is tuned, see `machine`; by default that which the study names, or else
+        the suspension rig.
     settings
         `group.name=value` for every run, over the study's own.
     twin
@@ -106,8 +110,12 @@ def tune(
     """
     if seed < 0:
         raise RigtwinError(f"--seed {seed}: expected 0 or more")
-    found = find_study(study, settings, roads=roads, held_out=held_out, evaluations=evaluations)
-    posterior = None if twin is None else load_posterior(Path(twin))
+    of = None if machine is None else the_machine(machine)
+    found = find_study(
+        study, settings, machine=of, roads=roads, held_out=held_out, evaluations=evaluations
+    )
+    base = found.machine.configuration
+    posterior = None if twin is None else load_posterior(Path(twin), base)
     folder = Path(out) if out is not None else default_folder(found)
     if folder.exists() and not folder.is_dir():
         raise RigtwinError(f"cannot write into {folder}: it is a file")

@@ -17,6 +17,7 @@ docs/tuning.md. Without one, those that come along are listed.
 examples:
   rigtwin tune skyhook --out tuning/skyhook
   rigtwin tune friction --twin calibrated.toml     of a rig that diagnose --save-twin has described
+  rigtwin tune study.toml --machine arm.toml       of any machine with a [controller]
   rigtwin run active --config tuning/skyhook/tuned.toml
 
 Every run is kept; a second call goes on where the first was stopped."""
@@ -24,6 +25,11 @@ Every run is kept; a second call goes on where the first was stopped."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", nargs="?", help="a study by name, or the path of its file")
+    parser.add_argument(
+        "--machine",
+        metavar="F.toml",
+        help="whose controller, by name or description (default: the study's, or the rig's)",
+    )
     parser.add_argument(
         "--twin",
         type=Path,
@@ -73,7 +79,7 @@ def execute(parsed: argparse.Namespace) -> int:
         4 if something speaks against the settings that were found, else 0.
     """
     from rigtwin.studies.tuning.folder import PAGE, SETTINGS, default_folder
-    from rigtwin.studies.tuning.text import concerns, text
+    from rigtwin.studies.tuning.text import command, concerns, text
 
     if parsed.study is None:
         print(_list_studies())
@@ -81,6 +87,7 @@ def execute(parsed: argparse.Namespace) -> int:
     with counting_bar("run", "tune") as progress:
         result = rigtwin.tune(
             parsed.study,
+            machine=parsed.machine,
             settings=parsed.set,
             twin=parsed.twin,
             out=parsed.out,
@@ -94,8 +101,7 @@ def execute(parsed: argparse.Namespace) -> int:
         )
     folder = parsed.out or default_folder(result.study)
     print(text(result))
-    run = f"rigtwin run {result.study.experiment.name} --config {folder / SETTINGS}"
-    print(f"\nlook at {folder / PAGE}\n{run}")
+    print(f"\nlook at {folder / PAGE}\n{command(result.study, folder / SETTINGS)}")
     return 4 if concerns(result) else 0
 
 

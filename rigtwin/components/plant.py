@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
@@ -31,6 +32,13 @@ class Plant(Protocol):
 
 
 P = TypeVar("P", bound=Plant)
+
+
+def plant_of(components: Mapping[str, Any]) -> Any:
+    """A plant of components by name, which other processes can be given."""
+    made = namedtuple("Plant", list(components))  # type: ignore[misc]
+    made.__reduce__ = lambda plant: (plant_of, (plant._asdict(),))  # type: ignore[method-assign, assignment]
+    return made(**components)
 
 
 def with_parameters(plant: P, group: str, changes: Mapping[str, float]) -> P:

@@ -4,7 +4,6 @@ line."""
 from __future__ import annotations
 
 import re
-from collections import namedtuple
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 from controllers.formula import Formula, formula
 from rigtwin.components import Computer, Mains, RigPlant
+from rigtwin.components.plant import plant_of
 from rigtwin.description.component_tables import MOVING, Components
 from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
 from rigtwin.description.limits import read_limits
@@ -108,8 +108,8 @@ class _Reader:
             return None
         reader.tolerate_timing(replays)
         values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
-        made = RigPlant if structure is Structure.QUARTER_CAR else namedtuple("Plant", list(values))  # type: ignore[misc]
-        plant: Any = made(**values)
+        rig = structure is Structure.QUARTER_CAR
+        plant: Any = RigPlant(**values) if rig else plant_of(values)
         return Machine(
             name=name,
             title=str(about.get("title", name)),

@@ -105,18 +105,33 @@ def format_toml(posterior: Posterior) -> list[str]:
     return lines
 
 
-def load_posterior(path: Path) -> Posterior:
-    """A calibrated twin of the suspension rig. Without a table `posterior` its values are taken as
-    certain.
+def load_posterior(path: Path, base: Configuration | None = None) -> Posterior:
+    """A calibrated twin. Without a table `posterior` its values are taken as certain.
 
-    Raises RigtwinError naming file and fault.
+    Parameters
+    ----------
+    path
+        Its file.
+    base
+        The machine's settings as described; the suspension rig's by default.
+
+    Returns
+    -------
+    Posterior
+        What is known of it.
+
+    Raises
+    ------
+    RigtwinError
+        Naming file and fault.
     """
-    return read_toml(path, _parse)
+    nominal = Configuration() if base is None else base
+    return read_toml(path, lambda tables: _parse(tables, nominal))
 
 
-def _parse(tables: Mapping[str, Any]) -> Posterior:
+def _parse(tables: Mapping[str, Any], nominal: Configuration) -> Posterior:
     changes = values_of(tables)
-    configuration = _of_rig("it", changes)
+    configuration = _with(nominal, "it", changes)
     table = tables.get(POSTERIOR, {})
     if not isinstance(table, Mapping):
         raise RigtwinError(
@@ -139,17 +154,17 @@ def _parse(tables: Mapping[str, Any]) -> Posterior:
         changes,
         {key: _interval(configuration, key, ends) for key, ends in intervals.items()},
         _probability(table.get("probability", 1.0)),
-        tuple(_otherwise(other) for other in others),
+        tuple(_otherwise(other, nominal) for other in others),
     )
 
 
-def _of_rig(where: str, changes: Changes) -> Configuration:
-    """The nominal rig with changes, which must be of its components alone."""
-    configuration = override(Configuration(), changes)
+def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration:
+    """A machine with changes, which must be of its components alone."""
+    configuration = override(nominal, changes)
     for group in changes:
         if group not in configuration.plant._fields:
             raise RigtwinError(
-                f"{where} changes {group}; a rig is described by "
+                f"{where} changes {group}; a machine is described by "
                 f"{', '.join(configuration.plant._fields)} alone"
             )
     return configuration
@@ -171,7 +186,7 @@ def _interval(configuration: Configuration, key: str, ends: object) -> tuple[flo
     if not isinstance(known.get(name), Quantity):
         raise RigtwinError(
             f"{POSTERIOR}.intervals: unknown parameter {key!r}; "
-            "expected component.parameter of the rig"
+            "expected component.parameter of the machine"
         )
     try:
         low, high = (float(end) for end in ends if not isinstance(end, bool | str))  # type: ignore[union-attr]
@@ -188,7 +203,7 @@ def _interval(configuration: Configuration, key: str, ends: object) -> tuple[flo
     return low, high
 
 
-def _otherwise(table: Mapping[str, Any]) -> Otherwise:
+def _otherwise(table: Mapping[str, Any], nominal: Configuration) -> Otherwise:
     changes = table.get("changes", {})
     if not isinstance(table.get("effect"), str) or not isinstance(changes, Mapping):
         raise RigtwinError(
@@ -200,5 +215,5 @@ def _otherwise(table: Mapping[str, Any]) -> Otherwise:
         raise RigtwinError(
             f"{POSTERIOR}.otherwise: effect = {effect!r}; expected a name of one line"
         )
-    _of_rig(f"{POSTERIOR}.otherwise {effect}", changes)
+    _with(nominal, f"{POSTERIOR}.otherwise {effect}", changes)
     return Otherwise(effect, _probability(table.get("probability", 0.0)), changes)

@@ -27,6 +27,10 @@ from rigtwin.recording import Recording, Writer
 from rigtwin.simulation.runner import RunResult
 
 
+class RunsAway(RigtwinError):
+    """A machine that went where nothing can, and met no limit on its way."""
+
+
 def run_machine(
     path: Path,
     machine: Machine,
@@ -145,7 +149,7 @@ def simulate_machine(
         ]
     trip = find_trip(machine, configuration, columns)
     if away and trip is None:
-        raise RigtwinError(f"{machine.name}: {', '.join(away)}: runs away; nothing holds it")
+        raise RunsAway(f"{machine.name}: {', '.join(away)}: runs away; nothing holds it")
     if trip is not None:
         columns = {
             topic: {name: signal[: trip.tick + 1] for name, signal in names.items()}

@@ -8,12 +8,12 @@ from itertools import chain
 
 import numpy as np
 
-from controllers import Settings
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store, Workers, run_jobs
 from rigtwin.studies.tuning.measures import Measure
+from rigtwin.studies.tuning.parameter import Settings
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, run
 from rigtwin.studies.tuning.scenario import Scenario
 from rigtwin.studies.tuning.study import Study
@@ -62,11 +62,12 @@ class Bench:
     def plan(self, base: Configuration, candidate: Settings, scenario: Scenario) -> Run:
         """The run of a candidate in a scenario. base: the configuration of everything else."""
         return Run(
+            machine=str(self.study.machine.path),
             experiment=self.study.experiment,
             configuration=base._replace(controller=candidate, plant=scenario.plant),
             seed=scenario.seed,
             first=self.study.first,
-            measures=tuple(measure.name for measure in self.study.goals.measures),
+            measures=self.study.goals.measures,
         )
 
     def run(

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binom
 
-from controllers import Settings
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.tuning.bench import Bench, quantile
 from rigtwin.studies.tuning.measures import Measure
+from rigtwin.studies.tuning.parameter import Settings
 from rigtwin.studies.tuning.run import LIMITS, TRIP
 from rigtwin.studies.tuning.scenario import Scenario
 

@@ -12,7 +12,9 @@ from matplotlib.figure import Figure
 
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Structure
 from rigtwin.errors import RigtwinError
+from rigtwin.models.machine_twin import run_machine
 from rigtwin.render.plot import save
 from rigtwin.simulation.runner import record
 from rigtwin.studies.tuning import text
@@ -88,9 +90,13 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
 
 def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
     """Record the tuned settings on the first held-out road."""
-    experiment = result.study.experiment
+    experiment, machine = result.study.experiment, result.study.machine
     configuration = twin._replace(controller=result.settings)
-    record(path, experiment.name, configuration, experiment.demands(configuration, APART), APART)
+    demands = experiment.demands(configuration, APART)
+    if machine.structure is Structure.QUARTER_CAR:
+        record(path, experiment.name, configuration, demands, APART, machine=machine.name)
+    else:
+        run_machine(path, machine, experiment.name, configuration, demands, APART)
 
 
 def _csv(rows: list[list[object]]) -> str:

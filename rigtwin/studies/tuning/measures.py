@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import FunctionType
+from typing import Any
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from controllers import Commands, Measurements
 from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
@@ -30,22 +33,35 @@ class Trial:
     ----------
     configuration : Configuration
         What it was run with.
-    commands, sensed : array
-        Shape (ticks, 4), columns of `controllers.Commands` and `.Measurements`; the latter without
-        noise where a twin knows them.
+    columns : mapping
+        Topic → field → signal, shape (ticks,).
     first : int
         Tick from which on it is measured.
     """
 
     configuration: Configuration
-    commands: Array
-    sensed: Array
+    columns: Mapping[str, Mapping[str, Array]]
     first: int = 0
 
     @property
     def period(self) -> float:
         """s."""
         return self.configuration.timing.period
+
+
+@dataclass(frozen=True)
+class RigTrial(Trial):
+    """A test of the suspension rig; its sensors are without noise where a twin knows them."""
+
+    @cached_property
+    def commands(self) -> Array:
+        """Shape (ticks, 4), columns of `controllers.Commands`."""
+        return np.column_stack([self.columns["/command"][name] for name in Commands._fields])
+
+    @cached_property
+    def sensed(self) -> Array:
+        """Shape (ticks, 4), columns of `controllers.Measurements`."""
+        return np.column_stack([self.columns["/sensor"][name] for name in Measurements._fields])
 
     @property
     def plate(self) -> Array:
@@ -83,7 +99,7 @@ class Measure:
     name, title, unit : str
         What studies call it, what it is in words, its SI unit.
     of : callable
-        The figure of a trial.
+        The figure of a trial; a function or an object that other processes can be given.
     more : bool, optional
         Whether more of it is better.
     """
@@ -91,40 +107,57 @@ class Measure:
     name: str
     title: str
     unit: str
-    of: Callable[[Trial], float]
+    of: Callable[[Any], float]
     more: bool = False
 
+    @property
+    def told(self) -> str:
+        """What a study says of it that defines it."""
+        return "" if isinstance(self.of, FunctionType) else repr(self.of)
 
-def _ride(trial: Trial) -> float:
+
+def _ride(trial: RigTrial) -> float:
     return rms(np.diff(trial.plate, 2) / trial.period**2)
 
 
-def _heave(trial: Trial) -> float:
+def _heave(trial: RigTrial) -> float:
     low_pass = butter(2, HEAVE, fs=1.0 / trial.period, output="sos")
     return rms(np.diff(sosfiltfilt(low_pass, trial.plate), 2) / trial.period**2)
 
 
-def _road_holding(trial: Trial) -> float:
+def _road_holding(trial: RigTrial) -> float:
     return float(np.std(trial.tyre))
 
 
-def _travel(trial: Trial) -> float:
+def _travel(trial: RigTrial) -> float:
     return float(np.std(trial.travel))
 
 
-def _force_error(trial: Trial) -> float:
+def _force_error(trial: RigTrial) -> float:
     return trial.tracking.force_e1 + trial.tracking.force_e2
 
 
-def _position_error(trial: Trial) -> float:
+def _position_error(trial: RigTrial) -> float:
     return trial.tracking.position_e1 + trial.tracking.position_e2
 
 
-def _effort(trial: Trial) -> float:
+def _tracking(trial: RigTrial) -> float:
+    return trial.tracking.force_e2
+
+
+def _model_error(trial: RigTrial) -> float:
+    return trial.tracking.force_e1
+
+
+def _position_tracking(trial: RigTrial) -> float:
+    return trial.tracking.position_e2
+
+
+def _effort(trial: RigTrial) -> float:
     return float(np.std(trial.commands[trial.first :, 3]))
 
 
-def _margin(trial: Trial) -> float:
+def _margin(trial: RigTrial) -> float:
     return decay(trial.configuration)
 
 
@@ -133,15 +166,10 @@ _ALL = (
     Measure("heave", f"rms body acceleration up to {HEAVE:g} Hz", "m/s²", _heave),
     Measure("road_holding", "rms dynamic tyre force", "N", _road_holding),
     Measure("travel", "rms suspension travel about its mean", "m", _travel),
-    Measure("tracking", "rms force tracking error e2", "N", lambda trial: trial.tracking.force_e2),
-    Measure("model_error", "rms force model error e1", "N", lambda trial: trial.tracking.force_e1),
+    Measure("tracking", "rms force tracking error e2", "N", _tracking),
+    Measure("model_error", "rms force model error e1", "N", _model_error),
     Measure("force_error", "force error, rms e1 + rms e2", "N", _force_error),
-    Measure(
-        "position_tracking",
-        "rms position tracking error e2",
-        "m",
-        lambda trial: trial.tracking.position_e2,
-    ),
+    Measure("position_tracking", "rms position tracking error e2", "m", _position_tracking),
     Measure("position_error", "position error, rms e1 + rms e2", "m", _position_error),
     Measure("effort", "rms motor voltage about its mean", "V", _effort),
     Measure(

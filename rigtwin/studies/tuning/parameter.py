@@ -8,14 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from controllers import Settings
 from rigtwin.numerics.arrays import Array
 
 DIGITS = 4
 """Significant digits of a tuned value. More have no meaning on a rig; what is written was tried."""
+
+
+Settings = Any
+"""A controller's settings: a NamedTuple, of whatever controller."""
 
 
 @dataclass(frozen=True)

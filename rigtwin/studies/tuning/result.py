@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from controllers import Settings
 from rigtwin.description.posterior import Posterior
 from rigtwin.studies.tuning.bench import Bench, Score
 from rigtwin.studies.tuning.evaluation import Comparison, evaluate
-from rigtwin.studies.tuning.parameter import set_values
+from rigtwin.studies.tuning.parameter import Settings, set_values
 from rigtwin.studies.tuning.scenario import APART, NOMINAL, Rig, calibrated_rig, draw_scenarios
 from rigtwin.studies.tuning.search import Candidate, Search, find_best, find_front
 from rigtwin.studies.tuning.study import Study
@@ -172,7 +171,10 @@ def _are_alike(study: Study, rig: Rig) -> bool:
     configuration, demands = study.search_configuration, study.experiment.demands
     one, other = draw_scenarios(study, rig, 2, APART)
     first, second = (demands(configuration, seed) for seed in (0, APART))
-    return np.array_equal(first, second) and one.plant == other.plant
+    pairs = [(first, second)]
+    if isinstance(first, Mapping):
+        pairs = [(signal, second[name]) for name, signal in first.items()]
+    return all(np.array_equal(*pair) for pair in pairs) and one.plant == other.plant
 
 
 def _thin(points: tuple[Candidate, ...], most: int) -> tuple[Candidate, ...]:

@@ -5,14 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
+from controllers import Commands, Measurements
+from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Configuration, flatten
+from rigtwin.description.limits import largest_reach
+from rigtwin.description.machine import Machine, Structure
+from rigtwin.models.machine_twin import RunsAway, simulate_machine
+from rigtwin.numerics.arrays import RUNAWAY, Array
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
 from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip
-from rigtwin.studies.tuning.measures import MEASURES, Trial
+from rigtwin.studies.tuning.measures import Measure, RigTrial, Trial
 
 LIMITS, TRIP = "limits", "trip"
 """Besides the measures: the largest share of a safety limit reached, and the number of a Trip."""
@@ -24,6 +32,8 @@ class Run:
 
     Parameters
     ----------
+    machine : str
+        Path of the description of that whose twin is run.
     experiment : Experiment
         The test.
     configuration : Configuration
@@ -32,15 +42,16 @@ class Run:
         Of road and noise.
     first : float
         s, from which on it is measured.
-    measures : tuple of str
-        Names of `MEASURES`.
+    measures : tuple of Measure
+        What it is measured by.
     """
 
+    machine: str
     experiment: Experiment
     configuration: Configuration
     seed: int
     first: float
-    measures: tuple[str, ...]
+    measures: tuple[Measure, ...]
 
     @property
     def key(self) -> str:
@@ -50,9 +61,13 @@ class Run:
             flatten(self.configuration),
             self.seed,
             self.first,
-            sorted(self.measures),
+            sorted(f"{measure.name} {measure.told}" for measure in self.measures),
         ]
         return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
+
+
+find_once = lru_cache(maxsize=4)(find)
+"""A machine by name or path, read once a process."""
 
 
 def run(job: Run) -> dict[str, float]:
@@ -61,20 +76,61 @@ def run(job: Run) -> dict[str, float]:
     Returns
     -------
     dict
-        Name → figure, of the measures, LIMITS and TRIP. The measures of a run that tripped are
-        not numbers.
+        Name → figure, of the measures, LIMITS and TRIP. The measures of a run that tripped, or of a
+        machine that ran away, are not numbers.
     """
+    machine = find_once(job.machine)
     demands = job.experiment.demands(job.configuration, job.seed)
-    return figures(job, simulate(job.configuration, demands, job.seed))
+    if machine.structure is Structure.QUARTER_CAR:
+        return figures(job, simulate(job.configuration, demands, job.seed))
+    return _run_described(machine, job, demands)
 
 
 def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
-    """Name → figure of a run that was made, as `run` gives it."""
-    configuration = job.configuration
-    shares = (1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, configuration))
+    """Name → figure of a run of the suspension rig, as `run` gives it."""
+    shares = (
+        1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, job.configuration)
+    )
     found = {LIMITS: max(shares), TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:
-        return found | dict.fromkeys(job.measures, math.nan)
-    first = round(job.first / configuration.timing.period)
-    trial = Trial(configuration, ran.commands, ran.truth, first)
-    return found | {name: float(MEASURES[name].of(trial)) for name in job.measures}
+        return found | _nothing(job)
+    trial = rig_trial(job.configuration, ran.commands, ran.truth, _first(job))
+    return found | _measure(job, trial)
+
+
+def rig_trial(
+    configuration: Configuration, commands: Array, sensed: Array, first: int = 0
+) -> RigTrial:
+    """A test of the suspension rig. commands, sensed: shape (ticks, 4), columns of
+    `controllers.Commands` and `.Measurements`."""
+    columns = {
+        "/command": dict(zip(Commands._fields, commands.T, strict=True)),
+        "/sensor": dict(zip(Measurements._fields, sensed.T, strict=True)),
+    }
+    return RigTrial(configuration, columns, first)
+
+
+def _run_described(machine: Machine, job: Run, demands: Mapping[str, Array]) -> dict[str, float]:
+    try:
+        columns, trip = simulate_machine(machine, job.configuration, demands, job.seed)
+    except RunsAway:
+        return {LIMITS: RUNAWAY, TRIP: 1.0} | _nothing(job)
+    found = {
+        LIMITS: largest_reach(machine, job.configuration, columns),
+        TRIP: float(trip is not None),
+    }
+    if trip is not None:
+        return found | _nothing(job)
+    return found | _measure(job, Trial(job.configuration, columns, _first(job)))
+
+
+def _first(job: Run) -> int:
+    return round(job.first / job.configuration.timing.period)
+
+
+def _nothing(job: Run) -> dict[str, float]:
+    return {measure.name: math.nan for measure in job.measures}
+
+
+def _measure(job: Run, trial: Trial) -> dict[str, float]:
+    return {measure.name: float(measure.of(trial)) for measure in job.measures}

@@ -10,9 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from machines import DEFAULT_MACHINE
-from rigtwin.components import RigPlant
-from rigtwin.description.catalogue import find
+from rigtwin.components.plant import Plant
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Changes, Posterior, shift_within, value_of
@@ -35,7 +33,7 @@ class Scenario:
     """
 
     seed: int
-    plant: RigPlant
+    plant: Plant
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scena
     first : int
         The first one's seed; the others follow.
     """
-    tolerances = find(DEFAULT_MACHINE).tolerances if study.variation.tolerances else ()
+    tolerances = study.machine.tolerances if study.variation.tolerances else ()
 
     def draw(seed: int) -> Scenario:
         random = np.random.default_rng([seed, 3])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
-from controllers import Settings
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Parameter
@@ -110,6 +111,8 @@ class Study:
     ----------
     name, title : str
         What it is called, and what it is in words.
+    machine : Machine
+        Whose twin is run.
     experiment : Experiment
         The test that is run.
     configuration : Configuration
@@ -136,6 +139,7 @@ class Study:
 
     name: str
     title: str
+    machine: Machine
     experiment: Experiment
     configuration: Configuration
     search_changes: Changes
@@ -149,8 +153,8 @@ class Study:
     other_rigs: Mapping[str, Changes] = field(default_factory=dict)
 
     @property
-    def baseline_settings(self) -> Settings:
-        """The controller that is compared with."""
+    def baseline_settings(self) -> Any:
+        """The settings of the controller that is compared with, a NamedTuple."""
         return override(self.configuration, self.baseline_changes).controller
 
     @property

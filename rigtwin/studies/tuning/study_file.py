@@ -11,21 +11,35 @@ from pathlib import Path
 from typing import Any
 
 from controllers.quantity import Quantity, fields
+from machines import DEFAULT_MACHINE
+from rigtwin.description.catalogue import find
 from rigtwin.description.changes import override, parse_assignments, read_toml
 from rigtwin.description.configuration import Configuration, groups
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.posterior import value_of
 from rigtwin.errors import RigtwinError
-from rigtwin.simulation.experiment import Experiment
+from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.tuning.measures import MEASURES, Measure
+from rigtwin.studies.tuning.own_measures import list_channels, parse_measure
 from rigtwin.studies.tuning.parameter import Parameter
 from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Study, Variation
 
 BASELINE = "baseline"
 REQUIRED = ("experiment", "minimise", "parameters")
 KEYS = (
-    *("title", "experiment", "from", "roads", "held_out", "quantile", "evaluations", "points"),
+    *(
+        "title",
+        "machine",
+        "experiment",
+        "from",
+        "roads",
+        "held_out",
+        "quantile",
+        "evaluations",
+        "points",
+    ),
     *("minimise", "report", "set", "search", "baseline", "parameters", "constraints", "vary"),
-    "judge",
+    *("judge", "measures"),
 )
 MOST = 10_000
 """Scenarios. Fewer than six have no 95 % interval of their median."""
@@ -35,7 +49,7 @@ LONGEST = 100
 
 def read_study(
     path: Path,
-    experiments: Mapping[str, Experiment],
+    machine: Machine | None = None,
     assignments: Sequence[str] = (),
     **numbers: int | None,
 ) -> Study:
@@ -45,8 +59,9 @@ def read_study(
     ----------
     path : Path
         Its file.
-    experiments : mapping
-        Name → experiment, of those that it may run.
+    machine : Machine, optional
+        Whose controller is tuned; by default that which the study names, or else the suspension
+        rig.
     assignments : sequence of str, optional
         `group.name=value` for every run, over the study's own.
     **numbers : int or None
@@ -64,15 +79,23 @@ def read_study(
     other = {key: number for key, number in numbers.items() if number is not None}
 
     def parse(tables: Mapping[str, Any]) -> Study:
-        return parse_study(path.stem, {**tables, **other}, experiments, given)
+        of = _machine(path, tables) if machine is None else machine
+        return parse_study(path.stem, {**tables, **other}, of, given)
 
     return read_toml(path, parse)
+
+
+def _machine(path: Path, tables: Mapping[str, Any]) -> Machine:
+    """The machine that a study names: one that is shipped, or a description beside the study."""
+    name = _text("machine", tables.get("machine", DEFAULT_MACHINE))
+    beside = path.parent / name
+    return find(str(beside) if name.endswith(".toml") and beside.is_file() else name)
 
 
 def parse_study(
     name: str,
     tables: Mapping[str, Any],
-    experiments: Mapping[str, Experiment],
+    machine: Machine,
     given: Changes | None = None,
 ) -> Study:
     """Make a study of its TOML tables.
@@ -83,8 +106,8 @@ def parse_study(
         What it is called.
     tables : mapping
         As they stand in its file.
-    experiments : mapping
-        Name → experiment, of those that it may run.
+    machine : Machine
+        Whose controller is tuned.
     given : mapping, optional
         Group → name → value for every run, over what the tables have.
 
@@ -99,10 +122,13 @@ def parse_study(
     for key in REQUIRED:
         if key not in tables:
             raise RigtwinError(f"{key} is missing")
-    experiment, given = _experiment(tables["experiment"], experiments), given or {}
-    own = override(experiment.configuration, _changes("set", tables.get("set", {})))
-    configuration = override(own, given)
-    search = _search(tables.get("search", {}), given)
+    if not len(machine.configuration.controller):
+        expected = "expected a machine with a [controller] that has settings"
+        raise RigtwinError(f"{machine.name} has nothing to tune; {expected}")
+    experiment = find_experiment(machine, _text("experiment", tables["experiment"]))
+    given, base = given or {}, experiment.configuration
+    configuration = override(override(base, _changes("set", tables.get("set", {}), base)), given)
+    search = _search(tables.get("search", {}), given, base)
     shorter = override(configuration, search)
     _ = shorter.ticks, shorter.substeps
     first = _number("from", tables.get("from", 0.0), 0.0, 86_400.0)
@@ -113,12 +139,13 @@ def parse_study(
     return Study(
         name=name,
         title=_text("title", tables.get("title", name)),
+        machine=machine,
         experiment=experiment,
         configuration=configuration,
         search_changes=search,
-        baseline_changes=_baseline(tables.get("baseline", {})),
+        baseline_changes=_baseline(tables.get("baseline", {}), base),
         parameters=_parameters(tables["parameters"], configuration),
-        goals=_goals(tables),
+        goals=_goals(tables, _known_measures(machine, tables.get("measures", {}))),
         budget=Budget(
             roads=_whole("roads", tables.get("roads", 16), 1, MOST),
             held_out=_whole("held_out", tables.get("held_out", 32), 6, MOST),
@@ -132,11 +159,15 @@ def parse_study(
     )
 
 
-def _experiment(name: object, experiments: Mapping[str, Experiment]) -> Experiment:
-    known = _text("experiment", name)
-    if known not in experiments:
-        raise RigtwinError(f"unknown experiment {known!r}; there are {', '.join(experiments)}")
-    return experiments[known]
+def _known_measures(machine: Machine, table: object) -> dict[str, Measure]:
+    """By name: the rig's, and those that the study defines."""
+    known = dict(MEASURES) if machine.structure is Structure.QUARTER_CAR else {}
+    channels = list_channels(machine)
+    for name, own in _table("measures", table, "tables, [measures.NAME]").items():
+        if name in known:
+            raise RigtwinError(f"measures.{name}: there is a measure of that name already")
+        known[name] = parse_measure(_text("measures", name), own, channels)
+    return known
 
 
 def _text(key: str, value: object) -> str:
@@ -164,7 +195,7 @@ def _table(where: str, table: object, expected: str) -> Mapping[str, Any]:
     return table
 
 
-def _changes(where: str, table: object) -> dict[str, dict[str, object]]:
+def _changes(where: str, table: object, base: Configuration) -> dict[str, dict[str, object]]:
     """`"group.name" = value` entries, or tables of them; every key and value is checked."""
     found: dict[str, dict[str, object]] = {}
     expected = 'a table of settings, such as "controller.kp" = 0.5'
@@ -178,7 +209,7 @@ def _changes(where: str, table: object) -> dict[str, dict[str, object]]:
             expected = 'expected group.name, such as "controller.kp" = 0.5'
             raise RigtwinError(f"{where}: {key} = {value!r}: {expected}")
     try:
-        override(Configuration(), found)
+        override(base, found)
     except RigtwinError as error:
         raise RigtwinError(f"{where}: {error}") from None
     return found
@@ -191,15 +222,15 @@ def _only(where: str, changes: Changes, allowed: Sequence[str], expected: str) -
             raise RigtwinError(f"{where}: {group}: expected {expected}")
 
 
-def _baseline(table: object) -> Changes:
-    changes = _changes("baseline", table)
+def _baseline(table: object, base: Configuration) -> Changes:
+    changes = _changes("baseline", table, base)
     _only("baseline", changes, ["controller"], "settings of the controller alone")
     return changes
 
 
-def _search(table: object, given: Changes) -> Changes:
+def _search(table: object, given: Changes, base: Configuration) -> Changes:
     """What the search runs differently, less what is given at once, which goes for it too."""
-    changes = _changes("search", table)
+    changes = _changes("search", table, base)
     _only("search", changes, ["timing", "safety", "road"], "timing, safety or road")
     found = {}
     for group, own in changes.items():
@@ -208,14 +239,15 @@ def _search(table: object, given: Changes) -> Changes:
     return found
 
 
-def _measures(key: str, names: object) -> tuple[Measure, ...]:
-    listed = [names] if isinstance(names, str) else names
+def _measures(key: str, names: object, known: Mapping[str, Measure]) -> tuple[Measure, ...]:
+    listed, there = [names] if isinstance(names, str) else names, ", ".join(known) or "none"
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-        raise RigtwinError(f"{key} = {names!r}: expected names of {', '.join(MEASURES)}")
+        raise RigtwinError(f"{key} = {names!r}: expected names of {there}")
     for name in listed:
-        if name not in MEASURES:
-            raise RigtwinError(f"{key}: unknown {name!r}; there are {', '.join(MEASURES)}")
-    return tuple(MEASURES[name] for name in dict.fromkeys(listed))
+        if name not in known:
+            more = "; [measures.NAME] defines one"
+            raise RigtwinError(f"{key}: unknown {name!r}; there are {there}{more}")
+    return tuple(known[name] for name in dict.fromkeys(listed))
 
 
 def _quantity(key: str, configuration: Configuration) -> Quantity:
@@ -257,21 +289,22 @@ def _parameter(key: str, entry: object, configuration: Configuration) -> Paramet
     return Parameter(key, low, high, logarithmic, meaning.unit)
 
 
-def _goals(tables: Mapping[str, Any]) -> Goals:
+def _goals(tables: Mapping[str, Any], known: Mapping[str, Measure]) -> Goals:
     asked = tables["minimise"]
-    minimise = _measures("minimise", asked)
+    minimise = _measures("minimise", asked, known)
     if len(minimise) not in (1, 2) or (isinstance(asked, list) and len(minimise) != len(asked)):
         expected = "expected one objective, or two others for their front"
         raise RigtwinError(f"minimise = {asked!r}: {expected}")
     expected = f'measures with bounds, such as road_holding = "{BASELINE}"'
     bounds = dict(_table("constraints", tables.get("constraints", {}), expected))
     limits = _number("constraints: limits", bounds.pop("limits", 0.9), 0.01, 1.0)
-    constraints = tuple(_constraint(key, value) for key, value in bounds.items())
-    return Goals(minimise, constraints, limits, _measures("report", tables.get("report", [])))
+    constraints = tuple(_constraint(key, value, known) for key, value in bounds.items())
+    report = _measures("report", tables.get("report", []), known)
+    return Goals(minimise, constraints, limits, report)
 
 
-def _constraint(key: str, value: object) -> Constraint:
-    where, (measure,) = f"constraints: {key}", _measures("constraints", [key])
+def _constraint(key: str, value: object, known: Mapping[str, Measure]) -> Constraint:
+    where, (measure,) = f"constraints: {key}", _measures("constraints", [key], known)
     if not isinstance(value, str):
         return Constraint(measure, _number(where, value, -1e12, 1e12))
     share, _, word = value.rpartition(" ")
@@ -291,7 +324,8 @@ def _variation(table: object, configuration: Configuration) -> Variation:
     for key, value in shares.items():
         where = f"vary: {key}"
         if key.partition(".")[0] not in configuration.plant._fields:
-            raise RigtwinError(f"{where}: expected component.parameter of the rig, or tolerances")
+            expected = "expected component.parameter of the machine, or tolerances"
+            raise RigtwinError(f"{where}: {expected}")
         _quantity(key, configuration)
         if value_of(configuration, key) == 0.0:
             advice = "any share of that is nothing; give it a value in [set]"
@@ -304,7 +338,8 @@ def _other_rigs(table: object, configuration: Configuration) -> dict[str, Change
     found: dict[str, Changes] = {}
     rigs = _table("judge", table, "tables of changes of the rig, [judge.NAME]")
     for name, changes in rigs.items():
-        where, found[name] = f"judge: {name}", _changes(f"judge: {_text('judge', name)}", changes)
-        expected = 'changes of the rig alone, such as "motor.coulomb" = 18.2'
+        where = f"judge: {_text('judge', name)}"
+        found[name] = _changes(where, changes, configuration)
+        expected = 'changes of the machine alone, such as "motor.coulomb" = 18.2'
         _only(where, found[name], configuration.plant._fields, expected)
     return found

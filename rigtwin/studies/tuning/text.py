@@ -6,10 +6,11 @@ import math
 
 from rigtwin.console import table
 from rigtwin.description.configuration import parameters
+from rigtwin.description.machine import Structure
 from rigtwin.studies.tuning.evaluation import Change, Comparison, Spread
 from rigtwin.studies.tuning.result import TUNED_NOMINAL, TuningResult, settings_of
 from rigtwin.studies.tuning.scenario import NOMINAL
-from rigtwin.studies.tuning.study import Constraint
+from rigtwin.studies.tuning.study import Constraint, Study
 
 CLOSE = 0.02
 """Share of a bound within which a figure counts as at it: the search goes to the bound, and other
@@ -183,6 +184,13 @@ def text(result: TuningResult) -> str:
     return "\n\n".join(blocks)
 
 
+def command(study: Study, settings: object) -> str:
+    """The line that runs a study's experiment with settings of a file."""
+    rig = study.machine.structure is Structure.QUARTER_CAR
+    other = "" if rig else f" --machine {study.machine.path}"
+    return f"rigtwin run {study.experiment.name}{other} --config {settings}"
+
+
 def toml(result: TuningResult, point: int | None = None) -> str:
     """The settings as `run --config` takes them: those that differ from the experiment's own.
 
@@ -197,7 +205,7 @@ def toml(result: TuningResult, point: int | None = None) -> str:
         median, interval = change(each)
         lines.append(f"# {each.measure.title}: {median} [{interval}] held out")
     lines += [f"# but {line}" for line in (concerns(result) if point is None else ())]
-    lines += [f"# rigtwin run {study.experiment.name} --config THIS.toml", "", "[controller]"]
+    lines += [f"# {command(study, 'THIS.toml')}", "", "[controller]"]
     before = {key: value for key, value, _ in parameters(study.experiment.configuration)}
     for name, value in settings_of(study, candidate)._asdict().items():
         if value != before[f"controller.{name}"]:
