@@ -129,7 +129,7 @@ class TransducerState(NamedTuple):
 
 
 def transducer(sensor: Sensor, period: float) -> Transducer:
-    drift = sensor.drift * period if isinstance(sensor, DRIFTING) else 0.0
+    drift = drift_of(sensor) * period
     own = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
     neutral = own == (1.0, 0.0, 0.0, 0.0, 0.0)
     share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
@@ -139,6 +139,17 @@ def transducer(sensor: Sensor, period: float) -> Transducer:
 def start_transducer(sensor: Transducer) -> TransducerState:
     """Before the first sample."""
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0]))
+
+
+def drift_of(sensor: Sensor) -> float:
+    """By how much a sensor's zero moves each second, in its unit."""
+    return sensor.drift if isinstance(sensor, DRIFTING) else 0.0
+
+
+def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
+    """What a sensor reads, shape (ticks,), as if its zero had stayed where it was at the start."""
+    drift = drift_of(sensor)
+    return measured if drift == 0.0 else measured - drift * period * np.arange(len(measured))
 
 
 @compilable
