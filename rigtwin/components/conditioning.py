@@ -189,6 +189,12 @@ def _offset(at: Context) -> Starts:
     return Starts.single([share * size for share in (-0.2, -0.02, 0.02, 0.2)], 0.002 * size)
 
 
+def _drift(at: Context) -> Starts:
+    sizes = {ForceSensor: at.scales.force, VelocitySensor: at.scales.speed}
+    size = sizes.get(at.effect.of, at.scales.stroke) / at.scales.time
+    return Starts.single([share * size for share in (-2e-3, -2e-4, 2e-4, 2e-3)], 2e-5 * size)
+
+
 def _two_lags(at: Context) -> Starts:
     time = at.scales.time
     sizes = [share * time for share in (0.005, 0.02, 0.06, 0.2)]
@@ -319,6 +325,13 @@ KINDS = (
             LoadCell: fixed_starts((-20.0, -4.0, 4.0, 20.0), 0.1),
             **_each(_offset, *DESCRIBED_SENSORS, PositionActuator),
         },
+    ),
+    Kind(
+        "drift",
+        "drift",
+        ("drift",),
+        "zero that moves with time, each second",
+        _each(_drift, *DESCRIBED_SENSORS),
     ),
     Kind(
         "hum",

@@ -54,6 +54,7 @@ class PositionSensor(NamedTuple):
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("m", -100.0, 100.0, "0: calibrated")] = 0.0
+    drift: Annotated[float, Quantity("m/s", -100.0, 100.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     white: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
@@ -66,6 +67,7 @@ class VelocitySensor(NamedTuple):
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("m/s", -100.0, 100.0, "0: calibrated")] = 0.0
+    drift: Annotated[float, Quantity("m/s^2", -100.0, 100.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     white: Annotated[float, Quantity("m/s", 0.0, 1e7, NONE)] = 0.0
@@ -78,6 +80,7 @@ class ForceSensor(NamedTuple):
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("N", -1e7, 1e7, "0: calibrated")] = 0.0
+    drift: Annotated[float, Quantity("N/s", -1e7, 1e7, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     white: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
@@ -85,6 +88,8 @@ class ForceSensor(NamedTuple):
     resolution: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
 
 
+DRIFTING = (PositionSensor, VelocitySensor, ForceSensor)
+"""Sensors whose zero may move with time."""
 DECLARED = (Lvdt, LoadCell)
 """Sensors whose noise, hum and bits are declared."""
 Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
@@ -104,33 +109,47 @@ def measures(component: object) -> str:
 
 
 class Transducer(NamedTuple):
-    """What a sensor makes of its quantity. delay: in ticks; share: of the way to its input that the
-    lag goes in a tick."""
+    """What a sensor makes of its quantity. drift: a tick; delay: in ticks; share: of the way to its
+    input that the lag goes in a tick."""
 
     neutral: bool
     gain: float
     offset: float
+    drift: float
     delay: float
     share: float
 
 
 class TransducerState(NamedTuple):
     """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the
-    lag's output."""
+    lag's output, how far the zero has drifted."""
 
     history: Array
     memory: Array
 
 
 def transducer(sensor: Sensor, period: float) -> Transducer:
-    neutral = (sensor.gain, sensor.offset, sensor.delay, sensor.lag) == (1.0, 0.0, 0.0, 0.0)
+    drift = drift_of(sensor) * period
+    own = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
+    neutral = own == (1.0, 0.0, 0.0, 0.0, 0.0)
     share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
-    return Transducer(neutral, sensor.gain, sensor.offset, sensor.delay / period, share)
+    return Transducer(neutral, sensor.gain, sensor.offset, drift, sensor.delay / period, share)
 
 
 def start_transducer(sensor: Transducer) -> TransducerState:
     """Before the first sample."""
-    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0]))
+    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0]))
+
+
+def drift_of(sensor: Sensor) -> float:
+    """By how much a sensor's zero moves each second, in its unit."""
+    return sensor.drift if isinstance(sensor, DRIFTING) else 0.0
+
+
+def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
+    """What a sensor reads, shape (ticks,), as if its zero had stayed where it was at the start."""
+    drift = drift_of(sensor)
+    return measured if drift == 0.0 else measured - drift * period * np.arange(len(measured))
 
 
 @compilable
@@ -143,7 +162,9 @@ def transduce(sensor: Transducer, state: TransducerState, value: float) -> float
         state.memory[0], state.memory[1] = 0.0, value
     late = delay_sample(state.history, state.memory, sensor.delay, value)
     state.memory[1] += sensor.share * (late - state.memory[1])
-    return sensor.gain * state.memory[1] + sensor.offset
+    found = sensor.gain * state.memory[1] + sensor.offset + state.memory[2]
+    state.memory[2] += sensor.drift
+    return found
 
 
 @kernel

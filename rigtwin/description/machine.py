@@ -33,6 +33,8 @@ TURNING = {
     "Ns/m": "Nms/rad",
     "N/m": "Nm/rad",
     "m/s": "rad/s",
+    "m/s^2": "rad/s^2",
+    "N/s": "Nm/s",
     "m/N": "rad/Nm",
     "Ns^2/m^2": "Nms^2/rad^2",
 }

@@ -160,9 +160,11 @@ def _picture(
     )
 
 
-def _against(view: View, along: Array, form: str, name: str, unit: str) -> Picture:
+def _against(
+    view: View, along: Array, form: str, name: str, unit: str, along_what: str = ""
+) -> Picture:
     """What is left without the effect against something that the component goes through, and what
-    the effect says of it."""
+    the effect says of it. along_what: in the caption, unless it is a quantity of the component."""
     there = view.counts > COUNTS
     along, left = along[there], (view.measured - view.before)[there]
     law = (view.after - view.before)[there]
@@ -185,8 +187,9 @@ def _against(view: View, along: Array, form: str, name: str, unit: str) -> Pictu
     ]
     caption = (
         f"What the {view.sensor_name} measured beyond the prediction without {view.effect.name}, "
-        f"against the {name} of the {view.part}: the dots (averages of the data) should lie on "
-        f"the solid line, which is what the effect predicts, and not on zero.{_weigh(view)}"
+        f"against {along_what or f'the {name} of the {view.part}'}: the dots (averages of the "
+        "data) should lie on the solid line, which is what the effect predicts, and not on zero."
+        f"{_weigh(view)}"
     )
     return _picture(
         view, form, (f"{name}", unit), (f"{view.sensor_name}, residual", view.unit), curves, caption
@@ -207,6 +210,11 @@ def _by_acceleration(view: View) -> Picture:
     unit = "rad/s²" if view.angular else "m/s²"
     acceleration = np.gradient(view.motion.speed, view.period)
     return _against(view, acceleration, "acceleration", "acceleration", unit)
+
+
+def _over_record(view: View) -> Picture:
+    along = view.time - view.time[0]
+    return _against(view, along, "record", "time", "s", "the time since the recording's first tick")
 
 
 def _loop(view: View) -> Picture:
@@ -370,6 +378,7 @@ FORMS: dict[str, Callable[[View], Picture]] = {
     "velocity": _by_velocity,
     "position": _by_position,
     "acceleration": _by_acceleration,
+    "record": _over_record,
     "loop": _loop,
     "phase": _phase,
     "line": _line,
@@ -412,6 +421,7 @@ PICTURES: dict[str, str] = {
     "gain": "line",
     "gain_asymmetry": "line",
     "offset": "line",
+    "drift": "record",
     "saturation": "line",
     "deadband": "line",
     "deadband_asymmetry": "line",

@@ -21,7 +21,13 @@ from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import Sensor, apply_sensor, start_transducer, transducer
+from rigtwin.components.sensors import (
+    Sensor,
+    apply_sensor,
+    remove_drift,
+    start_transducer,
+    transducer,
+)
 from rigtwin.components.servo import push_all, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
@@ -55,7 +61,7 @@ def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
     Parameters
     ----------
     sensor
-        Whose offset, gain, lag and delay are undone.
+        Whose offset, drift, gain, lag and delay are undone.
     measured
         Shape (ticks,).
     period
@@ -72,7 +78,7 @@ def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
     if sensor.delay != 0.0:
         ticks = np.arange(len(signal))
         signal = np.interp(ticks + sensor.delay / period, ticks, signal)
-    return (signal - sensor.offset) / sensor.gain
+    return (remove_drift(sensor, signal, period) - sensor.offset) / sensor.gain
 
 
 class JointModel:

@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from scipy.signal import detrend
 
-from rigtwin.components.sensors import Sensor
+from rigtwin.components.sensors import Sensor, drift_of, remove_drift
 from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.signals.noise import smallest_step, white_noise
@@ -31,7 +32,7 @@ def guess_place(velocity: Array, period: float) -> tuple[float, float]:
     Parameters
     ----------
     velocity
-        As measured, of a sensor of any zero, shape (ticks,).
+        As measured, of a sensor of any zero that may drift, shape (ticks,).
     period
         s, of a tick.
 
@@ -40,7 +41,7 @@ def guess_place(velocity: Array, period: float) -> tuple[float, float]:
     tuple
         The place, and the swing's standard deviation.
     """
-    swing = np.cumsum(velocity - np.mean(velocity)) * period
+    swing = np.cumsum(detrend(velocity)) * period
     return float(swing[0] - np.mean(swing)), float(np.std(swing))
 
 
@@ -72,7 +73,9 @@ class JointStart:
 
     def _read(self, sensor: Sensor) -> Start:
         value = (self._value - sensor.offset) / sensor.gain
-        return (value, self._slope / sensor.gain) if self._row == 0 else (0.0, value)
+        if self._row == 1:
+            return 0.0, value
+        return value, (self._slope - drift_of(sensor)) / sensor.gain
 
     def judge(self, sensor: Sensor, move: Move, form: float, pushes: Array) -> None:
         """Find whether the error of a start as it is read shows, and for how long. form: the error
@@ -105,7 +108,8 @@ class JointStart:
         start = self._read(sensor)
         if move is None:
             return start
-        measured = (self._measured[: self._remembered] - sensor.offset) / sensor.gain
+        measured = remove_drift(sensor, self._measured[: self._remembered], self._period)
+        measured = (measured - sensor.offset) / sensor.gain
         first = np.array(start)
         error = np.array(self._error)
         if self._row == 0:
