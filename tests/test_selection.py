@@ -51,6 +51,7 @@ def test_a_magnitude_must_be_known(width: float, stable: bool):
     [
         (Guide(coulomb=2.0, asymmetry=3.0), True),
         (Guide(coulomb=1.0, asymmetry=-3.0), False),
+        (Guide(coulomb=1.0, asymmetry=1.95), False),
         (Guide(viscous=2.0, viscous_asymmetry=-5.0), False),
     ],
 )

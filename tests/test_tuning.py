@@ -340,7 +340,10 @@ def test_what_was_diagnosed_is_not_varied_again():
         ('[posterior.intervals]\n"motor.coulomb" = [100, 200]', r"\] about its value, 14"),
         ('[posterior.intervals]\n"motor.coulomb" = [1, 2, 3]', r"expected \[low, high\]"),
         ("[timing]\nduration = 3", "a machine is described by"),
-        ('[[posterior.otherwise]]\neffect = "kp"\nchanges.controller.kp = 3', "a machine is described"),
+        (
+            '[[posterior.otherwise]]\neffect = "kp"\nchanges.controller.kp = 3',
+            "a machine is described",
+        ),
         ('[[posterior.otherwise]]\neffect = "a\\nb"', "a name of one line"),
     ],
 )

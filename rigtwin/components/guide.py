@@ -33,6 +33,9 @@ ROUNDING = 1e-12
 """m, within which a gap is taken up."""
 LEAST_FRICTION = 10.0
 """N; on the suspension rig a change of friction is tried in shares of what there is, or of this."""
+ONE_WAY = 0.05
+"""Share of the mean friction that its weaker direction has at least: no guide slides freely one way
+and rubs the other."""
 SLOWEST, SLOW = 0.01, 0.35
 """Shares of the highest speed between which Stribeck friction must fade."""
 WAVES = 3.0
@@ -176,11 +179,12 @@ def breakaway(
 
 
 def resists(of: Guide) -> bool:
-    """Whether friction resists the motion in both directions: it differs between them by no more
-    than there is of it."""
-    if of.load_coefficient == 0.0 and abs(of.asymmetry) > 2.0 * (of.coulomb + abs(of.stribeck)):
+    """Whether friction resists the motion in both directions, in neither by next to nothing: that
+    is a force of one direction."""
+    most = 2.0 * (1.0 - ONE_WAY)
+    if of.load_coefficient == 0.0 and abs(of.asymmetry) > most * (of.coulomb + abs(of.stribeck)):
         return False
-    return abs(of.viscous_asymmetry) <= 2.0 * of.viscous
+    return abs(of.viscous_asymmetry) <= most * of.viscous
 
 
 @compilable
