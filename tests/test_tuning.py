@@ -225,7 +225,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         ({"constraints": {"limits": 2}}, "expected a number from 0.01 to 1"),
         ({"vary": {"controller.kp": 0.3}}, "component.parameter of the rig"),
         ({"vary": {"motor.coulomb": 3}}, "expected a number from 0 to 1"),
-        ({"judge": {"odd": {"controller.kp": 0.3}}}, "changes of the rig alone"),
+        ({"judge": {"odd": {"controller.kp": 0.3}}}, "changes of the machine alone"),
         ({"set": {"controller.kp": "x"}}, "controller.kp = x"),
         ({"set": 3}, "expected a table of settings"),
         ({"search": {"controller.kp": 0.2}}, "expected timing, safety or road"),
@@ -240,7 +240,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         ({"judge": {"a\nb": {"motor.coulomb": 1}}}, "expected text of one line"),
         ({"set": {"duration": 2.0}}, "set: duration = 2.0: expected group.name"),
         ({"judge": {"odd": 3}}, "judge: odd = 3: expected a table"),
-        ({"vary": {"rail.viscous": 0.5}}, "it is 0 in this rig"),
+        ({"vary": {"rail.viscous": 0.5}}, "it is 0 in this machine"),
         ({"minimise": ["ride", "ride"]}, "one objective, or two others"),
     ],
 )

@@ -329,7 +329,7 @@ def _variation(table: object, configuration: Configuration) -> Variation:
         _quantity(key, configuration)
         if value_of(configuration, key) == 0.0:
             advice = "any share of that is nothing; give it a value in [set]"
-            raise RigtwinError(f"{where}: it is 0 in this rig, and {advice}")
+            raise RigtwinError(f"{where}: it is 0 in this machine, and {advice}")
         shares[key] = _number(where, value, 0.0, 1.0)
     return Variation(tolerances, shares)
 
