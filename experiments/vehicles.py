@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from controllers import Settings
 from experiments.experiment import flat_ground
-from rigtwin.components import Carriage, RigPlant, Tyre
+from rigtwin.components import Carriage, Tyre
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
+from rigtwin.studies.stability.tested import rig_as
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 TABLE_6_2 = "quarter-car"
@@ -41,18 +41,7 @@ VEHICLES = {
 def configuration(vehicle: Vehicle) -> Configuration:
     """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so
     that the body drops."""
-    preload = 0.9 * vehicle.sprung_mass * Settings().gravity
-    return Configuration(
-        plant=RigPlant(carriage=Carriage(vehicle.unsprung_mass), tyre=Tyre(vehicle.tyre_stiffness)),
-        controller=Settings(
-            start=-preload / vehicle.tyre_stiffness,
-            sprung_mass=vehicle.sprung_mass,
-            suspension_stiffness=vehicle.suspension_stiffness,
-            suspension_damping=vehicle.suspension_damping,
-            preload=preload,
-        ),
-        timing=Timing(duration=10.0),
-    )
+    return rig_as(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
 
 
 EXPERIMENTS = tuple(

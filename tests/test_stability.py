@@ -392,7 +392,7 @@ class TestCommand:
         printed = capsys.readouterr().out
         assert "truck" not in printed.splitlines()[1]
         assert "+14.33 ± 107.9j 1/s" in printed
-        assert printed.splitlines()[-1].endswith("unstable")
+        assert printed.splitlines()[-2].endswith("unstable")
         written = json.loads(out.read_text())
         assert set(written["models"]) == set(MODELS)
         assert written["models"]["suspension"]["critical_lag"] == pytest.approx(94_300 / 1_950_000)

@@ -25,6 +25,8 @@ from rigtwin.studies.identifiability import Identifiability as Identifiability
 from rigtwin.studies.identifiability import find_identifiable
 from rigtwin.studies.stability.judgement import ModelStability as ModelStability
 from rigtwin.studies.stability.judgement import Stability, judge
+from rigtwin.studies.stability.tested import RigMargin as RigMargin
+from rigtwin.studies.stability.tested import judge_margin
 from rigtwin.studies.stability.vehicle import QuarterCar, believable, checked_time
 from rigtwin.studies.sweep import Store, open_workers
 from rigtwin.studies.tuning.bench import Bench
@@ -158,9 +160,7 @@ def stability(
     RigtwinError
         For an unknown name, or a figure that no pole can be worked out for.
     """
-    car = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
-    if not isinstance(car, QuarterCar):
-        raise RigtwinError(f"vehicle {car!r:.60}: expected a name, or a QuarterCar")
+    car = _car(vehicle)
     for name, value in {**(changes or {}), "tau": tau}.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RigtwinError(f"{name} = {value!r:.60}: expected a number")
@@ -170,6 +170,29 @@ def stability(
             raise RigtwinError(f"unknown parameter {name!r} of a vehicle; there are {known}")
     car = believable(car._replace(**(changes or {})))
     return judge(car, checked_time("--tau", tau), delay)
+
+
+def _car(vehicle: str | QuarterCar) -> QuarterCar:
+    car = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
+    if not isinstance(car, QuarterCar):
+        raise RigtwinError(f"vehicle {car!r:.60}: expected a name, or a QuarterCar")
+    return car
+
+
+def rig_margin(vehicle: str | QuarterCar = "quarter-car") -> RigMargin:
+    """How stable a vehicle is on the rig as it runs, plain and with its plate's delay compensated.
+
+    Parameters
+    ----------
+    vehicle
+        By name, such as "truck", or its figures.
+
+    Raises
+    ------
+    RigtwinError
+        For an unknown name, or a figure that no pole can be worked out for.
+    """
+    return judge_margin(believable(_car(vehicle)))
 
 
 def reproduce(

@@ -71,12 +71,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     """Prints the poles and the critical lag and delay of every model of a vehicle."""
     from rigtwin.studies.stability.mapping import (
+        POINTS,
+        SPARSE,
         around,
         checked_ending,
         checked_model,
         draw,
         stability_map,
     )
+    from rigtwin.studies.stability.tested import AS_RUN
 
     found = rigtwin.stability(
         parsed.vehicle, changes=_numbers(parsed.set), tau=parsed.tau, delay=parsed.delay
@@ -99,7 +102,8 @@ def execute(parsed: argparse.Namespace) -> int:
             raise RigtwinError(
                 f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
             )
-    axes = [around(name, car, tau) for name in parsed.map or ()]
+    points = SPARSE if model in AS_RUN else POINTS
+    axes = [around(name, car, tau, points) for name in parsed.map or ()]
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
     print(_printed(found))
     at_rig = rigtwin.stability(car, tau=RIG_LAG).models["rig"]
@@ -108,6 +112,8 @@ def execute(parsed: argparse.Namespace) -> int:
         f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} "
         f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
     )
+    margin = rigtwin.rig_margin(car)
+    print(f"the rig as it runs: {_margin(margin)}")
     if parsed.map:
         draw(stability_map(model, car, tau, axes[0], axes[1]), out)
         print(f"drawn in {out}")
@@ -119,6 +125,7 @@ def execute(parsed: argparse.Namespace) -> int:
                 "tau": tau,
                 "models": {name: asdict(each) for name, each in found.models.items()},
                 "rig_at_10_ms": asdict(at_rig),
+                "as_run": asdict(margin),
             },
         )
     return 0
@@ -155,6 +162,14 @@ def _printed(found: Stability) -> str:
         ]
         lines.append((name, f"{_pole(model)} 1/s", "yes" if model.stable else "no", *times))
     return table(lines)
+
+
+def _margin(margin: rigtwin.RigMargin) -> str:
+    told = f"slowest motion {-margin.plain:+.2g} 1/s plain, "
+    told += f"{-margin.compensated:+.2g} 1/s with the plate's delay compensated"
+    if margin.bears is None:
+        return f"{told}, unstable with that too"
+    return f"{told}, stable with {1e3 * margin.bears:.2g} ms more delay than it is told of"
 
 
 def _time(time: float | None, frequency: float | None) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 from rigtwin.studies.stability.models import MODELS
+from rigtwin.studies.stability.tested import AS_RUN
 from rigtwin.studies.stability.vehicle import QuarterCar, validate
 
 LAG = "tau"
@@ -35,7 +36,16 @@ share."""
 SPAN = 10.0
 """A map reaches from the vehicle's own value over this to that times this."""
 POINTS = 60
+SPARSE = 24
+"""The same of a model of the whole sampled loop, whose poles take longer."""
+DRAWABLE = (*MODELS, *AS_RUN)
 KINDS = (".png", ".svg", ".pdf")
+
+
+TITLES = {
+    "sampled": "the rig as it runs, without compensation",
+    "compensated": "the rig as it runs, the plate's delay compensated",
+}
 
 
 class Axis(NamedTuple):
@@ -73,16 +83,23 @@ def around(name: str, car: QuarterCar, lag: float, points: int = POINTS) -> Axis
 
 
 def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axis) -> StabilityMap:
-    """The map of a model of `MODELS`, every lag of it `lag` s unless `tau` is an axis."""
+    """The map of a model of `MODELS`, every lag of it `lag` s unless `tau` is an axis, or of one of
+    `AS_RUN`, which has the rig's own lags."""
     checked_model(model)
+    if model in AS_RUN and LAG in (across.name, up.name):
+        expected = "expected parameters of the vehicle"
+        raise RigtwinError(f"a map of {model} over {LAG}: it has the rig's own lags; {expected}")
     if across.name == up.name:
         raise RigtwinError(
             f"a map over {across.name} and {up.name}: expected two different parameters",
         )
     rows = [_change((validate(car), lag), up.name, float(value)) for value in up.values]
     settings = [_change(row, across.name, float(value)) for row in rows for value in across.values]
-    dynamics = np.array([MODELS[model](*setting).A for setting in settings])
-    rightmost = np.linalg.eigvals(dynamics).real.max(axis=1)
+    if model in AS_RUN:
+        rightmost = np.array([-AS_RUN[model](each) for each, _ in settings])
+    else:
+        dynamics = np.array([MODELS[model](*setting).A for setting in settings])
+        rightmost = np.linalg.eigvals(dynamics).real.max(axis=1)
     rightmost = rightmost.reshape(len(up.values), len(across.values))
     critical = None
     if LAG in (across.name, up.name):
@@ -103,8 +120,8 @@ def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axi
 
 def checked_model(model: str) -> None:
     """Raises RigtwinError unless there is a model of that name."""
-    if model not in MODELS:
-        raise RigtwinError(f"unknown model {model!r}; there are {', '.join(MODELS)}")
+    if model not in DRAWABLE:
+        raise RigtwinError(f"unknown model {model!r}; there are {', '.join(DRAWABLE)}")
 
 
 def checked_ending(out: Path) -> None:
@@ -152,7 +169,9 @@ def draw(found: StabilityMap, out: Path) -> None:
             [],
             color="black",
             linewidth=1.5,
-            label=f"critical lag {1e3 * found.lag:g} ms",
+            label="limit of stability"
+            if found.model in AS_RUN
+            else f"critical lag {1e3 * found.lag:g} ms",
         )
     vehicle = found.car._asdict() | {LAG: found.lag}
     own = [vehicle[axis.name] for axis in (across, up)]
@@ -175,7 +194,7 @@ def draw(found: StabilityMap, out: Path) -> None:
         name = "lag τ" if axis.name == LAG else axis.name.replace("_", " ")
         label(f"{name}, {UNITS[axis.name]}")
     lag = "" if found.critical is not None else f", lags of {1e3 * found.lag:g} ms"
-    axes.set_title(f"stability of the {found.model} model{lag}", fontsize=11)
+    axes.set_title(TITLES.get(found.model, f"stability of the {found.model} model{lag}"))
     axes.legend(loc="upper right", fontsize=9)
     drawn = BytesIO()
     figure.savefig(drawn, dpi=120, format=out.suffix[1:].lower())
