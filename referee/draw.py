@@ -159,6 +159,10 @@ def _sensor(component: str, random: Random) -> list[Callable[[], Defect]]:
         value = _either(random, 2.0, 20.0) if cell else _either(random, 2e-4, 3e-3)
         return Defect("offset", component, value, 0.0, True, _to(component, zero=value))
 
+    def drift() -> Defect:
+        value = _either(random, 0.3, 3.0) if cell else _either(random, 3e-5, 3e-4)
+        return Defect("drift", component, value, 0.0, True, _to(component, drift=value))
+
     def lag() -> Defect:
         value = _log(random, 1e-3, 1e-2)
         return Defect("lag", component, value, 0.0, True, _to(component, lag=value))
@@ -179,7 +183,7 @@ def _sensor(component: str, random: Random) -> list[Callable[[], Defect]]:
         value = plain.bit * _log(random, 60.0, 400.0)
         return Defect("quantisation", component, value, plain.bit, True, _to(component, bit=value))
 
-    return [gain, offset, lag, delay, hum, noise, quantisation]
+    return [gain, offset, drift, lag, delay, hum, noise, quantisation]
 
 
 def _others(random: Random) -> list[Callable[[], Defect]]:
@@ -232,11 +236,7 @@ def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
         _log(random, 0.25, 0.8),
         _either(random, 0.15, 0.5),
     )
-    drag, bend, drift = (
-        _log(random, 150.0, 1500.0),
-        _either(random, 0.03, 0.15),
-        _either(random, 3e-5, 3e-4),
-    )
+    drag, bend = _log(random, 150.0, 1500.0), _either(random, 0.03, 0.15)
     slower, creep, pick = (
         _log(random, 0.04, 0.2),
         _either(random, 3e-5, 2e-4),
@@ -258,7 +258,6 @@ def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
         unnamed("heating", "motor", fading, _to("voltage", fading=3.0 * fading)),
         unnamed("quadratic drag", "rail", drag, _to("rail", drag=drag)),
         unnamed("bend", any_lvdt, bend, _to(any_lvdt, bend=bend)),
-        unnamed("drift", any_lvdt, drift, _to(any_lvdt, drift=drift)),
         unnamed(
             "slow valve",
             f"{any_cylinder}_cylinder",

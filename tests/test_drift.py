@@ -51,3 +51,20 @@ def test_a_drift_is_found_beside_friction():
 def test_without_drift_none_is_named():
     answer = rigtwin.diagnose(bench(0.0, 25.0), machine="damper-bench")
     assert {str(each.name) for each in answer.effects} == {"viscous@damper", "coulomb@damper"}
+
+
+@pytest.mark.parametrize(
+    ("sensor", "drift"),
+    [
+        ("structure_lvdt", 1e-4),
+        pytest.param("suspension_lvdt", -6e-5, marks=pytest.mark.slow),
+        pytest.param("ground_lvdt", 8e-5, marks=pytest.mark.slow),
+        pytest.param("load_cell", 1.0, marks=pytest.mark.slow),
+    ],
+)
+def test_a_drift_on_the_suspension_rig_is_no_offset(sensor: str, drift: float):
+    made = rigtwin.run("suspension-rig", "road10", seed=5, effects={f"drift@{sensor}": drift})
+    answer = rigtwin.diagnose(made)
+    assert [str(each.name) for each in answer.effects] == [f"drift@{sensor}"]
+    (value,) = answer.effects[0].parameters.values()
+    assert value.value == pytest.approx(drift, rel=0.05)

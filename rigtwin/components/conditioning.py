@@ -331,7 +331,11 @@ KINDS = (
         "drift",
         ("drift",),
         "zero that moves with time, each second",
-        _each(_drift, *DESCRIBED_SENSORS),
+        {
+            Lvdt: fixed_starts((-2e-4, -3e-5, 3e-5, 2e-4), 2e-6),
+            LoadCell: fixed_starts((-2.0, -0.3, 0.3, 2.0), 0.02),
+            **_each(_drift, *DESCRIBED_SENSORS),
+        },
     ),
     Kind(
         "hum",

@@ -31,6 +31,7 @@ class Lvdt(NamedTuple):
     resolution: Annotated[float, Quantity("m", 0.0, 0.01, "16 bit")] = 4.6e-6
     gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("m", -0.05, 0.05, "0: calibrated")] = 0.0
+    drift: Annotated[float, Quantity("m/s", -0.01, 0.01, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 0.1, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
 
@@ -45,6 +46,7 @@ class LoadCell(NamedTuple):
     resolution: Annotated[float, Quantity("N", 0.0, 100.0, "16 bit of ±2.5 kN")] = 0.076
     gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("N", -500.0, 500.0, "0: calibrated")] = 0.0
+    drift: Annotated[float, Quantity("N/s", -100.0, 100.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 0.1, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
 
@@ -88,8 +90,6 @@ class ForceSensor(NamedTuple):
     resolution: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
 
 
-DRIFTING = (PositionSensor, VelocitySensor, ForceSensor)
-"""Sensors whose zero may move with time."""
 DECLARED = (Lvdt, LoadCell)
 """Sensors whose noise, hum and bits are declared."""
 Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
@@ -129,7 +129,7 @@ class TransducerState(NamedTuple):
 
 
 def transducer(sensor: Sensor, period: float) -> Transducer:
-    drift = drift_of(sensor) * period
+    drift = sensor.drift * period
     own = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
     neutral = own == (1.0, 0.0, 0.0, 0.0, 0.0)
     share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
@@ -141,15 +141,11 @@ def start_transducer(sensor: Transducer) -> TransducerState:
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0]))
 
 
-def drift_of(sensor: Sensor) -> float:
-    """By how much a sensor's zero moves each second, in its unit."""
-    return sensor.drift if isinstance(sensor, DRIFTING) else 0.0
-
-
 def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
     """What a sensor reads, shape (ticks,), as if its zero had stayed where it was at the start."""
-    drift = drift_of(sensor)
-    return measured if drift == 0.0 else measured - drift * period * np.arange(len(measured))
+    if sensor.drift == 0.0:
+        return measured
+    return measured - sensor.drift * period * np.arange(len(measured))
 
 
 @compilable

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import drift_of
 from rigtwin.models.joint_start import FORGOTTEN, SHOWS, guess_place
 from rigtwin.models.start import ERRORS, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array
@@ -86,7 +85,7 @@ class CoupledStart:
                 places.append(each.along[None])
                 there.append(np.array([value - each.zero]))
                 rates.append(each.along[None])
-                speeds.append(np.array([(slope - drift_of(sensor)) / sensor.gain]))
+                speeds.append(np.array([(slope - sensor.drift) / sensor.gain]))
                 continue
             rates.append(CLOSELY * each.along[None])
             speeds.append(np.array([CLOSELY * value]))

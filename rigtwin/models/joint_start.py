@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.signal import detrend
 
-from rigtwin.components.sensors import Sensor, drift_of, remove_drift
+from rigtwin.components.sensors import Sensor, remove_drift
 from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.signals.noise import smallest_step, white_noise
@@ -75,7 +75,7 @@ class JointStart:
         value = (self._value - sensor.offset) / sensor.gain
         if self._row == 1:
             return 0.0, value
-        return value, (self._slope - drift_of(sensor)) / sensor.gain
+        return value, (self._slope - sensor.drift) / sensor.gain
 
     def judge(self, sensor: Sensor, move: Move, form: float, pushes: Array) -> None:
         """Find whether the error of a start as it is read shows, and for how long. form: the error
