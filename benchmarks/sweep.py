@@ -18,9 +18,12 @@ from pathlib import Path
 import numpy as np
 
 from experiments import EXPERIMENTS
+from machines import DEFAULT_MACHINE
 from rigtwin.console import table
+from rigtwin.description.catalogue import find
 from rigtwin.description.changes import override
 from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
+from rigtwin.studies.tuning.measures import MEASURES
 from rigtwin.studies.tuning.run import Run, run
 
 ROUNDS = 5
@@ -29,13 +32,15 @@ RUNS = 48
 TRIVIAL = 2000
 MANY, GENERATION = 10_000, 500
 EXPERIMENT = EXPERIMENTS["active"]
+MACHINE = str(find(DEFAULT_MACHINE).path)
+ASKED = (MEASURES["ride"], MEASURES["road_holding"])
 
 
 def asked(seconds: float, count: int, first: int = 0) -> Iterator[tuple[str, Run]]:
     """Runs that have not been made."""
     configuration = override(EXPERIMENT.configuration, {"timing": {"duration": seconds}})
     for seed in range(first, first + count):
-        one = Run(EXPERIMENT, configuration, seed, 0.0, ("ride", "road_holding"))
+        one = Run(MACHINE, EXPERIMENT, configuration, seed, 0.0, ASKED)
         yield one.key, one
 
 

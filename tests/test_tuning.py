@@ -24,6 +24,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml, load_posterior
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
+from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import Here
 from rigtwin.studies.tuning.bench import Bench, Score, quantile
@@ -94,6 +95,17 @@ def sine_test(amplitude: float, frequency: float, column: int) -> Trial:
     return rig_trial(Configuration(), commands, sensed)
 
 
+def rig_run(
+    test: Experiment,
+    configuration: Configuration,
+    seed: int,
+    first: float,
+    names: tuple[str, ...],
+) -> Run:
+    measures = tuple(MEASURES[name] for name in names)
+    return Run(str(find(DEFAULT_MACHINE).path), test, configuration, seed, first, measures)
+
+
 def figure(name: str, test: Trial) -> float:
     return MEASURES[name].of(test)
 
@@ -136,7 +148,7 @@ KINDS_OF_TEST = ("drop", "semi-active", "friction-road", "imposed")
 def test_every_measure_is_a_number_for_every_kind_of_test(name):
     short = {"timing": {"duration": 2.0, "timestep": 1e-3}}
     configuration = override(experiment(name).configuration, short)
-    found = run(Run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
+    found = run(rig_run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
     assert set(found) == {*MEASURES, LIMITS, TRIP}
     assert all(map(math.isfinite, found.values()))
     assert 0.0 < found[LIMITS] < 1.0
@@ -145,7 +157,7 @@ def test_every_measure_is_a_number_for_every_kind_of_test(name):
 def test_a_run_that_trips_has_no_measures():
     tight = {"timing": {"duration": 1.0}, "safety": {"force": 150.0}}
     configuration = override(Configuration(), tight)
-    found = run(Run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
+    found = run(rig_run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
     assert found[TRIP] != 0.0
     assert math.isnan(found["ride"])
     assert found[LIMITS] > 1.0
@@ -156,7 +168,7 @@ def test_errors_are_those_of_the_thesis_tables():
     from rigtwin.simulation.runner import record
 
     configuration = override(Configuration(), {"timing": {"duration": 3.0}})
-    found = run(Run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
+    found = run(rig_run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
@@ -223,7 +235,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         ({"constraints": {"travel": "low"}}, 'expected a number, "baseline"'),
         ({"constraints": {"travel": "-1 baseline"}}, 'expected a number, "baseline"'),
         ({"constraints": {"limits": 2}}, "expected a number from 0.01 to 1"),
-        ({"vary": {"controller.kp": 0.3}}, "component.parameter of the rig"),
+        ({"vary": {"controller.kp": 0.3}}, "component.parameter of the machine"),
         ({"vary": {"motor.coulomb": 3}}, "expected a number from 0 to 1"),
         ({"judge": {"odd": {"controller.kp": 0.3}}}, "changes of the machine alone"),
         ({"set": {"controller.kp": "x"}}, "controller.kp = x"),
