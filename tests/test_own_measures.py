@@ -11,7 +11,7 @@ import pytest
 import rigtwin
 from rigtwin.cli import main
 from rigtwin.description.catalogue import find
-from rigtwin.recording import load
+from rigtwin.recording import Recording, load
 from rigtwin.studies.tuning.measures import Trial
 from rigtwin.studies.tuning.own_measures import STATISTICS, list_channels, parse_measure
 from rigtwin.studies.tuning.study_file import parse_study
@@ -114,28 +114,25 @@ def test_a_rig_s_measures_are_not_another_machine_s() -> None:
         parse_study("s", tables, find("emps"))
 
 
+SETTINGS = {"timing": {"duration": 2.0, "timestep": 1e-3}, "guide": {"coulomb": 20.0}}
+
+
+def error(recording: Recording) -> np.ndarray:
+    off = recording.column("/command", "reference") - recording.column("/sensor", "position")
+    return off[500:]
+
+
 def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
     study, folder = tmp_path / "study.toml", tmp_path / "out"
     study.write_text(STUDY)
     assert main(["tune", str(study), "--out", str(folder), "--workers", "2"]) == 0
     told = capsys.readouterr().out
-    run = next(line for line in told.splitlines() if line.startswith("rigtwin run positioning"))
-    assert "emps.toml --config" in run
-    best = load(folder / "best.mcap")
-    again = rigtwin.run(
-        "emps", "positioning", settings=[*settings_of(study), folder / "tuned.toml"]
-    )
-    error = [
-        each.column("/command", "reference") - each.column("/sensor", "position")
-        for each in (best, again)
-    ]
-    before = rigtwin.run("emps", "positioning", settings=settings_of(study))
-    first = before.column("/command", "reference") - before.column("/sensor", "position")
-    assert max(np.std(each[500:]) for each in error) < 0.8 * np.std(first[500:])
-
-
-def settings_of(_study: Path) -> list[str]:
-    return ["timing.duration=2", "timing.timestep=1e-3", "guide.coulomb=20"]
+    line = next(line for line in told.splitlines() if line.startswith("rigtwin run positioning"))
+    assert "emps.toml --config" in line
+    before = rigtwin.run("emps", "positioning", settings=SETTINGS)
+    tuned = rigtwin.run("emps", "positioning", settings=[SETTINGS, folder / "tuned.toml"])
+    for each in (load(folder / "best.mcap"), tuned):
+        assert np.std(error(each)) < 0.8 * np.std(error(before))
 
 
 def test_a_limit_bounds_what_a_study_tries(tmp_path: Path) -> None:
