@@ -15,6 +15,7 @@ from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.faults.campaign import Fault, FaultResult, draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
 from rigtwin.hardware.faults.processes import try_process_fault
+from rigtwin.hardware.session.own_controller import Making, own_controller
 
 MOST = 1000
 
@@ -41,6 +42,7 @@ def faults(
     each: int = 11,
     processes: int = 4,
     card: str | Path = CARD,
+    controller: Making | None = None,
     progress: Callable[[str, int, int], object] = lambda *_: None,
 ) -> Campaign:
     """Puts faults into sessions on the virtual card, and sees whether each is stopped.
@@ -55,6 +57,9 @@ def faults(
         Sessions of each kind in one process, and of each kind that kills a process.
     card
         The channel table.
+    controller
+        A function of a test's configuration that makes one of your own instead of the rig's, in the
+        sessions that no process is killed in.
     progress
         Called with the kind that begins, the faults done and how many there are.
 
@@ -69,15 +74,19 @@ def faults(
     if each == processes == 0:
         raise RigtwinError("--each 0 --processes 0: no session to run; expected 1 or more of one")
     channels = load_table(Path(card))
+    own = None if controller is None else own_controller(controller)
     todo = _draw(seed, each, processes)
     results, undone, interrupted = list[FaultResult](), list[str](), False
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
         try:
             for number, fault in enumerate(todo):
                 progress(fault.kind.name, number, len(todo))
-                run = try_process_fault if fault.kind.place == "process" else try_fault
+                asked = fault, find(fault.experiment), channels, Path(folder)
                 try:
-                    results.append(run(fault, find(fault.experiment), channels, Path(folder)))
+                    if fault.kind.place == "process":
+                        results.append(try_process_fault(*asked))
+                    else:
+                        results.append(try_fault(*asked, own))
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:

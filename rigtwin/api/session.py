@@ -22,6 +22,7 @@ from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
 from rigtwin.hardware.session.dry_run import Peak, enter, predict_peaks
+from rigtwin.hardware.session.own_controller import Making, own_controller
 from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.hardware.session.record import (
@@ -84,6 +85,7 @@ def plan_test(
     settings: Settings = (),
     seed: int = 0,
     effects: Effects = (),
+    controller: Making | None = None,
 ) -> Test:
     """A test of the suspension rig, ready to be run under supervision.
 
@@ -99,6 +101,9 @@ def plan_test(
         Of the twin's noise, and of the road.
     effects
         What the twin has besides; the rig has its own.
+    controller
+        A function of the test's configuration that makes one of your own instead of the rig's, see
+        `run`; a new one for each session.
 
     Raises
     ------
@@ -109,7 +114,8 @@ def plan_test(
     configuration = with_changes(found.configuration, settings)
     demands = found.demands(configuration, seed)
     table = load_table(CARD if card is None else Path(card))
-    return Test(found.name, configuration, demands, seed, table, effect_texts(effects))
+    own = None if controller is None else own_controller(controller)
+    return Test(found.name, configuration, demands, seed, table, effect_texts(effects), own)
 
 
 def dry_run(
@@ -119,6 +125,7 @@ def dry_run(
     path: str | Path,
     settings: Settings = (),
     seed: int = 0,
+    controller: Making | None = None,
     effects: Effects = (),
     progress: Callable[[int], object] = lambda _: None,
     stop: Stop | None = None,
@@ -132,7 +139,7 @@ def dry_run(
 
     Parameters
     ----------
-    experiment, card, settings, seed, effects
+    experiment, card, settings, seed, controller, effects
         As of `run_on_card`; with any effects, or with the shipped table, nothing is noted.
     path
         Of the recording.
@@ -147,7 +154,14 @@ def dry_run(
     RigtwinError
         For what the session could not be run with on the rig either.
     """
-    test = plan_test(experiment, card=card, settings=settings, seed=seed, effects=effects)
+    test = plan_test(
+        experiment,
+        card=card,
+        settings=settings,
+        seed=seed,
+        effects=effects,
+        controller=controller,
+    )
     virtual, _ = open_virtual_card(test)
     with _stopped_by(stop, stop_file) as asked:
         ended = record_at_leisure(virtual, test, Path(path), asked, progress)
@@ -170,6 +184,7 @@ def run_on_twin(
     real_time: bool = False,
     settings: Settings = (),
     seed: int = 0,
+    controller: Making | None = None,
     effects: Effects = (),
     live: int = 0,
     progress: Callable[[int], object] = lambda _: None,
@@ -180,7 +195,7 @@ def run_on_twin(
 
     Parameters
     ----------
-    experiment, card, settings, seed, effects
+    experiment, card, settings, seed, controller, effects
         As of `plan_test`.
     path
         Of the recording.
@@ -199,7 +214,14 @@ def run_on_twin(
         Before anything is run.
     """
     _require_port(live)
-    test = plan_test(experiment, card=card, settings=settings, seed=seed, effects=effects)
+    test = plan_test(
+        experiment,
+        card=card,
+        settings=settings,
+        seed=seed,
+        effects=effects,
+        controller=controller,
+    )
     twin = WiredTwin(test.terminals(), test.table)
     with _stopped_by(stop, stop_file) as asked:
         if real_time:
@@ -221,6 +243,7 @@ def run_on_card(
     without_dry_run: str | None = None,
     settings: Settings = (),
     seed: int = 0,
+    controller: Making | None = None,
     live: int = 0,
     progress: Callable[[int], object] = lambda _: None,
     stop: Stop | None = None,
@@ -230,7 +253,7 @@ def run_on_card(
 
     Parameters
     ----------
-    experiment, settings, seed
+    experiment, settings, seed, controller
         As of `plan_test`.
     card
         The channel table that somebody answers for.
@@ -259,7 +282,7 @@ def run_on_card(
         If the test must not be run on the rig, before anything moves.
     """
     _require_port(live)
-    test = plan_test(experiment, card=card, settings=settings, seed=seed)
+    test = plan_test(experiment, card=card, settings=settings, seed=seed, controller=controller)
     permission = require_permission(test, Path(card), without_dry_run)
     if not arm(test):
         return None

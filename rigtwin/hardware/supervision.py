@@ -146,7 +146,7 @@ def supervise(
     lateness : Lateness, optional
         Is filled, if the rig runs in real time.
     updating : Update
-        The controller.
+        The controller. It is asked once before anything moves, and that answer is thrown away.
     progress : callable
         Called with the ticks done since its last call.
 

@@ -7,14 +7,13 @@ import resource
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from google.protobuf.message import Message
 
 from controllers import Commands, Controller, Demand, Measurements, State
-from controllers import update as healthy
 from rigtwin.description.changes import override
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
@@ -23,6 +22,7 @@ from rigtwin.hardware.daq.transport import InProcess
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, Response, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
 from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
+from rigtwin.hardware.session.own_controller import OwnController
 from rigtwin.hardware.session.record import Test, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.supervision import ARMED, LOOKING, SETTLING, Update
@@ -185,7 +185,11 @@ class _GlitchingCard(VirtualCard):
 
 
 def try_fault(
-    fault: Fault, experiment: Experiment, table: ChannelTable, folder: Path
+    fault: Fault,
+    experiment: Experiment,
+    table: ChannelTable,
+    folder: Path,
+    own: OwnController | None = None,
 ) -> FaultResult:
     """Runs a session with one fault in this process.
 
@@ -199,6 +203,8 @@ def try_fault(
         Of the virtual card.
     folder : Path
         Where the recording goes.
+    own : OwnController, optional
+        One's own instead of the rig's.
 
     Returns
     -------
@@ -212,7 +218,7 @@ def try_fault(
     KeyboardInterrupt
         If an operator ended it who is none of the fault.
     """
-    test = plan_test(fault, experiment, table)
+    test = replace(plan_test(fault, experiment, table), own=own)
     period, name = test.configuration.timing.period, fault.kind.name
     bench = FaultyBench(
         test.terminals(),
@@ -252,7 +258,9 @@ def try_fault(
                 bench.shown = virtual.tick
 
         fails = fault.kind.place in ("controller", "loop")
-        updating = _make_failing_update(fault, virtual) if fails else healthy
+        updating = test.updating()
+        if fails:
+            updating = _make_failing_update(fault, virtual, updating)
         try:
             record_at_leisure(card, test, path, stop, show_full_disk, updating)
         except RigtwinError:
@@ -264,7 +272,7 @@ def try_fault(
     return judge(fault, test, bench, path)
 
 
-def _make_failing_update(fault: Fault, card: VirtualCard) -> Update:
+def _make_failing_update(fault: Fault, card: VirtualCard, healthy: Update) -> Update:
     """Makes a controller, or the loop around it, fail in its time.
 
     Before the test at its first tick.

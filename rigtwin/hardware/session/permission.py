@@ -24,7 +24,8 @@ class Permission:
 
 def key_of(test: Test) -> str:
     """By which a dry run of just this session is known."""
-    return digest(test.experiment, test.configuration, test.demands, test.table)
+    told = test.experiment if test.own is None else f"{test.experiment} by {test.own.told}"
+    return digest(told, test.configuration, test.demands, test.table)
 
 
 def require_permission(test: Test, card: Path, without_dry_run: str | None) -> Permission:

@@ -10,11 +10,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from controllers import update
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.effects import apply_effects
+from rigtwin.description.machine import OWN
 from rigtwin.hardware.daq.card import Card, connect, require_client
 from rigtwin.hardware.daq.table import ChannelTable, require_ranges, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
@@ -22,6 +24,7 @@ from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard, Wired
 from rigtwin.hardware.realtime import Lateness, Pacer, describe_grants, in_real_time
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.guardian_settings import GuardianSettings
+from rigtwin.hardware.session.own_controller import OwnController, OwnUpdate
 from rigtwin.hardware.session.recorder import Keeper
 from rigtwin.hardware.supervision import SessionEnd, Update, supervise
 from rigtwin.numerics.arrays import Array
@@ -51,6 +54,8 @@ class Test:
         Of the card.
     effects : sequence of str
         Of the twin, as `--effect` takes them; none on a real rig.
+    own : OwnController, optional
+        One's own instead of the rig's.
     """
 
     __test__ = False  # not one of pytest's
@@ -61,6 +66,19 @@ class Test:
     seed: int
     table: ChannelTable
     effects: Sequence[str] = ()
+    own: OwnController | None = None
+
+    @property
+    def controller_settings(self) -> dict[str, Any]:
+        """What a recording says of the controller: of one's own only where the test started."""
+        told: dict[str, Any] = flatten(self.configuration)["controller"]
+        if self.own is None:
+            return told
+        return {OWN: True, **{name: told[name] for name in ("start", "preload")}}
+
+    def updating(self) -> Update:
+        """The controller of one session."""
+        return update if self.own is None else OwnUpdate(self.own, self.configuration)
 
     @property
     def card_configuration(self) -> Configuration:
@@ -128,7 +146,7 @@ def _writer_of(path: Path, test: Test) -> Callable[[], Writer]:
         path,
         test.experiment,
         test.configuration.timing.period,
-        controller=flatten(test.configuration)["controller"],
+        controller=test.controller_settings,
     )
 
 
@@ -138,7 +156,7 @@ def record_at_leisure(
     path: Path,
     stop: Callable[[], str | None] = lambda: None,
     progress: Callable[[int], object] = lambda _: None,
-    updating: Update = update,
+    updating: Update | None = None,
 ) -> SessionEnd:
     """Records on a twin whose time waits for the loop, as fast as it goes.
 
@@ -154,8 +172,8 @@ def record_at_leisure(
         Called in every tick; a text stops the session and is its reason.
     progress : callable
         Called with the ticks done since its last call.
-    updating : Update
-        The controller.
+    updating : Update, optional
+        The controller; the test's by default.
 
     Returns
     -------
@@ -167,7 +185,7 @@ def record_at_leisure(
     RigtwinError
         Before anything is recorded.
     """
-    limited = test.card_configuration
+    limited, updating = test.card_configuration, updating or test.updating()
     with _writer_of(path, test)() as writer:
         writer.reserve()
         for name, values in metadata(test, virtual=True).items():
@@ -273,7 +291,14 @@ def record_in_real_time(
         grants = stack.enter_context(in_real_time(fifo))
         try:
             ended = supervise(
-                rig, limited, test.demands, guardian, stop, lateness, progress=progress
+                rig,
+                limited,
+                test.demands,
+                guardian,
+                stop,
+                lateness,
+                updating=test.updating(),
+                progress=progress,
             )
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
