@@ -13,7 +13,7 @@ from controllers.mil import controller, initial_state, update
 from controllers.settings import Settings
 from controllers.signals import Commands, Demand, Measurements
 
-FADE = 0.1
+FADE = 0.01
 """s over which the compensation sets in: a plate that is read with hum is not where the law starts,
 and would be answered by a jump of the command."""
 
