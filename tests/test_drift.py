@@ -57,11 +57,12 @@ def test_without_drift_none_is_named():
     ("sensor", "drift"),
     [
         ("structure_lvdt", 1e-4),
-        pytest.param("suspension_lvdt", -6e-5, marks=pytest.mark.slow),
-        pytest.param("ground_lvdt", 8e-5, marks=pytest.mark.slow),
-        pytest.param("load_cell", 1.0, marks=pytest.mark.slow),
+        ("suspension_lvdt", -6e-5),
+        ("ground_lvdt", 8e-5),
+        ("load_cell", 1.0),
     ],
 )
+@pytest.mark.slow
 def test_a_drift_on_the_suspension_rig_is_no_offset(sensor: str, drift: float):
     made = rigtwin.run("suspension-rig", "road10", seed=5, effects={f"drift@{sensor}": drift})
     answer = rigtwin.diagnose(made)

@@ -21,7 +21,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.generic_client import GenericClientServer
 from rigtwin.simulation.slow_model import LateModel, SlowModel
 
-PERIOD, STEP, SECONDS = 1e-3, 10, 2.0
+PERIOD, STEP, SECONDS = 1e-3, 10, 1.2
 SHORT = {"timing": {"duration": SECONDS}}
 NOMINAL = find("drop").configuration.controller
 
@@ -125,7 +125,7 @@ def test_a_body_in_another_program_drops_as_it_should(own: rigtwin.Recording) ->
         made = drop(model)
     assert made.end == "completed"
     assert model.late == 0
-    assert len(client.places) > 195
+    assert len(client.places) > 115
     # The plate is at each target when its force is taken.
     there = made["/command.structure"][STEP - 1 :: STEP][: len(client.places)] - NOMINAL.start
     assert there == pytest.approx(client.places[: len(there)], abs=1e-9)
@@ -187,7 +187,7 @@ def test_a_model_that_stops_ends_the_test_and_the_recording_can_be_read(tmp_path
             )
     kept = rigtwin.load(out)
     assert kept.ticks >= 200
-    assert "completed" not in kept.end
+    assert "LateModel" in kept.end
 
 
 @pytest.mark.parametrize(

@@ -151,16 +151,21 @@ def run(
             rows: list[tuple[Commands, Measurements]] = []
             truth: list[Measurements] = []
             trip, column = Trip.NONE, 0
+            failure: Exception | None = None
             for demand in demands[first : first + BLOCK]:
                 measured = rig.read()
-                if isinstance(rig, Twin):
-                    truth.append(rig.truth)
                 if isinstance(rig, Twin) and rig.misses(1)[0]:
                     commands = rig.held
                 else:
-                    commands = tick(measured, Demand(*demand.tolist()))
-                    if own:
-                        commands = check_commands(commands)
+                    try:
+                        commands = tick(measured, Demand(*demand.tolist()))
+                        commands = check_commands(commands) if own else commands
+                    except Exception as error:
+                        # What was recorded before is handed on first.
+                        failure = error
+                        break
+                if isinstance(rig, Twin):
+                    truth.append(rig.truth)
                 rows.append((commands, measured))
                 number, column = judge_limits(
                     configuration.safety,
@@ -173,14 +178,17 @@ def run(
                 if trip != Trip.NONE:
                     break
                 rig.write(commands)
-            yield Block(
-                first,
-                np.array([commands for commands, _ in rows]),
-                np.array([measured for _, measured in rows]),
-                np.array(truth) if truth else None,
-                trip,
-                column,
-            )
+            if rows:
+                yield Block(
+                    first,
+                    np.array([commands for commands, _ in rows]),
+                    np.array([measured for _, measured in rows]),
+                    np.array(truth) if truth else None,
+                    trip,
+                    column,
+                )
+            if failure is not None:
+                raise failure
             if trip != Trip.NONE:
                 return
     finally:
