@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
@@ -111,7 +112,9 @@ def step(configuration: rigtwin.Configuration, seed: int) -> dict[str, np.ndarra
 
 def test_a_pole_is_kept_upright_as_the_linear_loop_has_it(tmp_path: Path) -> None:
     made = rigtwin.run(machine(tmp_path), step, controller=lqr)
-    ahead, push, *_ = cont2discrete((STATES, INPUT, np.eye(4), np.zeros((4, 1))), PERIOD)
+    system: Any = (STATES, INPUT, np.eye(4), np.zeros((4, 1)))
+    sampled: Any = cont2discrete(system, PERIOD)
+    ahead, push = sampled[:2]
     state, expected = np.zeros(4), np.zeros((4, TICKS))
     for tick in range(TICKS):
         expected[:, tick] = state

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,13 +43,13 @@ def compensated(configuration: Configuration) -> Compensated | Same:
     return Compensated(configuration.controller, period, law)
 
 
-def on_twin(path: Path, **options: object) -> rigtwin.Recording:
+def on_twin(path: Path, **options: Any) -> rigtwin.Recording:
     ended = rigtwin.run_on_twin("drop", path=path, settings=SHORT, seed=2, **options)
     assert ended.completed, ended.cause
     return rigtwin.load(path)
 
 
-def on_card(path: Path, **options: object) -> rigtwin.Recording:
+def on_card(path: Path, **options: Any) -> rigtwin.Recording:
     from rigtwin.hardware.daq import CARD
 
     ran = rigtwin.dry_run("drop", CARD, path=path, settings=SHORT, seed=2, **options)
@@ -74,7 +75,7 @@ def test_a_compensator_commands_on_the_card_what_it_does_on_the_twin(tmp_path: P
 
 
 def test_what_it_gives_is_looked_at(tmp_path: Path) -> None:
-    def broken(_: Configuration):
+    def broken(_: Configuration) -> Any:
         return lambda measured, demand: (0.0, 0.0, 0.0)
 
     ended = rigtwin.run_on_twin(

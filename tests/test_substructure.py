@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numba
 import numpy as np
@@ -37,7 +38,7 @@ class PointMass:
         return self.place
 
 
-def drop(model: object) -> rigtwin.Recording:
+def drop(model: Any) -> rigtwin.Recording:
     controller = Substructured(NOMINAL, PERIOD, model)
     return rigtwin.run("suspension-rig", "drop", seed=1, settings=SHORT, controller=controller)
 
