@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shutil
 import tomllib
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -35,22 +36,43 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """
     data = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
-        target = path.resolve()
-        if target.exists() and not target.is_file():
-            target.write_bytes(data)
-            return
-        beside = target.with_name(f"{target.name[:LONGEST]}.{uuid4().hex[:8]}.part")
-        try:
+        with written_whole(path) as beside:
             beside.write_bytes(data)
-            if target.exists():
-                shutil.copymode(target, beside)
-            beside.replace(target)
-        except BaseException:
-            with suppress(OSError):
-                beside.unlink()
-            raise
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """A file beside another, whose place it takes once it is written; it goes if that fails.
+
+    Parameters
+    ----------
+    path
+        Where to. What is no plain file, such as /dev/stdout, is given itself.
+
+    Yields
+    ------
+    Path
+        Where to write.
+    """
+    target = path.resolve()
+    if target.exists() and not target.is_file():
+        yield target
+        return
+    beside = target.with_name(f"{target.name[:LONGEST]}.{uuid4().hex[:8]}.part")
+    try:
+        yield beside
+        if target.exists():
+            shutil.copymode(target, beside)
+        beside.replace(target)
+    except BaseException as error:
+        with suppress(OSError):
+            beside.unlink()
+        if isinstance(error, RigtwinError):
+            # The operator knows the file by its name.
+            raise RigtwinError(str(error).replace(str(beside), str(path))) from None
+        raise
 
 
 def keep_apart(out: str | Path, *inputs: Path) -> Path:

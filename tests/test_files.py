@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -187,3 +188,27 @@ def test_a_recording_needs_a_file_before_the_test_runs(tmp_path, capsys, monkeyp
     assert main(["run", "drop", "--out", path]) == 1
     said = capsys.readouterr().err
     assert said == f"rigtwin: cannot record to {path}: it is no file but a device or a pipe\n"
+
+
+def test_an_import_onto_a_full_disk_leaves_nothing_that_is_cut(tmp_path):
+    rows = "\n".join(f"{0.001 * n:.3f},{(n * 7919) % 1000 / 997:.9f}" for n in range(30_000))
+    (tmp_path / "log.csv").write_text(f"t,x\n{rows}\n")
+    (tmp_path / "map.toml").write_text(
+        'machine = "emps"\ntime = { column = "t" }\n'
+        '[channels]\n"/sensor.position" = { column = "x" }\n'
+    )
+    out = tmp_path / "log.mcap"
+    out.write_bytes(b"before")
+    program = (
+        "import resource, sys; from rigtwin.cli import main; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)); "
+        "sys.exit(main(['import', 'log.csv', '--map', 'map.toml', '-o', 'log.mcap']))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1
+    assert "cannot write log.mcap" in ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert out.read_bytes() == b"before"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["log.csv", "log.mcap", "map.toml"]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, recordable
+from rigtwin.files import keep_apart, recordable, written_whole
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
@@ -241,7 +241,12 @@ def _write(out: Path, wanted: Map, period: float, channels: Channels) -> None:
         fields.setdefault(topic, []).append(name)
     ticks = len(next(iter(channels.values())))
     names = {topic: tuple(each) for topic, each in fields.items()}
-    with Writer(out, wanted.experiment, period, wanted.controller, wanted.machine, names) as writer:
+    with (
+        written_whole(out) as beside,
+        Writer(
+            beside, wanted.experiment, period, wanted.controller, wanted.machine, names
+        ) as writer,
+    ):
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {
