@@ -337,7 +337,7 @@ def test_a_table_of_the_thesis_beside_ours(tmp_path):
 
 def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
     for check in (rigtwin.blindcheck, rigtwin.blindcheck_machines):
-        with pytest.raises(rigtwin.RigtwinError, match="at least 1"):
+        with pytest.raises(rigtwin.RigtwinError, match="expected 1 or more"):
             check(0, folder=tmp_path)
     with pytest.raises(rigtwin.RigtwinError, match="0 to 1000"):
         rigtwin.faults(each=2000)

@@ -130,7 +130,7 @@ def test_what_is_better_is_counted_by_its_interval():
     ("arguments", "says"),
     [
         (["--tune", "nothing"], "unknown study"),
-        (["--tune", "compensator", "--cases", "0"], "--cases must be at least 1"),
+        (["--tune", "compensator", "--cases", "0"], "cases: expected 1 or more"),
         (["--workers", "0"], "expected 1 to 1024"),
     ],
 )

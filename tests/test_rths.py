@@ -120,7 +120,7 @@ def test_without_compensation_the_building_is_not_followed_and_with_it_on_every_
 
 def test_what_does_not_exist_is_said_in_one_line(capsys):
     for wrong, said in (
-        (["--case", "5"], "--case 5: expected 1, 2, 3, 4"),
+        (["--case", "5"], "case 5: expected 1, 2, 3, 4"),
         (["--quake", "lisbon"], ", ".join(QUAKES)),
         (["--compensator", "hope"], ", ".join(COMPENSATORS)),
         (["--plants", "0"], "--plants 0"),

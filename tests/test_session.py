@@ -184,7 +184,7 @@ def test_another_setting_is_another_session(tmp_path):
             "safety.stuck = 2",
         ),
         (["--card", "CARD", "--out", "CARD"], "is the input; name another output"),
-        (["--real-time", "--live", "70000"], "--live 70000: expected a port"),
+        (["--real-time", "--live", "70000"], "live 70000: expected a port"),
     ],
 )
 def test_mistakes_are_said_before_anything_moves(

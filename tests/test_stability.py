@@ -432,7 +432,7 @@ class TestCommand:
             (["--set", "mass=3"], "unknown parameter 'mass' of a vehicle"),
             (["--set", "sprung_mass=heavy"], "--set sprung_mass=heavy: expected a number"),
             (["--set", "sprung_mass=-3"], "sprung_mass -3: expected 0.001 to"),
-            (["--tau", "0"], "--tau 0: expected 1e-09 to"),
+            (["--tau", "0"], "tau 0: expected 1e-09 to"),
             (["-o", "x.png"], "expected --map X Y"),
             (["--model", "suspension"], "expected --map X Y"),
             (["--map", "tau", "sprung_mass", "-o", "x.doc"], "cannot draw 'x.doc'"),

@@ -73,7 +73,7 @@ class Sampled(NamedTuple):
 def find_case(number: int) -> Case:
     """The benchmark's case of that number. Raises RigtwinError with what there is."""
     if number not in CASES:
-        raise RigtwinError(f"--case {number}: expected {', '.join(map(str, CASES))}")
+        raise RigtwinError(f"case {number}: expected {', '.join(map(str, CASES))}")
     return CASES[number]
 
 

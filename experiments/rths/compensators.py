@@ -82,5 +82,5 @@ COMPENSATORS: Mapping[str, Callable[[], Law]] = {
 def find_compensator(name: str) -> Law:
     """The compensator of that name. Raises RigtwinError with what there is."""
     if name not in COMPENSATORS:
-        raise RigtwinError(f"--compensator {name}: expected {', '.join(COMPENSATORS)}")
+        raise RigtwinError(f"compensator {name}: expected {', '.join(COMPENSATORS)}")
     return COMPENSATORS[name]()

@@ -25,7 +25,7 @@ def ground_motion(quake: str) -> Array:
     Raises RigtwinError with what there is.
     """
     if quake not in QUAKES:
-        raise RigtwinError(f"--quake {quake}: expected {', '.join(QUAKES)}")
+        raise RigtwinError(f"quake {quake}: expected {', '.join(QUAKES)}")
     name = QUAKES[quake]
     with as_file(files("experiments.rths") / "earthquakes" / f"{name}NoScaling.mat") as path:
         time, acceleration = loadmat(path)[name]

@@ -92,7 +92,7 @@ def serve_card(
     from rigtwin.hardware.daq.transport import LOCAL, serve
 
     if seed < 0 or not 0 <= port <= PORTS:
-        raise RigtwinError(f"--seed: expected 0 or more; --port: 0 to {PORTS}")
+        raise RigtwinError(f"seed: expected 0 or more; port: 0 to {PORTS}")
     table = load_table(Path(card))
     configuration = with_changes(Configuration(), settings)
     actual = apply_effects(configuration, effect_texts(effects))
@@ -196,20 +196,20 @@ def check_card(
     """
     table = load_table(Path(card))
     if not operator.strip():
-        raise RigtwinError("--operator is empty: expected who calibrates")
+        raise RigtwinError("operator is empty: expected who calibrates")
     given, reads, known = dict(references or {}), dict(spans or {}), dict(directions or {})
-    _require_values(given, "--reference", table)
-    _require_values(reads, "--span", table)
+    _require_values(given, "reference", table)
+    _require_values(reads, "span", table)
     if not LEAST_STROKE <= stroke <= MOST_STROKE:
-        raise RigtwinError(f"--stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
+        raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
     for name, sign in known.items():
         if name not in OUTPUTS or sign not in (1, -1):
             raise RigtwinError(
-                f"--moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
+                f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
             )
     require_ranges(table, Configuration().safety)
     if not (signs or zero or reads):
-        raise RigtwinError("nothing to do: --zero, --span NAME=VALUE or --signs")
+        raise RigtwinError("nothing to do: zero, span NAME=VALUE or signs")
     wiring = None if virtual is None else load_table(Path(virtual))
 
     def find_direction(output: str) -> int:

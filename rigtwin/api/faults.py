@@ -70,9 +70,9 @@ def faults(
     """
     require_client()
     if seed < 0 or not 0 <= each <= MOST or not 0 <= processes <= MOST:
-        raise RigtwinError(f"--seed: expected 0 or more; --each and --processes: 0 to {MOST}")
+        raise RigtwinError(f"seed: expected 0 or more; each and processes: 0 to {MOST}")
     if each == processes == 0:
-        raise RigtwinError("--each 0 --processes 0: no session to run; expected 1 or more of one")
+        raise RigtwinError("each 0, processes 0: no session to run; expected 1 or more of one")
     channels = load_table(Path(card))
     own = None if controller is None else own_controller(controller)
     todo = _draw(seed, each, processes)

@@ -382,7 +382,7 @@ def _alone(folder: Path) -> Iterator[None]:
         raise RigtwinError(f"cannot write {folder / LOCK}: {error.strerror}") from None
     except RigtwinError:
         raise RigtwinError(
-            f"another session is running into {folder}; wait for it, or name another --folder"
+            f"another session is running into {folder}; wait for it, or name another folder"
         ) from None
     with held:
         yield
@@ -402,7 +402,7 @@ def _run_tests(
     taken = [test.name for test in todo if paths[test.name].exists()]
     if taken and not resume:
         raise RigtwinError(
-            f"{folder} holds {taken[0]}.mcap already; --resume goes on, or name another --folder"
+            f"{folder} holds {taken[0]}.mcap already; resume it, or name another folder"
         )
     # Every mistake is found before the first test moves anything.
     for test in todo:
@@ -419,7 +419,7 @@ def _run_tests(
         if aside is not None:
             told(f"what was there before is in {aside}")
         if not completed:
-            told(f"{test.name} did not complete; see {path}, then --resume")
+            told(f"{test.name} did not complete; see {path}, then resume")
             return False
     return True
 
@@ -430,4 +430,4 @@ def _result(path: Path, ended: SessionEnd) -> SessionResult:
 
 def _require_port(live: int) -> None:
     if not 0 <= live <= PORTS:
-        raise RigtwinError(f"--live {live}: expected a port up to {PORTS}")
+        raise RigtwinError(f"live {live}: expected a port up to {PORTS}")

@@ -111,7 +111,7 @@ def tune(
         For a mistake in the study, or if no candidate meets its constraints.
     """
     if seed < 0:
-        raise RigtwinError(f"--seed {seed}: expected 0 or more")
+        raise RigtwinError(f"seed {seed}: expected 0 or more")
     of = None if machine is None else the_machine(machine)
     found = find_study(
         study, settings, machine=of, roads=roads, held_out=held_out, evaluations=evaluations
@@ -169,7 +169,7 @@ def stability(
             known = ", ".join(QuarterCar._fields)
             raise RigtwinError(f"unknown parameter {name!r} of a vehicle; there are {known}")
     car = believable(car._replace(**(changes or {})))
-    return judge(car, checked_time("--tau", tau), delay)
+    return judge(car, checked_time("tau", tau), delay)
 
 
 def _car(vehicle: str | QuarterCar) -> QuarterCar:
@@ -269,9 +269,7 @@ def rths(
     if not isinstance(noise, Noise):
         raise RigtwinError(f"noise {noise!r:.60}: expected a Noise of position and force, V")
     if not whole or not 1 <= plants <= MOST_PLANTS or seed < 0:
-        raise RigtwinError(
-            f"--plants {plants} --seed {seed}: expected 1 to {MOST_PLANTS}, 0 or more"
-        )
+        raise RigtwinError(f"plants {plants}, seed {seed}: expected 1 to {MOST_PLANTS}, 0 or more")
     ground = ground_motion(quake)
     return [
         run_test(building, ground, law, plant, noise, seed) for plant in draw_plants(plants, seed)
@@ -359,7 +357,7 @@ def blindcheck_machines(
 
 def _check_draw(cases: int, seed: int) -> None:
     if cases < 1 or seed < 0:
-        raise RigtwinError("--cases must be at least 1, --seed at least 0")
+        raise RigtwinError("cases: expected 1 or more; seed: 0 or more")
 
 
 def _counting(progress: Progress, total: int) -> Callable[[int], None]:

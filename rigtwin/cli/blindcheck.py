@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     """Runs the check that was asked for and prints its score."""
     if (parsed.cases is not None and parsed.cases < 1) or parsed.seed < 0:
-        raise RigtwinError("--cases must be at least 1, --seed at least 0")
+        raise RigtwinError("cases: expected 1 or more; seed: 0 or more")
     for out in (parsed.json, parsed.draw):
         if out is not None:
             writable(out)

@@ -106,14 +106,14 @@ def open_workers(workers: int | None = None, cluster: str | None = None) -> Work
     """
     if cluster is not None:
         if workers is not None:
-            given = f"--workers {workers} --cluster {cluster}"
+            given = f"workers {workers}, cluster {cluster}"
             raise RigtwinError(f"{given}: expected one of them; a cluster brings its own workers")
         from rigtwin.studies.sweep.cluster import Cluster
 
         return Cluster(cluster)
     count = (os.cpu_count() or 1) if workers is None else workers
     if not 1 <= count <= MOST_WORKERS:
-        raise RigtwinError(f"--workers {count}: expected 1 to {MOST_WORKERS}")
+        raise RigtwinError(f"workers {count}: expected 1 to {MOST_WORKERS}")
     if count == 1:
         return Here()
     from rigtwin.studies.sweep.processes import Processes
