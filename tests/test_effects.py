@@ -59,7 +59,7 @@ def nominal() -> np.ndarray:
 def test_the_list_is_that_of_the_design():
     slides = {"coulomb", "viscous", "stribeck", "asymmetry", "backlash"}
     actuators = {"gain", "lag", "delay", "saturation", "deadband", "rate_limit"}
-    sensors = {"gain", "offset", "lag", "delay", "hum", "noise", "quantisation"}
+    sensors = {"gain", "offset", "drift", "lag", "delay", "hum", "noise", "quantisation"}
     expected = {
         "rail": slides,
         "carriage": {"mass"},

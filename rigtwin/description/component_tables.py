@@ -51,7 +51,7 @@ MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
 """What is measured → its unit where the joint slides, and where it turns."""
-TAKEN = ("computer", "mains", "controller", "safety", "timing", "road")
+TAKEN = ("computer", "mains", "controller", "safety", "timing")
 """Names of other groups of settings."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")

@@ -39,6 +39,8 @@ NOTICEABLE = {
     "backlash@cylinder": "0.002",
     "gain@lvdt": "1.05",
     "offset@lvdt": "0.001",
+    "drift@lvdt": "0.0005",
+    "drift@load_cell": "5",
     "lag@lvdt": "0.01",
     "delay@lvdt": "0.01",
     "hum@lvdt": "0.001",
