@@ -120,7 +120,7 @@ def bad(tmp_path: Path) -> dict[str, tuple[list[str], str]]:
         "two and set": (["compare", str(RIG), str(RIG), "--set", "rail.coulomb=3"], "without one"),
         "study": (["reproduce", "table-9.9"], "there are chapters 3, 4, 5, 6, 7, A, B"),
         "seeds": (["reproduce", "table-3.5", "--seeds", "0"], "--seeds 0"),
-        "workers": (["reproduce", "table-3.5", "--workers", "0"], "--workers 0"),
+        "workers": (["reproduce", "table-3.5", "--workers", "0"], "workers 0"),
         "nothing to compute": (["reproduce", "table-2.1"], "nothing of it is of the rig"),
         "map": (["stability", "--map", "tau", "tau"], "two different parameters"),
         "page": (

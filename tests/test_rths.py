@@ -123,7 +123,7 @@ def test_what_does_not_exist_is_said_in_one_line(capsys):
         (["--case", "5"], "case 5: expected 1, 2, 3, 4"),
         (["--quake", "lisbon"], ", ".join(QUAKES)),
         (["--compensator", "hope"], ", ".join(COMPENSATORS)),
-        (["--plants", "0"], "--plants 0"),
+        (["--plants", "0"], "plants 0"),
     ):
         assert main(["rths", *wrong]) != 0
         error = capsys.readouterr().err
