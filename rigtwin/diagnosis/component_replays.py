@@ -12,7 +12,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import Lvdt, apply_sensor, undo_sensor
+from rigtwin.components.sensors import Lvdt, apply_sensor, remove_drift, undo_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.component import (
@@ -71,6 +71,11 @@ class ComponentReplays:
 
     def _clean(self, signal: Array) -> Array:
         return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
+
+    def _without_zero(self, name: str) -> Array:
+        """What a sensor measured, its mains line, offset and drift taken away."""
+        sensor = getattr(self.configuration.plant, name)
+        return remove_drift(sensor, self._clean(self._sensor(name)), self.period) - sensor.offset
 
     def _apply_sensor(self, name: str, true: Array) -> Array:
         """What the twin's sensor of that name makes of a true signal."""
@@ -141,9 +146,7 @@ class ComponentReplays:
     @cached_property
     def carriage_output(self) -> Array:
         sensor = self.configuration.plant.load_cell
-        force = undo_sensor(
-            sensor, self._clean(self._sensor("load_cell")) - sensor.offset, self.period
-        )
+        force = undo_sensor(sensor, self._without_zero("load_cell"), self.period)
         return replay_carriage(
             self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload
         )
@@ -154,9 +157,7 @@ class ComponentReplays:
         if spring.force == 0.0:
             return np.zeros(self.recording.ticks)
         sensor = self.configuration.plant.suspension_lvdt
-        travel = undo_sensor(
-            sensor, self._clean(self._sensor("suspension_lvdt")) - sensor.offset, self.period
-        )
+        travel = undo_sensor(sensor, self._without_zero("suspension_lvdt"), self.period)
         return np.array([spring_force(spring, -stroke) for stroke in travel.tolist()])
 
     @cached_property
