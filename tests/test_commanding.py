@@ -147,6 +147,26 @@ def test_a_controller_that_gives_no_number_is_told_so(tmp_path: Path) -> None:
         rigtwin.run(machine(tmp_path), step, controller=lambda *_: {"push": 1.0})
 
 
+def test_where_nothing_can_be_commanded_it_is_said(tmp_path: Path) -> None:
+    nothing = "a controller has nothing to command in this test"
+    with pytest.raises(rigtwin.RigtwinError, match=nothing):
+        rigtwin.run("tx40", step, controller=lambda *_: 0.0)
+    with pytest.raises(rigtwin.RigtwinError, match=nothing):
+        rigtwin.run(machine(tmp_path), lambda *_: {"force": np.zeros(10)}, controller=lqr)
+    (tmp_path / "upright.xml").write_text(
+        MODEL.replace('<motor name="drive" joint="rail"/>', '<position name="drive" joint="rail"/>')
+    )
+    led = TABLES.replace('free = ["rail", "pivot"]', 'free = ["pivot"]') + by_formula()
+    (tmp_path / "led.toml").write_text(led)
+    with pytest.raises(rigtwin.RigtwinError, match="takes the demand .reference.; there are force"):
+        rigtwin.run(tmp_path / "led.toml", step)
+
+
+def test_one_s_own_needs_no_demands_of_the_described_one(tmp_path: Path) -> None:
+    of = machine(tmp_path, by_formula())
+    assert rigtwin.run(of, lambda *_: {}, controller=lambda *_: 0.0).end == "completed"
+
+
 LIMITS = "[limits]\nplace = [-0.1, 0.004]\nangle = 0.5\n"
 
 
@@ -166,6 +186,12 @@ def test_what_falls_meets_a_limit_before_it_runs_away(tmp_path: Path) -> None:
     wider = {"safety": {"angle_low": -50.0}}
     fall = rigtwin.run(of, lambda *_: {"force": np.full(TICKS, -0.5)}, settings=wider)
     assert fall.end == "trip: place below -0.1 m"
+
+
+def test_limits_the_wrong_way_round_are_said(tmp_path: Path) -> None:
+    wrong = {"safety": {"place_high": -0.2}}
+    with pytest.raises(rigtwin.RigtwinError, match="place_high = -0.2: expected low"):
+        rigtwin.run(machine(tmp_path, LIMITS), step, controller=lqr, settings=wrong)
 
 
 def test_limits_go_to_other_processes(tmp_path: Path) -> None:

@@ -15,20 +15,22 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.settings import Nothing, group_of
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 LOW, HIGH = "_low", "_high"
 """What a limit's two settings end in, after its component's name."""
 UNBOUNDED = 1e12
 SOURCE = "the description's limits"
+Columns = Mapping[str, Mapping[str, Array]]
+"""Topic → field → signal, shape (ticks,)."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Of one channel. low, high: in its unit; name: of its component; channel: topic and field."""
+    """Of one channel. name: of its component; low, high: in its unit."""
 
     name: str
-    channel: tuple[str, str]
     low: float
     high: float
     unit: str
@@ -89,32 +91,10 @@ def read_limits(table: object, components: Mapping[str, Component], mistakes: Mi
     return group_of(values) if values else Nothing()
 
 
-def limits_of(machine: Machine, configuration: Configuration) -> Iterator[Limit]:
-    """The limits of a test.
-
-    Parameters
-    ----------
-    machine
-        Its description.
-    configuration
-        Of the test.
-
-    Yields
-    ------
-    Limit
-        Of each channel that has one.
-    """
-    told = configuration.safety._asdict()
-    for name, component in machine.components.items():
-        if component.channel is not None and name + LOW in told:
-            ends = told[name + LOW], told[name + HIGH]
-            yield Limit(name, component.channel, *ends, component.unit)
-
-
-def find_trip(
-    machine: Machine, configuration: Configuration, columns: Mapping[str, Mapping[str, Array]]
-) -> Tripped | None:
-    """What ends a test early, if anything does.
+def limited_signals(
+    machine: Machine, configuration: Configuration, columns: Columns
+) -> Iterator[tuple[Limit, Array]]:
+    """The limits of a test, each with its signal.
 
     Parameters
     ----------
@@ -125,17 +105,34 @@ def find_trip(
     columns
         Topic → field → signal, shape (ticks,), as recorded.
 
-    Returns
-    -------
-    Tripped or None
-        The first.
+    Yields
+    ------
+    tuple
+        A limit, and the signal of its channel; none that was not recorded.
+
+    Raises
+    ------
+    RigtwinError
+        For limits whose low one is not below the high one.
     """
-    found: list[Tripped] = []
-    for limit in limits_of(machine, configuration):
-        topic, field = limit.channel
-        if field not in columns.get(topic, {}):
+    told = configuration.safety._asdict()
+    for name, component in machine.components.items():
+        if component.channel is None or name + LOW not in told:
             continue
-        signal = columns[topic][field]
+        low, high = told[name + LOW], told[name + HIGH]
+        if not low < high:
+            key = f"safety.{name}"
+            raise RigtwinError(f"{key}{LOW} = {low:g}, {key}{HIGH} = {high:g}: expected low below")
+        topic, field = component.channel
+        if field in columns.get(topic, {}):
+            yield Limit(name, low, high, component.unit), columns[topic][field]
+
+
+def find_trip(machine: Machine, configuration: Configuration, columns: Columns) -> Tripped | None:
+    """What ends a test early, if anything does: the first value beyond a limit. Arguments as of
+    `limited_signals`."""
+    found: list[Tripped] = []
+    for limit, signal in limited_signals(machine, configuration, columns):
         for beyond, said in (
             (~np.isfinite(signal), "is not a finite number"),
             (signal > limit.high, f"above {limit.high:g} {limit.unit}".rstrip()),
@@ -146,23 +143,9 @@ def find_trip(
     return min(found, key=lambda trip: trip.tick, default=None)
 
 
-def largest_reach(
-    machine: Machine, configuration: Configuration, columns: Mapping[str, Mapping[str, Array]]
-) -> float:
-    """The largest share of a limit that a test reached; 0 of a machine without limits.
-
-    Parameters
-    ----------
-    machine
-        Its description.
-    configuration
-        Of the test.
-    columns
-        Topic → field → signal, shape (ticks,), as recorded.
-    """
-    reached = [
-        limit.reach(columns[limit.channel[0]][limit.channel[1]])
-        for limit in limits_of(machine, configuration)
-        if limit.channel[1] in columns.get(limit.channel[0], {})
-    ]
+def largest_reach(machine: Machine, configuration: Configuration, columns: Columns) -> float:
+    """The largest share of a limit that a test reached; 0 of a machine without limits. Arguments as
+    of `limited_signals`."""
+    limited = limited_signals(machine, configuration, columns)
+    reached = [limit.reach(signal) for limit, signal in limited]
     return max((each for each in reached if math.isfinite(each)), default=0.0)

@@ -37,11 +37,11 @@ def demanded_channels(machine: Machine) -> list[Channel]:
     for replay in machine.replays:
         if machine.structure in TOGETHER:
             channels = [machine.components[name].channel for name in replay.moved_by]
-            control, read = machine.control, list_sensed(machine)
-            output = None if control is None else ("/command", *control.outputs)
-            found += [c for c in channels if c is not None and c != output]
-            if control is not None and output in channels:
-                found += [c for c in control.channels if c not in read and c not in found]
+            computed = _list_computed(machine).values()
+            found += [c for c in channels if c is not None and c not in computed]
+            if computed and machine.control is not None:
+                sensed = list_sensed(machine)
+                found += [channel for channel in machine.control.channels if channel not in sensed]
             continue
         mover = machine.components[replay.moved_by[0]]
         own = {
@@ -66,31 +66,67 @@ def list_sensed(machine: Machine) -> set[Channel]:
     }
 
 
+def _list_commandable(machine: Machine) -> dict[str, Channel]:
+    """Actuators of joints that act on each other which a controller can command → their commands.
+    What prescribes a motion is given ahead of the test."""
+    if machine.structure is not Structure.COUPLED:
+        return {}
+    channels = {name: machine.components[name].channel for name in machine.replays[0].moved_by}
+    return {
+        name: channel
+        for name, channel in channels.items()
+        if channel is not None and isinstance(getattr(machine.plant, name), ForceActuator | Servo)
+    }
+
+
+def _list_computed(machine: Machine) -> dict[str, Channel]:
+    """Those of them that the described controller commands."""
+    outputs = () if machine.control is None else machine.control.outputs
+    commandable = _list_commandable(machine)
+    return {name: channel for name, channel in commandable.items() if channel[1] in outputs}
+
+
 def list_wanted(
     machine: Machine, demands: Mapping[str, Array], controller: Tick | None
 ) -> tuple[list[Channel], list[str]]:
-    """Channels that have to be demanded, and actuators of joints that act on each other that a
-    controller commands."""
-    channels = demanded_channels(machine)
-    if machine.structure is not Structure.COUPLED:
-        # A controller of one's own takes whatever demands it knows.
-        return (channels if controller is None else [("/command", name) for name in demands]), []
-    outputs = []
-    for name in machine.replays[0].moved_by:
-        channel, part = machine.components[name].channel, getattr(machine.plant, name)
-        if channel is None or not isinstance(part, ForceActuator | Servo):
-            continue
-        own = controller is not None and not {channel[1], ".".join(channel)} & set(demands)
-        if own or (controller is None and channel not in channels):
-            outputs.append(name)
-    given = {machine.components[name].channel for name in outputs}
-    wanted = [channel for channel in channels if channel not in given]
-    if controller is not None:
-        known = {name for _, name in channels} | {".".join(channel) for channel in channels}
-        wanted += [("/command", name) for name in demands if name not in known]
-        if not outputs:
-            raise RigtwinError(f"{machine.name}: every command is demanded; nothing is controlled")
-    return wanted, outputs
+    """What has to be demanded, and what is commanded tick by tick.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    demands
+        That a test makes, by field or topic.field.
+    controller
+        One of one's own, which takes whatever demands it knows.
+
+    Returns
+    -------
+    tuple
+        Channels that have to be demanded, and actuators of joints that act on each other that a
+        controller commands.
+
+    Raises
+    ------
+    RigtwinError
+        If there is nothing for a controller of one's own to command.
+    """
+    if controller is None:
+        return demanded_channels(machine), list(_list_computed(machine))
+    if machine.structure is Structure.JOINTS:
+        return [("/command", name) for name in demands], []
+
+    def is_demanded(channel: Channel) -> bool:
+        return channel[1] in demands or ".".join(channel) in demands
+
+    commandable = _list_commandable(machine)
+    outputs = [name for name, channel in commandable.items() if not is_demanded(channel)]
+    if not outputs:
+        raise RigtwinError(f"{machine.name}: a controller has nothing to command in this test")
+    movers = [machine.components[name].channel for name in machine.replays[0].moved_by]
+    wanted = [c for c in movers if c is not None and c not in [commandable[o] for o in outputs]]
+    known = {name for _, name in wanted} | {".".join(channel) for channel in wanted}
+    return wanted + [("/command", name) for name in demands if name not in known], outputs
 
 
 def check_demands(
