@@ -162,6 +162,20 @@ def test_where_nothing_can_be_commanded_it_is_said(tmp_path: Path) -> None:
         rigtwin.run(tmp_path / "led.toml", step)
 
 
+def test_what_prescribes_a_motion_is_read_too() -> None:
+    """The road of a quarter car, beside its body's travel."""
+    road = 0.004 * np.sin(9.0 * np.arange(500) * PERIOD)
+    seen: list[float] = []
+
+    def hold(sensed: dict[str, float], _: dict[str, float]) -> float:
+        seen.append(sensed["road"])
+        return -20.0 * sensed["travel"]
+
+    made = rigtwin.run("quarter-car-bench", lambda *_: {"road": road}, controller=hold)
+    assert made["/sensor.road"] == pytest.approx(seen, abs=1e-12)
+    assert made["/sensor.road"] == pytest.approx(road, abs=1e-5)
+
+
 def test_one_s_own_needs_no_demands_of_the_described_one(tmp_path: Path) -> None:
     of = machine(tmp_path, by_formula())
     assert rigtwin.run(of, lambda *_: {}, controller=lambda *_: 0.0).end == "completed"

@@ -13,7 +13,7 @@ from rigtwin.components.conditioning import ActuatorState, actuator, condition, 
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Component, Machine, Row
+from rigtwin.description.machine import Machine, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
 from rigtwin.models.coupled import CoupledModel, begin
 from rigtwin.models.coupled_motion import Inputs, advance
@@ -130,9 +130,10 @@ def move_freely(machine: Machine, configuration: Configuration, demands: dict[st
     plant, period = configuration.plant, configuration.timing.period
     model, found = _at_start(machine, configuration, demands)
     moved = model.move(plant)
-    for name, row in _sensors(machine, plant):
-        if name not in found:
-            found[name] = apply_sensor(getattr(plant, name), model.observe(row, moved), period)
+    for row in _list_sensors(machine, plant):
+        if row.name not in found:
+            true = model.observe(row, moved)
+            found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
     return Moved(found, not runs_away(moved))
 
 
@@ -169,13 +170,14 @@ def move_commanded(
     plant, period = configuration.plant, configuration.timing.period
     nothing = {name: np.zeros(ticks) for name in outputs}
     model, found = _at_start(machine, configuration, {**nothing, **demands})
-    sensors = [(name, row) for name, row in _sensors(machine, plant) if name not in found]
-    read = [row for _, row in sensors if row.kind in ("position", "velocity")]
+    sensors = _list_sensors(machine, plant)
+    read = [row for row in sensors if row.kind in ("position", "velocity")]
     readings = Readings(plant, [row.name for row in read], noise, period, ticks)
     moved, given = model.move_commanded(plant, outputs, command, readings, read)
-    for name, row in sensors:
-        if name not in readings.signals:
-            found[name] = apply_sensor(getattr(plant, name), model.observe(row, moved), period)
+    for row in sensors:
+        if row.name not in readings.signals:
+            true = model.observe(row, moved)
+            found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
     signals = {**found, **readings.signals, **dict(zip(outputs, given, strict=True))}
     return Moved(signals, not runs_away(moved), frozenset({*readings.signals, *outputs}))
 
@@ -197,14 +199,12 @@ def _at_start(
     return CoupledTwin(machine, unobserved, recording, configuration, steps), found
 
 
-def _sensors(machine: Machine, plant: Plant) -> list[tuple[str, Row]]:
+def _list_sensors(machine: Machine, plant: Plant) -> list[Row]:
     """The sensors, each with what it reads."""
-
-    def row(component: Component) -> Row | None:
-        kind = measures(getattr(plant, component.name))
-        if not kind or component.channel is None or not component.acts_on:
-            return None
-        return Row(component.name, kind, component.channel, component.unit)
-
-    found = [(name, row(component)) for name, component in machine.components.items()]
-    return [(name, each) for name, each in found if each is not None]
+    return [
+        Row(name, kind, component.channel, component.unit)
+        for name, component in machine.components.items()
+        if (kind := measures(getattr(plant, name)))
+        and component.channel is not None
+        and component.acts_on
+    ]
