@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -67,6 +68,10 @@ def plot_parameters(result: TuningResult) -> Figure:
         axis.set(xlabel=f"{parameter.name.replace('_', ' ')}{unit}")
         if parameter.logarithmic:
             axis.set_xscale("log")
+            # Plain numbers, and few: over less than two decades each line would have its label.
+            axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+            axis.xaxis.set_minor_formatter(NullFormatter())
     axes[0].set(ylabel=_label(measure))
     axes[0].legend(fontsize=8)
     return figure
