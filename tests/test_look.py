@@ -74,7 +74,8 @@ def test_a_fit_is_the_diagnosis_and_is_saved_as_a_twin(look, machine, recording,
     path = look.save(tmp_path / "twin.toml", values)
     again = rigtwin.look(recording, machine=machine, settings=path)
     assert again.plant({}) == look.plant(values)
-    assert again.nominal.overall == pytest.approx(look.predict(values).overall, rel=0.1)
+    # Each is predicted in the longest steps that change its own nominal by half a percent at most.
+    assert again.nominal.overall == pytest.approx(look.predict(values).overall, rel=0.1, abs=0.01)
 
 
 @pytest.mark.parametrize(

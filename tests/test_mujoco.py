@@ -10,10 +10,10 @@ import pytest
 from rigtwin.components import Effect, candidates, with_parameters
 from rigtwin.description.machine import Machine
 from rigtwin.models.joint import JointModel
-from rigtwin.models.mujoco import MujocoModel
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from tests.helpers.described import TOML, described
+from tests.helpers.mujoco_joint import MujocoModel
 
 PERIOD, STEPS = 1e-3, 20
 TIME = np.arange(1000) * PERIOD

@@ -16,9 +16,9 @@ from rigtwin.components.servo import push, push_law
 from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.choose import model_of
-from rigtwin.models.mujoco import MujocoModel
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
+from tests.helpers.mujoco_joint import MujocoModel
 
 ARM = """
 <mujoco>

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from controllers.formula import run as run_formula
+from controllers.formula import run
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import start_transducer, transduce, transducer
 from rigtwin.description.control import Channel, FormulaControl
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
 
 Tick = Callable[[Mapping[str, float], Mapping[str, float]], "float | Mapping[str, float]"]
 """A controller's command, or commands by name, for what its sensors read and for what is demanded,
@@ -22,6 +23,12 @@ Command = Callable[[int, Mapping[str, float]], "float | Mapping[str, float]"]
 """The same for a tick's number and what the sensors read."""
 Columns = Mapping[str, Mapping[str, Array]]
 """Topic → field → signal, shape (ticks,)."""
+
+
+@kernel
+def _evaluate(operations: np.ndarray, registers: Array, memory: Array, period: float) -> float:
+    """A formula's value at a tick; see `controllers.formula.run`."""
+    return run(operations, registers, memory, period)
 
 
 class Readings:
@@ -117,6 +124,7 @@ def command_by_formula(
         s, of a tick.
     """
     program = control.formula.with_settings(settings)
+    operations = np.ascontiguousarray(program.operations)
     registers, memory = program.registers.copy(), control.formula.memory()
     given = [
         None if channel in sensors else columns[channel[0]][channel[1]]
@@ -127,6 +135,6 @@ def command_by_formula(
     def command(tick: int, sensed: Mapping[str, float]) -> float:
         for number, signal in enumerate(given):
             registers[number] = sensed[read[number]] if signal is None else signal[tick]
-        return float(run_formula(program.operations, registers, memory, period))
+        return float(_evaluate(operations, registers, memory, period))
 
     return command

@@ -1,5 +1,4 @@
-"""The twin of joints that act on each other, some of them free: what their sensors read in a
-test."""
+"""The twin of joints some of which are free: what their sensors read in a test."""
 
 from __future__ import annotations
 
@@ -8,22 +7,66 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components import UNLIMITED, ForceActuator, measures
-from rigtwin.components.conditioning import ActuatorState, actuator, condition, hold
+from rigtwin.components import UNLIMITED, ForceActuator, Servo, measures
+from rigtwin.components.conditioning import actuator
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
+from rigtwin.components.servo import push_law
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Row
+from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
 from rigtwin.models.coupled import CoupledModel, begin
-from rigtwin.models.coupled_motion import Inputs, advance
 from rigtwin.models.demanded import pose_as_recorded
+from rigtwin.models.demands import list_pushers, list_sensors
 from rigtwin.models.moved_twin import Moved
+from rigtwin.models.multibody import Multibody
+from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
 from rigtwin.numerics.arrays import Array, runs_away
 
 
 class CoupledTwin(CoupledModel):
     """All joints in a test to come, advanced tick by tick under a controller."""
+
+    def _bodies_of(self, plant: Plant) -> Multibody:
+        """With the mass of joints that are described one by one."""
+        found, shares = super()._bodies_of(plant), dict[str, float]()
+        for replay in self._machine.replays:
+            own = replay.joint.inertia - replay.joint.armature
+            if replay.mass is not None and own > 0.0:
+                shares[replay.joint.name] = getattr(plant, replay.mass).mass / own
+        return found.scale(shares) if any(share != 1.0 for share in shares.values()) else found
+
+    def begin(self, plant: Plant, outputs: Sequence[str], sensors: Sequence[Row]) -> SteppedTwin:
+        """The machine at the beginning of its test.
+
+        Parameters
+        ----------
+        plant
+            Its components.
+        outputs
+            Force actuators and servos that are commanded tick by tick.
+        sensors
+            That are read tick by tick.
+        """
+        h = self._period / self._steps
+        multibody = self._bodies_of(plant)
+        inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
+        contacts = self._contacts(plant, inputs.pushes)
+        data = multibody.data()
+        return SteppedTwin(
+            bodies=multibody.bodies(data, self._turning(plant)),
+            owner=data,
+            contacts=contacts,
+            free=self._free,
+            held=self._held,
+            state=begin(contacts, self._start_of(plant), inputs.prescribed, self._held, h),
+            inputs=inputs,
+            laws=[push_law(getattr(plant, name)) for name in self._servos],
+            drives=[self._drive(plant, name, h) for name in outputs],
+            sensing=[Sensing(r, self._along[r.name], self._zero[r.name]) for r in sensors],
+            h=h,
+            steps=self._steps,
+        )
 
     def move_commanded(
         self,
@@ -37,14 +80,12 @@ class CoupledTwin(CoupledModel):
 
         Parameters
         ----------
-        plant
-            Its components.
-        outputs
-            Force actuators and servos that the controller commands.
+        plant, outputs
+            As of `begin`.
         command
             Of a tick, by what was read.
         readings, sensors
-            What the controller reads: of positions and velocities.
+            What the controller reads.
 
         Returns
         -------
@@ -52,70 +93,72 @@ class CoupledTwin(CoupledModel):
             Positions, velocities and forces, shape (3, coordinates, ticks), as `move` has them;
             commands, shape (outputs, ticks).
         """
-        steps, h = self._steps, self._period / self._steps
-        multibody = self._bodies_of(plant)
-        inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
-        contacts = self._contacts(plant, inputs.pushes)
-        state = begin(contacts, self._start_of(plant), inputs.prescribed, self._held, h)
-        bodies = multibody.bodies(multibody.data(), self._turning(plant))
-        drives = [actuator(getattr(plant, name), plant.computer, h) for name in outputs]
-        acts = [self._acting(plant, name, inputs) for name in outputs]
-        along = {row.name: self._along[row.name] for row in sensors}
-        rates = {row.name: row.kind == "velocity" for row in sensors}
+        stepped = self.begin(plant, outputs, sensors)
         fields = [self._field(name) for name in outputs]
-        out = np.zeros((3, multibody.coordinates, self._ticks))
-        given, states = np.zeros((len(outputs), self._ticks)), list[ActuatorState]()
+        out = np.zeros((3, self._bodies.coordinates, self._ticks))
+        given = np.zeros((len(outputs), self._ticks))
         for tick in range(self._ticks):
-            true = {
-                name: float(way @ state.speed)
-                if rates[name]
-                else float(way @ state.place) + self._zero[name]
-                for name, way in along.items()
-            }
-            told = commands_of(command(tick, readings.take(tick, true)), fields)
-            given[:, tick] = told
-            states = states or [hold(*each) for each in zip(drives, told, strict=True)]
-            for value, drive, held, (signal, factor, limit) in zip(
-                told, drives, states, acts, strict=True
-            ):
-                for step in range(tick * steps, (tick + 1) * steps):
-                    pushed = factor * condition(drive, held, value)
-                    signal[step] = min(max(pushed, -limit), limit)
-            advance(
-                bodies=bodies,
-                contacts=contacts,
-                free=self._free,
-                held=self._held,
-                state=state,
-                inputs=inputs,
-                h=h,
-                steps=steps,
-                first=tick,
-                last=tick + 1,
-                out=out,
-            )
+            read = readings.take(tick, stepped.sense())
+            given[:, tick] = told = commands_of(command(tick, read), fields)
+            out[:, :, tick] = stepped.step(told)
         return out, given
 
-    def _acting(self, plant: Plant, name: str, inputs: Inputs) -> tuple[Array, float, float]:
-        """Where an actuator's signal stands among the inputs, shape (steps,), what a command makes
-        of it, and its limit."""
-        if name in self._servos:
-            return inputs.servos.commands[self._servos.index(name)], 1.0, UNLIMITED
-        mover: ForceActuator = getattr(plant, name)
-        return inputs.pushes[self._pushers.index(name)], mover.constant, self._limit(plant, name)
+    def _drive(self, plant: Plant, name: str, h: float) -> Drive:
+        mover: ForceActuator | Servo = getattr(plant, name)
+        model = actuator(mover, plant.computer, h)
+        if isinstance(mover, Servo):
+            return Drive(model, 1.0, UNLIMITED, True, self._servos.index(name))
+        limit = self._limit(plant, name)
+        return Drive(model, mover.constant, limit, False, self._pushers.index(name))
+
+    def list_sensors(self, plant: Plant) -> list[Row]:
+        """The sensors of its joints, each with what it reads."""
+        return [
+            Row(name, kind, component.channel, component.unit)
+            for name, component in self._machine.components.items()
+            if (kind := measures(getattr(plant, name)))
+            and component.channel is not None
+            and component.acts_on
+            and self._along[name].any()
+        ]
 
     def _field(self, name: str) -> str:
         channel = self._machine.components[name].channel
         return name if channel is None else channel[1]
 
 
-def move_freely(machine: Machine, configuration: Configuration, demands: dict[str, Array]) -> Moved:
+def list_parts(machine: Machine) -> list[ReplayOf]:
+    """What of a machine goes together in its twin: all joints that are pushed, free ones with them,
+    and each that is prescribed and acts on no other."""
+    pushers = list_pushers(machine)
+    alone = [replay for replay in machine.replays if not replay.free]
+    pushed = [replay for replay in alone if set(replay.moved_by) <= set(pushers)]
+    if not pushed:
+        return list(machine.replays)
+    together = ReplayOf(
+        name=pushed[0].name,
+        joint=pushed[0].joint,
+        moved_by=tuple(dict.fromkeys(name for each in pushed for name in each.moved_by)),
+        rows=(),
+        guide=None,
+        mass=None,
+        closed=False,
+        free=tuple(dict.fromkeys(each.joint.name for each in pushed)),
+    )
+    return [together, *(replay for replay in machine.replays if replay not in pushed)]
+
+
+def move_freely(
+    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
+) -> Moved:
     """What the sensors read, noise and bits apart.
 
     Parameters
     ----------
     machine
         Its description.
+    replay
+        Which of its joints.
     configuration
         With the effects that it has.
     demands
@@ -128,9 +171,9 @@ def move_freely(machine: Machine, configuration: Configuration, demands: dict[st
         What all its sensors read.
     """
     plant, period = configuration.plant, configuration.timing.period
-    model, found = _at_start(machine, configuration, demands)
+    model, found = _at_start(machine, replay, configuration, demands)
     moved = model.move(plant)
-    for row in _list_sensors(machine, plant):
+    for row in model.list_sensors(plant):
         if row.name not in found:
             true = model.observe(row, moved)
             found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
@@ -139,6 +182,7 @@ def move_freely(machine: Machine, configuration: Configuration, demands: dict[st
 
 def move_commanded(
     machine: Machine,
+    replay: ReplayOf,
     configuration: Configuration,
     demands: dict[str, Array],
     outputs: Sequence[str],
@@ -151,7 +195,7 @@ def move_commanded(
 
     Parameters
     ----------
-    machine, configuration, demands
+    machine, replay, configuration, demands
         As of `move_freely`.
     outputs
         Actuators that the controller commands.
@@ -169,9 +213,9 @@ def move_commanded(
     """
     plant, period = configuration.plant, configuration.timing.period
     nothing = {name: np.zeros(ticks) for name in outputs}
-    model, found = _at_start(machine, configuration, {**nothing, **demands})
-    sensors = _list_sensors(machine, plant)
-    read = [row for row in sensors if row.kind in ("position", "velocity")]
+    model, found = _at_start(machine, replay, configuration, {**nothing, **demands})
+    sensors, readable = model.list_sensors(plant), list_sensors(machine)
+    read = [row for row in sensors if row.name in readable]
     readings = Readings(plant, [row.name for row in read], noise, period, ticks)
     moved, given = model.move_commanded(plant, outputs, command, readings, read)
     for row in sensors:
@@ -183,10 +227,9 @@ def move_commanded(
 
 
 def _at_start(
-    machine: Machine, configuration: Configuration, demands: dict[str, Array]
+    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
 ) -> tuple[CoupledTwin, dict[str, Array]]:
     """The machine before its test, and what the sensors read that prescribe motions."""
-    (replay,) = machine.replays
     plant, period = configuration.plant, configuration.timing.period
     found = {
         name: apply_sensor(getattr(plant, name), demand, period)
@@ -197,14 +240,3 @@ def _at_start(
     unobserved = replace(replay, rows=())
     steps = configuration.substeps
     return CoupledTwin(machine, unobserved, recording, configuration, steps), found
-
-
-def _list_sensors(machine: Machine, plant: Plant) -> list[Row]:
-    """The sensors, each with what it reads."""
-    return [
-        Row(name, kind, component.channel, component.unit)
-        for name, component in machine.components.items()
-        if (kind := measures(getattr(plant, name)))
-        and component.channel is not None
-        and component.acts_on
-    ]

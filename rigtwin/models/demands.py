@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.components import ForceActuator, Servo, measures
+from rigtwin.components import PUSHERS, measures
 from rigtwin.description.control import Channel
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.models.commanding import Tick
 from rigtwin.numerics.arrays import Array
 
-TOGETHER = (Structure.MOVED, Structure.COUPLED)
-"""Structures of joints that act on each other."""
 Columns = dict[str, dict[str, Array]]
 """Topic → field → signal, shape (ticks,)."""
 
@@ -30,60 +28,57 @@ def demanded_channels(machine: Machine) -> list[Channel]:
     Returns
     -------
     list of channels
-        Commands that no described controller computes, what the controller is given besides its own
-        sensors, and motions that are prescribed.
+        Commands that no described controller computes, motions that are prescribed, and what the
+        controller is given besides its sensors.
     """
-    found: list[Channel] = []
-    for replay in machine.replays:
-        if machine.structure in TOGETHER:
-            channels = [machine.components[name].channel for name in replay.moved_by]
-            computed = _list_computed(machine).values()
-            found += [c for c in channels if c is not None and c not in computed]
-            if computed and machine.control is not None:
-                sensed = list_sensed(machine)
-                found += [channel for channel in machine.control.channels if channel not in sensed]
-            continue
-        mover = machine.components[replay.moved_by[0]]
-        own = {
-            c.channel
-            for c in machine.components.values()
-            if c.joint == replay.joint.name and c.element == "sensor"
-        }
-        if replay.closed and machine.control is not None:
-            found += [channel for channel in machine.control.channels if channel not in own]
-        elif mover.channel is not None:
-            found.append(mover.channel)
+    computed = list_computed(machine).values()
+    found = [channel for channel in list_movers(machine).values() if channel not in computed]
+    if computed and machine.control is not None:
+        sensed = list_sensed(machine)
+        found += [channel for channel in machine.control.channels if channel not in sensed]
     return list(dict.fromkeys(found))
 
 
-def list_sensed(machine: Machine) -> set[Channel]:
-    """Channels of sensors of positions and velocities."""
-    return {
-        component.channel
-        for name, component in machine.components.items()
-        if component.channel is not None
-        and measures(getattr(machine.plant, name)) in ("position", "velocity")
-    }
+def list_movers(machine: Machine) -> dict[str, Channel]:
+    """What moves a machine → its channel."""
+    names = [name for replay in machine.replays for name in replay.moved_by]
+    channels = {name: machine.components[name].channel for name in names}
+    return {name: channel for name, channel in channels.items() if channel is not None}
 
 
-def _list_commandable(machine: Machine) -> dict[str, Channel]:
-    """Actuators of joints that act on each other which a controller can command → their commands.
+def list_pushers(machine: Machine) -> dict[str, Channel]:
+    """Actuators that push a machine's joints, as a controller can tick by tick → their commands.
     What prescribes a motion is given ahead of the test."""
-    if machine.structure is not Structure.COUPLED:
-        return {}
-    channels = {name: machine.components[name].channel for name in machine.replays[0].moved_by}
-    return {
-        name: channel
-        for name, channel in channels.items()
-        if channel is not None and isinstance(getattr(machine.plant, name), ForceActuator | Servo)
-    }
+    movers = list_movers(machine).items()
+    return {name: c for name, c in movers if isinstance(getattr(machine.plant, name), PUSHERS)}
 
 
-def _list_computed(machine: Machine) -> dict[str, Channel]:
+def list_computed(machine: Machine) -> dict[str, Channel]:
     """Those of them that the described controller commands."""
     outputs = () if machine.control is None else machine.control.outputs
-    commandable = _list_commandable(machine)
-    return {name: channel for name, channel in commandable.items() if channel[1] in outputs}
+    pushers = list_pushers(machine).items()
+    return {name: channel for name, channel in pushers if channel[1] in outputs}
+
+
+def list_sensors(machine: Machine) -> dict[str, str]:
+    """Sensors of a machine that is pushed which a controller can read tick by tick → whether of
+    position, velocity or force. The force that a prescribed motion takes is known only after."""
+    plant, prescribed = machine.plant, set(list_movers(machine)) - set(list_pushers(machine))
+    held = {machine.components[name].joint for name in prescribed}
+    found = {}
+    for name, component in machine.components.items():
+        kind = measures(getattr(plant, name))
+        if not kind or component.channel is None or not component.acts_on:
+            continue
+        if kind != "force" or not held & {joint for joint, _ in component.acts_on}:
+            found[name] = kind
+    return found
+
+
+def list_sensed(machine: Machine) -> set[Channel]:
+    """Channels of those sensors."""
+    channels = (machine.components[name].channel for name in list_sensors(machine))
+    return {channel for channel in channels if channel is not None}
 
 
 def list_wanted(
@@ -103,8 +98,7 @@ def list_wanted(
     Returns
     -------
     tuple
-        Channels that have to be demanded, and actuators of joints that act on each other that a
-        controller commands.
+        Channels that have to be demanded, and actuators that a controller commands.
 
     Raises
     ------
@@ -112,19 +106,16 @@ def list_wanted(
         If there is nothing for a controller of one's own to command.
     """
     if controller is None:
-        return demanded_channels(machine), list(_list_computed(machine))
-    if machine.structure is Structure.JOINTS:
-        return [("/command", name) for name in demands], []
+        return demanded_channels(machine), list(list_computed(machine))
 
     def is_demanded(channel: Channel) -> bool:
         return channel[1] in demands or ".".join(channel) in demands
 
-    commandable = _list_commandable(machine)
-    outputs = [name for name, channel in commandable.items() if not is_demanded(channel)]
+    pushers = list_pushers(machine)
+    outputs = [name for name, channel in pushers.items() if not is_demanded(channel)]
     if not outputs:
         raise RigtwinError(f"{machine.name}: a controller has nothing to command in this test")
-    movers = [machine.components[name].channel for name in machine.replays[0].moved_by]
-    wanted = [c for c in movers if c is not None and c not in [commandable[o] for o in outputs]]
+    wanted = [c for name, c in list_movers(machine).items() if name not in outputs]
     known = {name for _, name in wanted} | {".".join(channel) for channel in wanted}
     return wanted + [("/command", name) for name in demands if name not in known], outputs
 

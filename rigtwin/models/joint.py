@@ -276,6 +276,14 @@ class JointModel:
         signal = recover_motion(sensor, self._motion, self._period)
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
+    def prescribe(self, plant: Plant, signal: Array) -> Array:
+        """The joint under a prescribed motion, shape (4, ticks) as `move`. signal: what an ideal
+        sensor that moves it would read, shape (ticks,)."""
+        position = (
+            np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
+        )
+        return self._inverse_dynamics(plant, position, 0.0)
+
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         guide, inertia = self._parts(plant)
         velocity = np.gradient(position, self._apart)

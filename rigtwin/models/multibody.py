@@ -218,6 +218,22 @@ class Multibody:
         found._find_steady()
         return found
 
+    def scale(self, shares: Mapping[str, float]) -> Multibody:
+        """The same with bodies that are so many times as heavy. shares: of all that each joint
+        carries."""
+        found = copy(self)
+        found._model = model = copy(self._model)
+        for joint, share in shares.items():
+            carried = [int(model.jnt_bodyid[model.joint(joint).id])]
+            for body in range(carried[0] + 1, model.nbody):
+                if model.body_parentid[body] in carried:
+                    carried.append(body)
+            model.body_mass[carried] *= share
+            model.body_inertia[carried] *= share
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        found._find_steady()
+        return found
+
     def _prepare(self, model: mujoco.MjModel) -> mujoco.MjModel:
         model.opt.disableflags |= (
             mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION

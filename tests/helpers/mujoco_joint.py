@@ -1,5 +1,4 @@
-"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to, and the
-twin that is run.
+"""Any machine's joint in MuJoCo itself: the reference that the faster model is held to.
 
 MuJoCo has the masses, the geometry and gravity; the components' laws act on the joint tick by tick.
 It is slow, and takes no shortcut that needs the joint to be alone. Contacts, joint limits and the
@@ -8,7 +7,7 @@ MJCF's own actuators are left out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -22,9 +21,7 @@ from rigtwin.components.servo import pull, push, push_law
 from rigtwin.models.commanding import (
     Command,
     Readings,
-    Tick,
     command_by_formula,
-    command_by_function,
     commands_of,
 )
 from rigtwin.models.guided import Inertia
@@ -45,13 +42,6 @@ OFF = (
 
 class MujocoModel(JointModel):
     """One joint of a machine in MuJoCo."""
-
-    read: dict[str, Array]
-    """Sensor → what the controller read, after `move`."""
-    sensor_noise: Mapping[str, Array] = {}
-    """Sensor → what is added to its reading, shape (ticks,)."""
-    controller: Tick | None = None
-    """What commands the actuator instead of the description's controller."""
 
     def _mechanics(
         self, plant: Plant, timestep: float
@@ -76,19 +66,6 @@ class MujocoModel(JointModel):
         model.dof_solimp[at] = (0.9999, 0.9999, 0.001, 0.5, 2.0)
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model, mujoco.MjData(model), place, at
-
-    def prescribe(self, plant: Plant, signal: Array) -> Array:
-        """The joint under a prescribed motion, shape (4, ticks) as `move`. signal: what an ideal
-        sensor that moves it would read, shape (ticks,)."""
-        position = (
-            np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
-        )
-        self.read = {}
-        return self._inverse_dynamics(plant, position, 0.0)
-
-    def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
-        self.read = {}
-        return super().move(plant, force, shift)
 
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         """The force that moves the joint as prescribed, by inverse dynamics."""
@@ -182,16 +159,13 @@ class MujocoModel(JointModel):
         them."""
         names = self._sensors or self.sensors_of_joint()
         ticks, columns = self._recording.ticks, self._recording.columns
-        readings = Readings(plant, names, self.sensor_noise, self._period, ticks)
-        self.read = readings.signals
+        readings = Readings(plant, names, {}, self._period, ticks)
         rates = {name: measures(getattr(plant, name)) == "velocity" for name in names}
         channel = self._machine.components[self._replay.moved_by[0]].channel
         output = [self._replay.moved_by[0] if channel is None else channel[1]]
         recorded = self._command
         own: Command = lambda tick, _: float(recorded[tick])  # noqa: E731
-        if self.controller is not None:
-            own = command_by_function(self.controller, columns)
-        elif self._control is not None:
+        if self._control is not None:
             components = self._machine.components
             sensors = {c: name for name in names if (c := components[name].channel) is not None}
             own = command_by_formula(self._control, self._settings, columns, sensors, self._period)

@@ -1,0 +1,63 @@
+"""The twin of a joint that is moved as prescribed and acts on no other: what its sensors read in a
+test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from rigtwin.components import measures
+from rigtwin.components.sensors import apply_sensor
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.models.demanded import pose_as_recorded
+from rigtwin.models.joint import JointModel
+from rigtwin.models.moved_twin import Moved
+from rigtwin.models.reading import sensors_of
+from rigtwin.numerics.arrays import Array, runs_away
+
+
+def carry(
+    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
+) -> Moved:
+    """What the sensors read, noise and bits apart.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    replay
+        Of its joint.
+    configuration
+        With the effects that it has.
+    demands
+        What moves the joint → where it goes, or the command of its position actuator, shape
+        (ticks,).
+
+    Returns
+    -------
+    Moved
+        What all sensors of that joint read.
+    """
+    plant, period, components = configuration.plant, configuration.timing.period, machine.components
+    (mover,) = replay.moved_by
+    rows = []
+    for name in sensors_of(machine):
+        channel = components[name].channel
+        if components[name].joint == replay.joint.name and channel is not None:
+            rows.append(Row(name, measures(getattr(plant, name)), channel, components[name].unit))
+    nothing = {row.name: np.zeros(len(demands[mover])) for row in rows}
+    recording = pose_as_recorded(machine, {**nothing, **demands}, period)
+    observed = replace(replay, rows=tuple(rows))
+    model = JointModel(machine, observed, recording, configuration, configuration.substeps)
+    if measures(getattr(plant, mover)):
+        moved = model.prescribe(plant, demands[mover])
+    else:
+        moved = model.move(plant)
+    places = {"position": 0, "velocity": 1, "force": 2}
+    found = {
+        row.name: apply_sensor(getattr(plant, row.name), moved[places[row.kind]], period)
+        for row in rows
+    }
+    return Moved(found, not runs_away(moved))
