@@ -10,21 +10,22 @@ from time import perf_counter
 import numpy as np
 from google.protobuf.message import Message
 
-from controllers import Commands, Measurements
+from controllers import Commands
 from experiments import EXPERIMENTS
 from rigtwin.description.changes import from_assignments
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import Response, VirtualCard
+from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.hardware.session.record import (
-    Test,
     open_virtual_card,
     record_at_leisure,
     record_in_real_time,
 )
+from rigtwin.hardware.session.test import Test
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 
@@ -39,10 +40,10 @@ class _Taped:
         self.volts: Array = terminals.volts.copy()
         self._playing = False
 
-    def advance(self, written: Array, pressure: bool) -> None:
+    def advance(self, written: Array, power: bool) -> None:
         self._place += 1
         if not self._playing:
-            self._terminals.advance(written, pressure)
+            self._terminals.advance(written, power)
             self._tape.append(self._terminals.volts.copy())
         self.volts[:] = self._tape[min(self._place, len(self._tape) - 1)]
 
@@ -72,7 +73,7 @@ class _Timed:
     def start(self) -> None:
         self._card.start()
 
-    def read(self) -> Measurements:
+    def read(self) -> tuple[float, ...]:
         self.times.append(perf_counter() - self._begun - self._answering)
         if self._pacer is not None:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
@@ -82,8 +83,8 @@ class _Timed:
     def write(self, commands: Commands) -> None:
         self._card.write(commands)
 
-    def pressure(self, on: bool) -> None:
-        self._card.pressure(on)
+    def power(self, on: bool) -> None:
+        self._card.power(on)
 
     def stop(self) -> None:
         self._card.stop()

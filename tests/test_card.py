@@ -9,6 +9,7 @@ import time
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,9 +31,10 @@ from rigtwin.hardware.daq.table import (
     require_trust,
     to_toml,
 )
-from rigtwin.hardware.daq.terminals import Terminals, WiredTwin
+from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard
+from rigtwin.hardware.daq.wired import WiredTwin
 
 TABLE = load_table(CARD)
 PERIOD = 1e-3
@@ -47,7 +49,7 @@ def virtual(
     return Card(table, PERIOD, InProcess(card), clock=clock), card
 
 
-def after(card: Card, ticks: int, commands: Commands) -> Measurements:
+def after(card: Card, ticks: int, commands: Commands) -> Any:
     """What is read after so many ticks of the same commands."""
     for _ in range(ticks):
         card.read()
@@ -220,7 +222,7 @@ def test_card_and_twin_behind_the_same_converters_read_the_same():
             0.01 * np.sin(tick / 50), -0.004 * min(tick / 300, 1.0), 0.0, min(tick / 300, 1.0)
         )
         for rig in (card, twin):
-            rig.pressure(tick > 20)
+            rig.power(tick > 20)
             rig.write(commands)
     assert card.missed == twin.missed == 0
 
@@ -229,7 +231,7 @@ def test_no_pressure_no_motion():
     card, _ = virtual()
     card.start()
     assert abs(after(card, 200, Commands(0.05, 0.05, 0.0, 0.0)).structure_lvdt) < 2e-3
-    card.pressure(True)
+    card.power(True)
     assert after(card, 600, Commands(0.05, 0.05, 0.0, 0.0)).structure_lvdt == pytest.approx(
         0.05, abs=2e-3
     )
@@ -282,7 +284,7 @@ def test_what_the_card_does_not_have_is_found_before_anything_moves(change, said
     card, device = virtual(change(TABLE))
     with pytest.raises(CardFault, match=said):
         card.inspect()
-    assert not device.pressure
+    assert not device.power
     assert device.tick == 0
     assert np.all(device.outputs == 0.0)
 
@@ -312,7 +314,7 @@ def test_outputs_beyond_the_range_and_no_numbers_are_refused():
 def test_a_card_that_refuses_its_outputs_for_good_is_reset(monkeypatch):
     card, device = virtual()
     card.start()
-    card.pressure(True)
+    card.power(True)
     card.read()
     card.write(Commands(0.0, 0.0, 0.0, 1.0))
 
@@ -322,20 +324,20 @@ def test_a_card_that_refuses_its_outputs_for_good_is_reset(monkeypatch):
     monkeypatch.setattr(device, "_WriteAnalogF64", refuse)
     card.stop()
     assert np.all(device.outputs == 0.0)
-    assert not device.pressure
+    assert not device.power
 
 
 def test_a_disconnected_card_says_so_and_has_no_output():
     card, device = virtual()
     card.start()
-    card.pressure(True)
+    card.power(True)
     card.read()
     card.write(Commands(0.0, 0.0, 0.0, 1.0))
     device.disconnect()
     with pytest.raises(CardFault, match="not present"):
         card.read()
     assert np.all(device.outputs == 0.0)
-    assert not device.pressure
+    assert not device.power
     card.stop()
 
 
@@ -384,7 +386,7 @@ def test_through_a_socket_it_is_the_same_card():
         for tick in range(100):
             assert far.read() == near.read()
             for card in (far, near):
-                card.pressure(True)
+                card.power(True)
                 card.write(Commands(0.0, -1e-5 * tick, 0.0, 0.01 * tick))
         with pytest.raises(RigtwinError, match="taken"):
             serve(device, port)
@@ -394,7 +396,7 @@ def test_through_a_socket_it_is_the_same_card():
         assert device.outputs[0] > 0.9
         there = replace(TABLE, address=f"{LOCAL}:{port}")
         assert release(there)
-        assert not device.pressure
+        assert not device.power
         assert device.outputs[0] == 0.0
         assert not release(there)
         Card(TABLE, PERIOD, connect(f"{LOCAL}:{port}")).start()

@@ -33,12 +33,14 @@ from rigtwin.hardware.daq.calibration import (
     set_zeros,
 )
 from rigtwin.hardware.daq.table import load_table, to_toml
-from rigtwin.hardware.daq.terminals import InRealTime, Terminals, WiredTwin
+from rigtwin.hardware.daq.terminals import Terminals
+from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
 from rigtwin.hardware.session import permission
 from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
 from rigtwin.hardware.session.plan import PlannedTest, parse_plan
-from rigtwin.hardware.session.record import Test, record_in_real_time
+from rigtwin.hardware.session.record import record_in_real_time
+from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 from tests.helpers.described import NOISY, described
@@ -125,7 +127,7 @@ def test_a_dry_run_in_python_is_that_of_the_command(card, tmp_path, monkeypatch,
 
 def test_another_setting_is_another_session(tmp_path):
     def key(test: Test) -> str:
-        return digest(test.experiment, test.configuration, test.demands, test.table)
+        return digest(test.experiment, test.configuration, test.list_demands(), test.table)
 
     base = session()
     others = [
@@ -334,7 +336,8 @@ def test_every_wrong_sign_is_found(signs):
     from rigtwin.hardware.daq.card import Card
     from rigtwin.hardware.daq.transport import InProcess
     from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
-    from rigtwin.hardware.session.recorder import NUMBER, SENSORS
+    from rigtwin.hardware.rig_operation import RigOperation
+    from rigtwin.hardware.session.recorder import RIG_LAYOUT
     from rigtwin.hardware.supervision import supervise
     from rigtwin.hardware.supervisor import COMPLETED
 
@@ -351,21 +354,21 @@ def test_every_wrong_sign_is_found(signs):
         fault = None
 
         def tick(self, row):
-            if np.isfinite(row[NUMBER]):
+            if np.isfinite(row[RIG_LAYOUT.number]):
                 rows.append(row)
 
         def transition(self, transition): ...
 
-        def beat(self, ground, structure): ...
+        def beat(self, outputs): ...
 
         def ready(self): ...
 
         def flush(self): ...
 
     card = Card(TABLE, 1e-3, InProcess(device), clock=lambda: device.tick * 1e-3)
-    ended = supervise(card, configuration, demands, Rows())
+    ended = supervise(card, RigOperation(configuration, demands), Rows())  # type: ignore[arg-type]
     assert ended.cause == COMPLETED
-    measured = np.array(rows)[:, SENSORS]
+    measured = np.array(rows)[:, list(RIG_LAYOUT.topics["/sensor"].values())]
     moved = {line.name: sign for line, sign in zip(TABLE.outputs, signs[4:], strict=True)}
     found, _ = correct_signs(TABLE, fit_responses(measured, demands), moved)
     assert [line.scaling.sign for line in found.lines] == list(signs)
@@ -541,17 +544,18 @@ def test_the_live_view_is_served_on_this_computer_only():
     import socket
 
     from rigtwin.hardware.session.live import open_live_view
-    from rigtwin.recording.channels import topic_fields
+    from rigtwin.hardware.session.recorder import RIG_LAYOUT
 
+    fields = RIG_LAYOUT.fields
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    show = open_live_view(port)
-    show("/session", np.zeros((20, len(topic_fields("/session")))))
+    show = open_live_view(port, fields)
+    show("/session", np.zeros((20, len(fields["/session"]))))
     with socket.create_connection(("127.0.0.1", port), 5.0):
         pass
     with pytest.raises(RigtwinError, match="no live view on port"):
-        open_live_view(port)
+        open_live_view(port, fields)
     others = {
         str(address[4][0])
         for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers import Measurements
 from controllers import update as healthy
 from experiments import find
 from rigtwin.cli import main
@@ -21,12 +20,13 @@ from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.daq.terminals import WiredTwin
+from rigtwin.hardware.daq.wired import WiredTwin
 from rigtwin.hardware.faults.campaign import draw_faults, last_words, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
 from rigtwin.hardware.faults.processes import Stray, try_process_fault
-from rigtwin.hardware.session.record import Test, open_virtual_card, record_at_leisure
+from rigtwin.hardware.session.record import open_virtual_card, record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
+from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
@@ -138,7 +138,7 @@ def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
     idle = rows[rows[:, 1] == Phase.IDLE]
     assert not idle[:, 3:].any()
     assert rows[-1, 3] == 0.0
-    assert not device.pressure
+    assert not device.power
     assert device.outputs[0] == 0.0
 
 
@@ -162,14 +162,14 @@ def test_the_operator_stops_in_every_state(tmp_path, seconds):
     outputs = []
 
     def stop() -> str | None:
-        outputs.append((device.tick, float(device.outputs[0]), device.pressure))
+        outputs.append((device.tick, float(device.outputs[0]), device.power))
         return "stopped by the operator: test" if device.tick >= at else None
 
     ended = record_at_leisure(card, test, tmp_path / "r.mcap", stop)
     assert ended.cause.name == "operator"
     assert states(tmp_path / "r.mcap")[-2:] == ["stopping", "stopped"]
     assert device.outputs[0] == 0.0
-    assert not device.pressure
+    assert not device.power
     last_driven = max((tick for tick, volts, _ in outputs if volts != 0.0), default=0)
     assert last_driven <= at
 
@@ -223,7 +223,7 @@ def test_a_rig_that_is_out_of_its_limits_is_not_armed(tmp_path):
         record_at_leisure(card, test, tmp_path / "r.mcap")
     assert states(tmp_path / "r.mcap") == ["faulted"]
     assert device.outputs[0] == 0.0
-    assert not device.pressure
+    assert not device.power
 
 
 def test_limits_of_the_card_reach_the_session():
@@ -300,7 +300,8 @@ def slowed(device, ticks):
 def test_a_loop_that_is_too_slow_is_called_late(tmp_path, ticks, said):
     test = session("road1.6", "timing.duration=3", "safety.ramp=0.4", "safety.hold=0.1")
     card, device = open_virtual_card(test)
-    ended = record_at_leisure(card, test, tmp_path / "r.mcap", updating=slowed(device, ticks))
+    late = test.operation(slowed(device, ticks))
+    ended = record_at_leisure(card, test, tmp_path / "r.mcap", operation=late)
     assert said in ended.cause.reason
     recording = load(tmp_path / "r.mcap")
     assert recording.time[0] == 0.0
@@ -349,7 +350,7 @@ class Hopeless:
     def start(self) -> None:
         self._rig.start()
 
-    def read(self) -> Measurements:
+    def read(self) -> tuple[float, ...]:
         self.ticks += 1
         return self._rig.read()
 
@@ -358,8 +359,8 @@ class Hopeless:
             raise OSError("gone")
         self._rig.write(commands)
 
-    def pressure(self, on: bool) -> None:
-        self._rig.pressure(on)
+    def power(self, on: bool) -> None:
+        self._rig.power(on)
 
     def stop(self) -> None:
         self.stopped += 1

@@ -11,10 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rigtwin.api.machines import Effects, Settings, effect_texts
+from machines import DEFAULT_MACHINE
+from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
+from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
 from rigtwin.hardware.daq.calibration import (
@@ -26,9 +28,12 @@ from rigtwin.hardware.daq.calibration import (
 )
 from rigtwin.hardware.daq.card import require_client
 from rigtwin.hardware.daq.failsafe import release
+from rigtwin.hardware.daq.machine_terminals import MachineTerminals
+from rigtwin.hardware.daq.signals import RIG, signals_of
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, load_table, require_ranges, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
+from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.table_check import (
     LEAST_STROKE,
@@ -65,6 +70,7 @@ class ServedCard:
 def serve_card(
     card: str | Path,
     *,
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     port: int = 0,
     settings: Settings = (),
     effects: Effects = (),
@@ -76,6 +82,8 @@ def serve_card(
     ----------
     card
         The channel table: how the twin is wired to the card.
+    machine
+        Whose twin, by name or description.
     port
         0 takes a free one.
     settings, effects
@@ -93,12 +101,16 @@ def serve_card(
 
     if seed < 0 or not 0 <= port <= PORTS:
         raise RigtwinError(f"seed: expected 0 or more; port: 0 to {PORTS}")
-    table = load_table(Path(card))
-    configuration = with_changes(Configuration(), settings)
+    on = the_machine(machine)
+    configuration = with_changes(on.configuration, settings)
     actual = apply_effects(configuration, effect_texts(effects))
-    virtual = VirtualCard(
-        Terminals(actual, table, seed), table, RealTime(configuration.timing.period)
-    )
+    if on.structure is Structure.QUARTER_CAR:
+        table = load_table(Path(card))
+        terminals: Wired = Terminals(actual, table, seed)
+    else:
+        table = load_table(Path(card), signals_of(on))
+        terminals = MachineTerminals(on, actual, table, seed)
+    virtual = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, taken = serve(virtual, port)
     return ServedCard(
         table.device,
@@ -108,14 +120,16 @@ def serve_card(
     )
 
 
-def release_card(card: str | Path) -> bool:
-    """Frees what a program that died has left on a gRPC device server, with the motor at zero and
-    the pressure off.
+def release_card(card: str | Path, *, machine: Machine | str | Path = DEFAULT_MACHINE) -> bool:
+    """Frees what a program that died has left on a gRPC device server, with all outputs at zero and
+    the power off.
 
     Parameters
     ----------
     card
         The channel table.
+    machine
+        Of which machine, by name or description.
 
     Returns
     -------
@@ -127,7 +141,8 @@ def release_card(card: str | Path) -> bool:
     RigtwinError
         If the card has no server.
     """
-    table = load_table(Path(card))
+    on = the_machine(machine)
+    table = load_table(Path(card), RIG if on.structure is Structure.QUARTER_CAR else signals_of(on))
     if not table.address:
         raise RigtwinError(
             "card.address is empty: "

@@ -10,32 +10,34 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from experiments import find
 from machines import DEFAULT_MACHINE
 from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, load
+from rigtwin.components import RigPlant
 from rigtwin.description.changes import read_toml, with_changes
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.files import recordable
 from rigtwin.hardware.daq import CARD
+from rigtwin.hardware.daq.signals import signals_of
 from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.daq.terminals import InRealTime, WiredTwin
-from rigtwin.hardware.session.dry_run import Peak, enter, predict_peaks
+from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
+from rigtwin.hardware.session.dry_run import enter
 from rigtwin.hardware.session.own_controller import Making, own_controller
 from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.hardware.session.record import (
-    Test,
     open_virtual_card,
     record_at_leisure,
     record_in_real_time,
 )
 from rigtwin.hardware.session.stops import stop_requests
+from rigtwin.hardware.session.test import AnyTest, MachineTest, Test
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording.owner import open_alone
 from rigtwin.simulation.experiment import Experiment, find_experiment
+from rigtwin.simulation.peaks import Peak
 
 PORTS = 65535
 LOCK = "session.lock"
@@ -81,41 +83,63 @@ class DryRun:
 def plan_test(
     experiment: str,
     *,
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     card: str | Path | None = None,
     settings: Settings = (),
     seed: int = 0,
     effects: Effects = (),
     controller: Making | None = None,
-) -> Test:
-    """A test of the suspension rig, ready to be run under supervision.
+) -> AnyTest:
+    """A test ready to be run under supervision.
 
     Parameters
     ----------
     experiment
         Its name.
+    machine
+        Whose, by name or description; another than the suspension rig is moved by force actuators
+        and servos alone.
     card
-        The channel table, TOML; by default the shipped one.
+        The channel table, TOML; of the suspension rig by default the shipped one.
     settings
         Changes, {"safety": {"force": 1200}}, or a TOML file that holds them, or several.
     seed
         Of the twin's noise, and of the road.
     effects
-        What the twin has besides; the rig has its own.
+        What the twin has besides; the machine has its own.
     controller
-        A function of the test's configuration that makes one of your own instead of the rig's, see
-        `run`; a new one for each session.
+        A function of the test's configuration that makes one of your own instead of the machine's,
+        see `run`; a new one for each session.
 
     Raises
     ------
     RigtwinError
         For any mistake in these.
     """
-    found = find(experiment)
+    on = the_machine(machine)
+    found = find_experiment(on, experiment)
     configuration = with_changes(found.configuration, settings)
-    demands = found.demands(configuration, seed)
-    table = load_table(CARD if card is None else Path(card))
     own = None if controller is None else own_controller(controller)
-    return Test(found.name, configuration, demands, seed, table, effect_texts(effects), own)
+    told = tuple(effect_texts(effects))
+    if is_the_rig(on):
+        table = load_table(CARD if card is None else Path(card))
+        demands = found.demands(configuration, seed)
+        return Test(found.name, configuration, demands, seed, table, told, own)
+    if on.structure is Structure.QUARTER_CAR:
+        raise RigtwinError(
+            f"{on.name}: sessions run the nominal suspension rig, or a machine of another structure"
+        )
+    signals = signals_of(on)
+    if card is None:
+        raise RigtwinError(f"{on.name}: no channel table; expected that of the card it is on")
+    table = load_table(Path(card), signals)
+    demands = found.demands(configuration, seed)
+    return MachineTest(on, found.name, configuration, demands, seed, table, told, own)
+
+
+def is_the_rig(machine: Machine) -> bool:
+    """Whether a machine is the nominal suspension rig."""
+    return machine.plant == RigPlant()
 
 
 def dry_run(
@@ -123,6 +147,7 @@ def dry_run(
     card: str | Path,
     *,
     path: str | Path,
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     settings: Settings = (),
     seed: int = 0,
     controller: Making | None = None,
@@ -131,15 +156,14 @@ def dry_run(
     stop: Stop | None = None,
     stop_file: str | Path | None = None,
 ) -> DryRun:
-    """Runs the exact session of a test on the suspension rig on the virtual card, before the rig is
-    armed for it.
+    """Runs the exact session of a test on the virtual card, before the machine is armed for it.
 
-    A session that passes is noted beside the channel table; the rig is armed by a person, for just
-    what has passed.
+    A session that passes is noted beside the channel table; the machine is armed by a person, for
+    just what has passed.
 
     Parameters
     ----------
-    experiment, card, settings, seed, controller, effects
+    experiment, machine, card, settings, seed, controller, effects
         As of `run_on_card`; with any effects, or with the shipped table, nothing is noted.
     path
         Of the recording.
@@ -156,6 +180,7 @@ def dry_run(
     """
     test = plan_test(
         experiment,
+        machine=machine,
         card=card,
         settings=settings,
         seed=seed,
@@ -167,7 +192,7 @@ def dry_run(
         ended = record_at_leisure(virtual, test, Path(path), asked, progress)
     recording = load(Path(path)) if ended.ticks else None
     passed = ended.cause == COMPLETED
-    peaks = predict_peaks(recording, test.card_configuration) if recording is not None else ()
+    peaks = test.predict_peaks(recording) if recording is not None else ()
     # The shipped table arms nothing, and where it lies nothing is written.
     shipped = Path(card).resolve() == CARD.resolve()
     if passed and not test.effects and not shipped:
@@ -180,6 +205,7 @@ def run_on_twin(
     experiment: str,
     *,
     path: str | Path,
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     card: str | Path | None = None,
     real_time: bool = False,
     settings: Settings = (),
@@ -195,7 +221,7 @@ def run_on_twin(
 
     Parameters
     ----------
-    experiment, card, settings, seed, controller, effects
+    experiment, machine, card, settings, seed, controller, effects
         As of `plan_test`.
     path
         Of the recording.
@@ -216,6 +242,7 @@ def run_on_twin(
     _require_port(live)
     test = plan_test(
         experiment,
+        machine=machine,
         card=card,
         settings=settings,
         seed=seed,
@@ -225,7 +252,7 @@ def run_on_twin(
     twin = WiredTwin(test.terminals(), test.table)
     with _stopped_by(stop, stop_file) as asked:
         if real_time:
-            timed = InRealTime(twin, test.configuration.timing.period)
+            timed = InRealTime(twin, test.period)
             ended = record_in_real_time(
                 timed, test, recordable(path), asked, guarded=False, live=live, progress=progress
             )
@@ -239,7 +266,8 @@ def run_on_card(
     card: str | Path,
     *,
     path: str | Path,
-    arm: Callable[[Test], bool],
+    arm: Callable[[AnyTest], bool],
+    machine: Machine | str | Path = DEFAULT_MACHINE,
     without_dry_run: str | None = None,
     settings: Settings = (),
     seed: int = 0,
@@ -249,18 +277,18 @@ def run_on_card(
     stop: Stop | None = None,
     stop_file: str | Path | None = None,
 ) -> SessionResult | None:
-    """Runs a test on the rig.
+    """Runs a test on the machine itself.
 
     Parameters
     ----------
-    experiment, settings, seed, controller
+    experiment, machine, settings, seed, controller
         As of `plan_test`.
     card
         The channel table that somebody answers for.
     path
         Of the recording.
     arm
-        Asks whoever stands at the rig whether everybody is clear of it. Nothing has moved when it
+        Asks whoever stands at it whether everybody is clear of it. Nothing has moved when it
         is called, and nothing moves if it says no.
     without_dry_run
         Who answers for it that there was no dry run of just this, if there was none.
@@ -274,15 +302,22 @@ def run_on_card(
     Returns
     -------
     SessionResult or None
-        How it ended; None if the rig was not armed.
+        How it ended; None if it was not armed.
 
     Raises
     ------
     RigtwinError
-        If the test must not be run on the rig, before anything moves.
+        If the test must not be run on it, before anything moves.
     """
     _require_port(live)
-    test = plan_test(experiment, card=card, settings=settings, seed=seed, controller=controller)
+    test = plan_test(
+        experiment,
+        machine=machine,
+        card=card,
+        settings=settings,
+        seed=seed,
+        controller=controller,
+    )
     permission = require_permission(test, Path(card), without_dry_run)
     if not arm(test):
         return None

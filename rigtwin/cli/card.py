@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rigtwin
+from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
 from rigtwin.console import table, writable
 from rigtwin.errors import RigtwinError
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     serving.add_argument(
         "--port", type=int, default=31763, help="default 31763; 0 takes a free one"
     )
+    _add_machine(serving)
     serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
     add_effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
     add_settings(serving)
@@ -102,6 +104,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "release", help="free what a program that died has left on a gRPC device server"
     )
     freeing.add_argument("card", type=Path, metavar="CARD.toml")
+    _add_machine(freeing)
+
+
+def _add_machine(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--machine",
+        default=DEFAULT_MACHINE,
+        metavar="F.toml",
+        help="on the card, by name or description (default: the suspension rig)",
+    )
 
 
 def execute(parsed: argparse.Namespace) -> int:
@@ -114,6 +126,7 @@ def _serve(parsed: argparse.Namespace) -> int:
 
     served = rigtwin.serve_card(
         parsed.card,
+        machine=parsed.machine,
         port=parsed.port,
         settings=settings_of(parsed),
         effects=parsed.effect,
@@ -133,9 +146,9 @@ def _serve(parsed: argparse.Namespace) -> int:
 
 
 def _release(parsed: argparse.Namespace) -> int:
-    left = rigtwin.release_card(parsed.card)
+    left = rigtwin.release_card(parsed.card, machine=parsed.machine)
     done = "what a dead program had is free" if left else "nothing had been left"
-    print(f"motor at zero, pressure off; {done}")
+    print(f"outputs at zero, power off; {done}")
     return 0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_machine, add_settings, settings_of
-from rigtwin.cli.supervised import add_supervised, is_the_rig, require_card, run
+from rigtwin.cli.supervised import add_supervised, require_card, run
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 
@@ -104,12 +104,7 @@ def _fresh(stem: str) -> Path:
 
 
 def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) -> int:
-    if not is_the_rig(machine):
-        raise RigtwinError(
-            "--card, --real-time and --target daq run the nominal suspension rig alone; "
-            f"{machine.name} has other components or values"
-        )
-    require_card(parsed)
+    require_card(parsed, machine)
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import rigtwin
 from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import add_effect, add_settings, settings_of
-from rigtwin.cli.supervised import add_supervised, is_the_rig, plan, require_card, require_twin
+from rigtwin.cli.supervised import add_supervised, plan, require_card
 from rigtwin.cli.supervised import run as run_supervised
 from rigtwin.errors import RigtwinError
 
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--machine",
         default=DEFAULT_MACHINE,
         metavar="F.toml",
-        help="the machine, by name or description; another than the suspension rig has a twin only",
+        help="the machine, by name or description (default: the suspension rig)",
     )
     add_effect(parser, "give the twin an effect that its settings do not tell")
     add_settings(parser)
@@ -48,17 +48,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     """Runs the list and tells of each test what the twin says of it."""
     machine = rigtwin.machine(parsed.machine)
-    if not is_the_rig(machine):
+    if machine.name != DEFAULT_MACHINE and not _needs_card(parsed):
         return _run_on_twin(parsed, machine)
     from rigtwin.hardware.session.permission import require_permission
 
-    require_card(parsed)
+    require_card(parsed, machine)
     real = parsed.target == "daq" and not parsed.dry_run
     code = 0
 
     def prepare(test: PlannedTest) -> None:
         ready = plan(_command_line(parsed, test), test.experiment)
-        _ = ready.card_configuration
+        ready.operation()
         if real:
             require_permission(ready, parsed.card, parsed.without_dry_run)
 
@@ -66,13 +66,14 @@ def execute(parsed: argparse.Namespace) -> int:
         nonlocal code
         code = run_supervised(_command_line(parsed, test), test.experiment, path)
         if code == 0:
-            _compare(path)
+            _compare(path, parsed.machine if machine.name != DEFAULT_MACHINE else None)
         return code == 0
 
     rigtwin.run_session(
         parsed.list,
         parsed.folder,
         run,
+        machine=machine,
         resume=parsed.resume,
         real=real,
         prepare=prepare,
@@ -81,12 +82,17 @@ def execute(parsed: argparse.Namespace) -> int:
     return code
 
 
+def _needs_card(parsed: argparse.Namespace) -> bool:
+    """Whether anything is asked that goes with a channel table alone."""
+    asked = ("card", "dry_run", "real_time", "arm", "without_dry_run", "stop_file", "live")
+    return parsed.target == "daq" or any(getattr(parsed, name) for name in asked)
+
+
 def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
     """Runs the list on the twin of any machine."""
     from rigtwin.description.changes import with_changes
     from rigtwin.simulation.experiment import find_experiment
 
-    require_twin(parsed, machine)
     code = 0
 
     def run(test: PlannedTest, path: Path) -> bool:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import rigtwin
+from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import settings_of
 from rigtwin.console import late, table
 from rigtwin.errors import RigtwinError
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
     from rigtwin import DryRun, Machine
-    from rigtwin.hardware.session.record import Test
+    from rigtwin.hardware.session.test import AnyTest
 
 
 def add_supervised(parser: argparse.ArgumentParser) -> None:
@@ -64,38 +65,21 @@ def add_supervised(parser: argparse.ArgumentParser) -> None:
     )
 
 
-OWN = ("card", "dry_run", "real_time", "arm", "without_dry_run", "stop_file", "live")
-"""Options of a session that only the suspension rig has."""
-
-
-def is_the_rig(machine: Machine) -> bool:
-    """Whether a machine is the nominal suspension rig, which a card is there for."""
-    from rigtwin.components import RigPlant
-
-    return machine.plant == RigPlant()
-
-
-def require_twin(parsed: argparse.Namespace, machine: Machine) -> None:
-    """Raises RigtwinError where something is asked of a machine that needs the rig itself."""
-    asked = [name for name in OWN if getattr(parsed, name)]
-    asked += ["target"] if parsed.target == "daq" else []
-    if asked:
+def require_card(parsed: argparse.Namespace, machine: Machine) -> None:
+    """Raises RigtwinError for a session that needs a channel table and has none."""
+    if parsed.card is None and parsed.target == "daq":
+        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
+    if parsed.card is None and parsed.real_time and machine.name != DEFAULT_MACHINE:
         raise RigtwinError(
-            f"--{asked[0].replace('_', '-')} is of the nominal suspension rig alone; "
-            f"{machine.name} has a twin only"
+            f"--real-time of {machine.name} needs a channel table of it: --card CARD.toml"
         )
 
 
-def require_card(parsed: argparse.Namespace) -> None:
-    """Raises RigtwinError for a session on the card without its table."""
-    if parsed.target == "daq" and parsed.card is None:
-        raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
-
-
-def plan(parsed: argparse.Namespace, name: str) -> Test:
+def plan(parsed: argparse.Namespace, name: str) -> AnyTest:
     """The test of a command line. Raises RigtwinError."""
     return rigtwin.plan_test(
         name,
+        machine=parsed.machine,
         card=parsed.card,
         settings=settings_of(parsed),
         seed=parsed.seed,
@@ -109,6 +93,7 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
     with _bar(test) as bar:
         given: dict[str, Any] = {
             "path": path,
+            "machine": parsed.machine,
             "seed": parsed.seed,
             "settings": settings_of(parsed),
             "stop_file": parsed.stop_file,
@@ -139,7 +124,7 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
     return _tell(test, path, ended.ticks, ended.cause, ended.completed)
 
 
-def _tell_dry_run(parsed: argparse.Namespace, test: Test, path: Path, found: DryRun) -> int:
+def _tell_dry_run(parsed: argparse.Namespace, test: AnyTest, path: Path, found: DryRun) -> int:
     from rigtwin.hardware.session.dry_run import ledger
 
     ticks = found.recording.ticks if found.recording is not None else 0
@@ -157,8 +142,8 @@ def _tell_dry_run(parsed: argparse.Namespace, test: Test, path: Path, found: Dry
     return code
 
 
-def _tell(test: Test, path: Path, ticks: int, cause: str, completed: bool) -> int:
-    seconds = ticks * test.configuration.timing.period
+def _tell(test: AnyTest, path: Path, ticks: int, cause: str, completed: bool) -> int:
+    seconds = ticks * test.period
     print(f"{test.experiment}: {seconds:.3f} s recorded in {path}; {cause}")
     lateness = rigtwin.load(path).lateness if ticks else {}
     if lateness:
@@ -166,7 +151,7 @@ def _tell(test: Test, path: Path, ticks: int, cause: str, completed: bool) -> in
     return 0 if completed else 3
 
 
-def _ask_to_arm(test: Test) -> bool:
+def _ask_to_arm(test: AnyTest) -> bool:
     from rigtwin.hardware.realtime import list_shortcomings
 
     for lacking in list_shortcomings():
@@ -185,11 +170,11 @@ def _ask_to_arm(test: Test) -> bool:
         return False
 
 
-def _bar(test: Test) -> tqdm:
+def _bar(test: AnyTest) -> tqdm:
     from tqdm import tqdm
 
     return tqdm(
-        total=len(test.demands),
+        total=test.ticks,
         unit="tick",
         unit_scale=True,
         disable=None,

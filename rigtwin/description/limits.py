@@ -41,6 +41,12 @@ class Limit:
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return float(np.max(np.abs(signal - middle))) / half
 
+    def nearest(self, signal: Array) -> tuple[float, float]:
+        """How far a signal, shape (ticks,), went from the middle of the limits, and how far it
+        may."""
+        half = 0.5 * (self.high - self.low)
+        return self.reach(signal) * half, half
+
 
 @dataclass(frozen=True)
 class Tripped:

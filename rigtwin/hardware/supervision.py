@@ -2,64 +2,28 @@
 
 The same for the real rig, its virtual card and the twin.
 
-Between controller and rig stand the limits of `rigtwin.simulation.safety` and the states of
+Between controller and rig stand its limits, which are part of its `Operation`, and the states of
 `rigtwin.hardware.supervisor`. Whatever goes wrong, the outputs go to the stop state at that tick:
-motor to zero force, cylinders hold, and after a while their pressure is taken off.
+no force, positions held, and after a while power is taken off.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from controllers import (
-    Commands,
-    Controller,
-    Demand,
-    Measurements,
-    Mode,
-    State,
-    controller,
-    initial_state,
-    update,
-)
-from controllers.force import MOTOR_CONSTANT
-from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
+from rigtwin.hardware.operation import Commands, Operation, Sample
 from rigtwin.hardware.realtime import Lateness, monotonic
 from rigtwin.hardware.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
-from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.rig import DrivenRig
-from rigtwin.simulation.safety import (
-    Trip,
-    empty_memory,
-    explain_trip,
-    find_arming_obstacle,
-    is_beyond,
-    judge_commands,
-    judge_measurements,
-    stop_state,
-)
-
-LOOKING = 0.3
-"""s for which the sensors are looked at before the rig is armed; it also warms up everything that
-a tick needs."""
-ARMED = 0.1
-"""s of pressure before anything is moved."""
-SETTLING = 0.3
-"""s at the start position between the ramp and the test."""
 
 OFTEN, MOST_MISSED = 0.005, 0.2
 """Share by which a tick enters the average of ticks missed, and what that may be: one in five,
 over some 200."""
-NOT_HELD = ("following", "structure", "ground", "travel", "velocity", "wheel")
-"""Causes after which cylinders are not held under pressure: one of them may be what is wrong."""
-UNREAD = Measurements(math.nan, math.nan, math.nan, math.nan)
-
-Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Commands]]
 
 
 class Recorder(Protocol):
@@ -88,8 +52,8 @@ class Recorder(Protocol):
         """
         ...
 
-    def beat(self, ground: float, structure: float) -> None:
-        """Called once a tick: the loop is alive, and holds the cylinders there, m."""
+    def beat(self, outputs: Sequence[float]) -> None:
+        """Called once a tick: the loop is alive, and these outputs would be safe."""
         ...
 
     def flush(self) -> None:
@@ -110,7 +74,7 @@ class SessionEnd:
     transitions : tuple of Transition
         All of them, in order.
     peaks : dict
-        Greatest magnitude of each measurement, and of the commands' voltage.
+        Greatest magnitude of each signal that the operation watches.
     """
 
     cause: Cause
@@ -121,12 +85,10 @@ class SessionEnd:
 
 def supervise(
     rig: DrivenRig,
-    configuration: Configuration,
-    demands: Array,
+    operation: Operation,
     recorder: Recorder,
     stop: Callable[[], str | None] = lambda: None,
     lateness: Lateness | None = None,
-    updating: Update = update,
     progress: Callable[[int], object] = lambda _: None,
 ) -> SessionEnd:
     """Runs a test, ramped in and out.
@@ -135,18 +97,14 @@ def supervise(
     ----------
     rig : DrivenRig
         What is moved.
-    configuration : Configuration
-        With the limits that the card adds.
-    demands : Array
-        Columns of controllers.Demand, shape (ticks, 3).
+    operation : Operation
+        The test, and how the machine is kept safe.
     recorder : Recorder
         Keeps what happens.
     stop : callable
         Looked at in every tick; a text stops the session and is its reason.
     lateness : Lateness, optional
         Is filled, if the rig runs in real time.
-    updating : Update
-        The controller. It is asked once before anything moves, and that answer is thrown away.
     progress : callable
         Called with the ticks done since its last call.
 
@@ -160,53 +118,32 @@ def supervise(
     RigtwinError
         Only before anything has moved.
     """
-    return _Session(
-        rig,
-        configuration,
-        demands,
-        recorder,
-        stop=stop,
-        lateness=lateness,
-        updating=updating,
-        progress=progress,
-    ).run()
+    return _Session(rig, operation, recorder, stop, lateness, progress).run()
 
 
 class _Session:
     def __init__(
         self,
         rig: DrivenRig,
-        configuration: Configuration,
-        demands: Array,
+        operation: Operation,
         recorder: Recorder,
         stop: Callable[[], str | None],
         lateness: Lateness | None,
-        updating: Update,
         progress: Callable[[int], object],
     ) -> None:
-        self._rig, self._limits, self._demands = rig, configuration.safety, demands
-        self._period = configuration.timing.period
+        self._rig, self._operation, self._course = rig, operation, operation.course
+        self._period, self._signals = operation.period, operation.signals
         self._recorder, self._stop, self._lateness = recorder, stop, lateness
-        self._updating, self._progress = updating, progress
-        self._controller = controller(configuration.controller, self._period)
-        self._state = initial_state(self._controller)
-        self._memory = empty_memory()
+        self._progress = progress
         self._supervisor = Supervisor(recorder.transition)
-        self._target = self._start_of(configuration, demands)
-        self._before = (LOOKING, ARMED, self._limits.ramp, SETTLING)
-        self._clock = -round(sum(self._before) / self._period)
-        self._held, self._pressure = Commands(0.0, 0.0, 0.0, 0.0), False
+        course = self._course
+        before = (course.looking, course.armed, course.ramp, course.settling)
+        self._clock = -round(sum(before) / self._period)
+        self._held, self._power = operation.rest, False
+        self._unread = self._signals.sample(*[math.nan] * len(self._signals.inputs))
         self._told = self._done_before = 0
         self._behind = 0.0
-        self._done, self._peaks = 0, [0.0] * 5
-
-    @staticmethod
-    def _start_of(configuration: Configuration, demands: Array) -> Commands:
-        settings = configuration.controller
-        ground, structure, force = demands[0].tolist()
-        if settings.mode != Mode.IMPOSED:
-            structure, force = settings.start, settings.preload
-        return Commands(ground, structure, force, force / MOTOR_CONSTANT)
+        self._done, self._peaks = 0, [0.0] * len(operation.watched)
 
     @property
     def _interval(self) -> float:
@@ -242,13 +179,12 @@ class _Session:
                 )
             recorder.flush()
             self._progress(self._done - self._done_before)
-        names = (*Measurements._fields, "voltage")
         transitions = tuple(self._supervisor.transitions)
         return SessionEnd(
             transitions[-1].cause,
             self._done,
             transitions,
-            dict(zip(names, self._peaks, strict=True)),
+            dict(zip(self._operation.watched, self._peaks, strict=True)),
         )
 
     def _look(self) -> Commands:
@@ -258,21 +194,14 @@ class _Session:
         armed.
         """
         measured = self._rig.read()
-        refused = find_arming_obstacle(self._limits, measured)
+        refused = self._operation.look(measured)
         if refused is not None:
             raise RigtwinError(f"not armed: {refused}")
-        rest = self._held = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
-        self._updating(self._controller, self._state, measured, Demand(*self._demands[0].tolist()))
-        for _ in range(max(round(LOOKING / self._period), 1)):
+        rest = self._held = self._operation.rest
+        for _ in range(max(round(self._course.looking / self._period), 1)):
             self._rig.write(rest)
             cause = self._find_fault(measured)
-            number, column = judge_commands(
-                self._limits, self._interval, self._memory, measured, rest
-            )
-            if number != Trip.NONE:
-                cause = Cause(
-                    Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
-                )
+            cause = self._operation.judge_commands(measured, rest, self._interval) or cause
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
             self._row(measured, rest)
@@ -286,42 +215,46 @@ class _Session:
             Cause("operator", "every sensor lives and is within its limit", fault=False),
             self._time,
         )
-        self._pressure = True
-        self._rig.pressure(True)
-        for _ in range(round(ARMED / self._period)):
+        self._power = True
+        self._rig.power(True)
+        for _ in range(round(self._course.armed / self._period)):
             cause = self._tick(lambda _: rest)
             if cause is not None:
                 return cause
         self._supervisor.go(
             Phase.RAMPING, Cause("ramp", "ramping to the start", fault=False), self._time
         )
-        for share in _cosine_shares(self._limits.ramp, self._period):
-            between = Commands(
-                *(a + share * (b - a) for a, b in zip(rest, self._target, strict=True))
-            )
+        for between in self._ramp(rest, self._operation.target):
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
         while self._clock < 0:
-            cause = self._tick(lambda _: self._target)
+            cause = self._tick(lambda _: self._operation.target)
             if cause is not None:
                 return cause
         self._clock = 0
         self._supervisor.go(
             Phase.RUNNING, Cause("test", "at the start; the test begins", fault=False), self._time
         )
-        while self._clock < len(self._demands):
+        while self._clock < self._operation.ticks:
             cause = self._tick(self._control)
             if cause is not None:
                 return cause
         return COMPLETED
 
-    def _control(self, measured: Measurements) -> Commands:
-        demand = Demand(*self._demands[self._clock].tolist())
-        self._state, commands = self._updating(self._controller, self._state, measured, demand)
-        return commands
+    def _control(self, measured: Sample) -> Commands:
+        return self._operation.control(self._clock, measured)
 
-    def _tick(self, command: Callable[[Measurements], Commands]) -> Cause | None:
+    def _ramp(self, begin: Commands, end: Commands) -> Iterator[Commands]:
+        """From one to the other, without a jump in velocity; nothing where no time is for it."""
+        if self._course.ramp == 0.0:
+            return
+        for share in _cosine_shares(self._course.ramp, self._period):
+            yield self._signals.commands(
+                *(a + share * (b - a) for a, b in zip(begin, end, strict=True))
+            )
+
+    def _tick(self, command: Callable[[Sample], Commands]) -> Cause | None:
         """One tick: read, look, command, look, write.
 
         Returns why the session must stop, after the outputs are at the stop state, or None.
@@ -336,19 +269,13 @@ class _Session:
         if self._lateness is not None:
             self._lateness.missed += self._rig.missed
         cause = self._find_fault(measured)
-        if cause is None and running and self._clock >= len(self._demands):
+        if cause is None and running and self._clock >= self._operation.ticks:
             return COMPLETED
         commands = self._held
         if cause is None:
             try:
                 commands = command(measured)
-                number, column = judge_commands(
-                    self._limits, self._interval, self._memory, measured, commands
-                )
-                if number != Trip.NONE:
-                    cause = Cause(
-                        Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
-                    )
+                cause = self._operation.judge_commands(measured, commands, self._interval)
             except Exception as error:
                 commands = self._held
                 cause = Cause(
@@ -367,15 +294,13 @@ class _Session:
             self._lateness.add(getattr(self._rig, "late", 0.0), monotonic() - begun)
         return None
 
-    def _find_fault(self, measured: Measurements) -> Cause | None:
+    def _find_fault(self, measured: Sample) -> Cause | None:
         """What is wrong besides the commands."""
-        self._recorder.beat(self._held.ground, self._held.structure)
-        number, column = judge_measurements(self._limits, self._interval, self._memory, measured)
-        missed = self._rig.missed
-        if missed > self._limits.missed:
-            return Cause(
-                "late", f"{missed} ticks missed in a row; at most {self._limits.missed:g} may be"
-            )
+        self._beat()
+        found = self._operation.judge_measured(measured, self._interval)
+        missed, most = self._rig.missed, self._operation.missed
+        if missed > most:
+            return Cause("late", f"{missed} ticks missed in a row; at most {most:g} may be")
         self._behind += OFTEN * (missed / (1.0 + missed) - self._behind)
         if self._behind > MOST_MISSED:
             return Cause(
@@ -383,10 +308,8 @@ class _Session:
                 f"of the last ticks {100 * self._behind:.0f} % were missed; "
                 "the loop cannot keep the pace",
             )
-        if number != Trip.NONE:
-            return Cause(
-                Trip(number).name.lower(), explain_trip(Trip(number), self._limits, column)
-            )
+        if found is not None:
+            return found
         fault = self._recorder.fault
         if fault is not None:
             return Cause("recording", fault)
@@ -396,77 +319,81 @@ class _Session:
     def _halt(
         self,
         cause: Cause,
-        measured: Measurements = UNREAD,
+        measured: Sample = None,
         commands: Commands | None = None,
         tick: float = math.nan,
     ) -> Cause:
-        """Outputs to the stop state, now: no force, cylinders where they were last told to be.
+        """Outputs to the stop state, now: no force, positions where they were last told to be.
 
         Then it is noted.
         """
-        self._held = stop_state(self._limits, self._held)
+        self._held = self._operation.stop_state(self._held)
         try:
             self._rig.write(self._held)
         except Exception:
-            self._pressure = False
+            self._power = False
             self._rig.stop()
-        self._row(measured, commands or self._held, tick)
+        self._row(self._unread if measured is None else measured, commands or self._held, tick)
         return cause
 
     def _come_to_rest(self, cause: Cause, rest: Commands) -> None:
-        """Back to where it stood, if all is well; else hold. Then take the pressure off."""
+        """Back to where it stood, if all is well; else hold. Then take the power off."""
         self._supervisor.go(Phase.STOPPING, cause, self._time)
         if cause == COMPLETED:
             later = self._ramp_out(rest)
             cause = later or cause
-        for _ in range(0 if cause.name in NOT_HELD else round(self._limits.hold / self._period)):
-            if not self._pressure or not self._hold():
+        holds = self._operation.holds_after(cause)
+        for _ in range(round(self._course.hold / self._period) if holds else 0):
+            if not self._power or not self._hold():
                 break
         try:
-            self._rig.pressure(False)
+            self._rig.power(False)
         except Exception:
             self._rig.stop()
-        self._pressure = False
+        self._power = False
         # Nothing is left that could move: giving the card back may take its time.
         self._supervisor.go(Phase.FAULTED if cause.fault else Phase.STOPPED, cause, self._time)
 
     def _ramp_out(self, rest: Commands) -> Cause | None:
         begin = self._held
-        for share in _cosine_shares(self._limits.ramp, self._period):
-            between = Commands(*(a + share * (b - a) for a, b in zip(begin, rest, strict=True)))
+        for between in self._ramp(begin, rest):
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
-        self._held = stop_state(self._limits, self._held)
+        self._held = self._operation.stop_state(self._held)
         return None
 
     def _hold(self) -> bool:
         """A tick of holding.
 
-        False if there is no use in it: the card is gone, or a cylinder is beyond its limit.
+        False if there is no use in it: the card is gone, or it must not be held.
         """
         try:
             measured = self._rig.read()
             self._rig.write(self._held)
         except Exception:
             return False
-        self._recorder.beat(self._held.ground, self._held.structure)
+        self._beat()
         self._clock += self._rig.missed
         self._row(measured, self._held)
-        return not is_beyond(self._limits, measured)
+        return self._operation.may_be_held(measured)
 
-    def _row(self, measured: Measurements, commands: Commands, tick: float = math.nan) -> None:
+    def _beat(self) -> None:
+        safe = self._operation.stop_state(self._held)
+        self._recorder.beat(self._signals.to_write(safe))
+
+    def _row(self, measured: Sample, commands: Commands, tick: float = math.nan) -> None:
         """Notes a tick, which is over with that.
 
         tick: its number in the test, if it is of the test.
         """
         held, rig = self._held, self._rig
-        written = (held.ground, held.structure, held.voltage, float(self._pressure))
+        written = (*self._signals.to_write(held), float(self._power))
         late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)
         self._recorder.tick(
             (self._time, phase, *written, *measured, late, float(rig.missed), *commands, tick)
         )
-        for place, value in enumerate((*measured, commands.voltage)):
+        for place, value in enumerate(self._operation.watch(measured, commands)):
             if abs(value) > self._peaks[place]:
                 self._peaks[place] = abs(value)
         self._done += not math.isnan(tick)

@@ -148,6 +148,26 @@ def list_parts(machine: Machine) -> list[ReplayOf]:
     return [together, *(replay for replay in machine.replays if replay not in pushed)]
 
 
+def begin_live(
+    machine: Machine, configuration: Configuration, outputs: Sequence[str], sensors: Sequence[Row]
+) -> SteppedTwin:
+    """A machine whose joints are all pushed, before a test of any length.
+
+    Parameters
+    ----------
+    machine
+        Its description.
+    configuration
+        With the effects that it has.
+    outputs, sensors
+        All its actuators, and the sensors that are read.
+    """
+    (replay,) = list_parts(machine)
+    nothing: dict[str, Array] = {name: np.zeros(2) for name in outputs}
+    twin, _ = _at_start(machine, replay, configuration, nothing)
+    return twin.begin(configuration.plant, outputs, sensors)
+
+
 def move_freely(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
 ) -> Moved:

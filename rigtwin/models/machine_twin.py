@@ -141,7 +141,11 @@ def simulate_machine(
         for name, channel in movers.items()
         if name not in outputs
     }
-    command = _command(machine, configuration, columns, controller) if outputs else None
+    command: Command | None = None
+    if controller is not None:
+        command = command_by_function(controller, columns)
+    elif outputs:
+        command = command_of(machine, configuration, columns)
     away: list[str] = []
     for replay in list_parts(machine):
         mine = {name: given[name] for name in replay.moved_by if name in given}
@@ -178,12 +182,9 @@ BLOCK = 250
 FINISHED = "completed"
 
 
-def _command(
-    machine: Machine, configuration: Configuration, columns: Columns, controller: Tick | None
-) -> Command:
-    """What commands joints that act on each other."""
-    if controller is not None:
-        return command_by_function(controller, columns)
+def command_of(machine: Machine, configuration: Configuration, columns: Columns) -> Command:
+    """The described controller of a machine. columns: what is demanded, topic → field → signal,
+    shape (ticks,)."""
     control = machine.control
     assert isinstance(control, FormulaControl)
     read = {name: machine.components[name].channel for name in list_sensors(machine)}

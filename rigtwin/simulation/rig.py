@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 from controllers import Commands, Measurements
 
@@ -28,15 +28,31 @@ class Rig(Protocol):
         ...
 
 
-class DrivenRig(Rig, Protocol):
-    """A rig that is ramped in and out, as the real one must be: it also has hydraulic pressure, and
-    may be late.
+class DrivenRig(Protocol):
+    """A machine that is led into a test and out of it, as a real one must be: its actuators also
+    have power, and it may be late. Samples and commands are those of its `Signals`.
 
     missed: ticks that passed unread before the last `read`.
     """
 
     missed: int
 
-    def pressure(self, on: bool) -> None:
-        """Lets the hydraulics have pressure, or takes it off."""
+    def start(self) -> None:
+        """Makes it ready; nothing moves."""
+        ...
+
+    def read(self) -> tuple[float, ...]:
+        """Samples all sensors; waits for the next tick if it has a clock."""
+        ...
+
+    def write(self, commands: Any) -> None:
+        """Sets the outputs, which hold until the next write."""
+        ...
+
+    def power(self, on: bool) -> None:
+        """Lets the actuators have power, such as hydraulics their pressure, or takes it off."""
+        ...
+
+    def stop(self) -> None:
+        """Forces to zero, power off."""
         ...

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controllers import Commands, Measurements
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.conversion import conversion, rows
 from rigtwin.hardware.daq.table import ChannelTable
@@ -109,12 +108,13 @@ class Card:
         waits for the ticks of a card that has no clock of its own.
         """
         self._table, self._period, self._channel = table, period, channel
-        # A tick converts seven numbers: handing them to compiled code would take longer.
+        # A tick converts a few numbers: handing them to compiled code would take longer.
         self._inputs, self._outputs = (
             rows(conversion(table.inputs)),
             rows(conversion(table.outputs)),
         )
-        self._volts, self._asked = np.zeros(4), np.zeros(3)
+        self._volts, self._asked = np.zeros(len(table.inputs)), np.zeros(len(table.outputs))
+        self._signals = table.signals
         self._pacer, self._clock = pacer, clock
         self._start, self._count, self.missed, self.late = -1.0, 0, 0, 0.0
         self._tasks: list[Any] = []
@@ -140,9 +140,9 @@ class Card:
                 "inputs": [channel.name for channel in device.ai_physical_chans],
                 "outputs": [channel.name for channel in device.ao_physical_chans],
             }
-            if table.physical(table.pressure) not in [line.name for line in device.do_lines]:
+            if table.physical(table.power) not in [line.name for line in device.do_lines]:
                 raise CardFault(
-                    f"card.pressure: {device.product_type} has no line {table.pressure}"
+                    f"card.{table.signals.power}: {device.product_type} has no line {table.power}"
                 )
             ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
             for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
@@ -181,7 +181,7 @@ class Card:
                 outputs.ao_channels.add_ao_voltage_chan(
                     table.physical(line.line), min_val=-volts, max_val=volts
                 )
-            pressure.do_channels.add_do_chan(table.physical(table.pressure))
+            pressure.do_channels.add_do_chan(table.physical(table.power))
             if table.timing == "hardware":
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
@@ -194,13 +194,13 @@ class Card:
             self._writer.auto_start = False
             for task in (outputs, pressure, inputs):
                 task.start()
-            self._stream, self._pressure = (
+            self._stream, self._power = (
                 inputs.in_stream,
                 DigitalSingleChannelWriter(pressure.out_stream),
             )
-            self._pressure.auto_start = False
+            self._power.auto_start = False
 
-    def read(self) -> Measurements:
+    def read(self) -> tuple[float, ...]:
         self.missed = 0
         if self._pacer is not None:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
@@ -212,7 +212,9 @@ class Card:
             with translate_errors(f"card {self._table.device} gives no sample"):
                 raise error
         samples = zip(self._inputs, self._volts.tolist(), strict=True)
-        return Measurements(*[factor * volts + offset for (factor, offset, _), volts in samples])
+        return self._signals.sample(
+            *[factor * volts + offset for (factor, offset, _), volts in samples]
+        )
 
     def _drop_what_is_old(self) -> None:
         """A loop that was late finds samples waiting: only the last is worth an answer."""
@@ -223,7 +225,7 @@ class Card:
         if self.late > 0.5 * self._period:
             self.missed = self._stream.avail_samp_per_chan
             if self.missed:
-                waiting = np.empty((4, self.missed))
+                waiting = np.empty((len(self._volts), self.missed))
                 self._reader.read_many_sample(waiting, self.missed, TIMEOUT)
                 self._volts[:] = waiting[:, -1]
             self._count += self.missed
@@ -233,42 +235,42 @@ class Card:
             self._start, self.late = now - self._count * self._period, 0.0
         self._count += 1
 
-    def write(self, commands: Commands) -> None:
-        self._asked[:] = self._to_volts(commands)
+    def write(self, commands: tuple[float, ...]) -> None:
+        self._asked[:] = self._to_volts(self._signals.to_write(commands))
         try:
             self._writer.write_one_sample(self._asked)
         except Exception as error:
             with translate_errors(f"card {self._table.device} takes no output"):
                 raise error
 
-    def _to_volts(self, commands: Commands) -> list[float]:
-        asked = zip(
-            self._outputs, (commands.ground, commands.structure, commands.voltage), strict=True
-        )
+    def _to_volts(self, values: list[float]) -> list[float]:
+        asked = zip(self._outputs, values, strict=True)
         return [
             min(max((value - offset) / factor, -reach), reach)
             for (factor, offset, reach), value in asked
         ]
 
-    def pressure(self, on: bool) -> None:
-        with translate_errors(f"card {self._table.device}: pressure line {self._table.pressure}"):
-            self._pressure.write_one_sample_one_line(on)
+    def power(self, on: bool) -> None:
+        with translate_errors(f"card {self._table.device}: pressure line {self._table.power}"):
+            self._power.write_one_sample_one_line(on)
 
     def stop(self) -> None:
-        """Motor to zero, pressure off, the card's lines given back.
+        """Forces to zero, power off, the card's lines given back.
 
         A card that takes no output any more is reset, which sets them to zero. Never raises: there
         is nobody left to hear it.
         """
         if len(self._tasks) == 3:
-            self._asked[2] = self._to_volts(Commands(0.0, 0.0, 0.0, 0.0))[2]
+            nothing = self._to_volts([0.0] * len(self._outputs))
+            for place in self._signals.released_places:
+                self._asked[place] = nothing[place]
             refused = False
             try:
                 self._writer.write_one_sample(self._asked)
             except Exception:
                 refused = True
             try:
-                self._pressure.write_one_sample_one_line(False)
+                self._power.write_one_sample_one_line(False)
             except Exception:
                 refused = True
             if refused:

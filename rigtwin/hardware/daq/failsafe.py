@@ -18,6 +18,7 @@ from rigtwin.hardware.daq.card import (
 )
 from rigtwin.hardware.daq.conversion import conversion, to_volts
 from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.numerics.arrays import Array
 
 
 class LastResort:
@@ -32,9 +33,10 @@ class LastResort:
     def __init__(self, table: ChannelTable) -> None:
         self._table, self._conversion = table, conversion(table.outputs)
         self._outputs: Any = None
-        self._pressure: Any = None
+        self._power: Any = None
         self._tasks: list[Any] = []
-        self._values, self._volts = np.zeros(3), np.empty(3)
+        count = len(table.outputs)
+        self._values, self._volts = np.zeros(count), np.empty(count)
         to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
 
         connect(table.address)  # loads the driver's client, which takes a while
@@ -45,12 +47,12 @@ class LastResort:
             with translate_errors(f"card {self._table.device}: watching it"):
                 self._attach()
 
-    def force_off(self, positions: Sequence[float]) -> None:
-        """Sets the motor to zero force and holds the cylinders at positions, m.
+    def hold(self, outputs: Sequence[float] | Array) -> None:
+        """Sets the outputs to the values that are safe now: no force, positions held.
 
         Raises CardFault.
         """
-        self._values[:2] = positions
+        self._values[:] = outputs
         to_volts(self._conversion, self._values, self._volts)
         with translate_errors(f"card {self._table.device}: stopping it"):
             if self._outputs is None:
@@ -58,13 +60,13 @@ class LastResort:
             assert self._outputs is not None
             self._outputs.write_one_sample(self._volts)
 
-    def pressure_off(self) -> None:
+    def power_off(self) -> None:
         """Raises CardFault."""
-        with translate_errors(f"card {self._table.device}: taking its pressure off"):
-            if self._pressure is None:
+        with translate_errors(f"card {self._table.device}: taking its power off"):
+            if self._power is None:
                 self._take()
-            assert self._pressure is not None
-            self._pressure.write_one_sample_one_line(False)
+            assert self._power is not None
+            self._power.write_one_sample_one_line(False)
 
     def close(self) -> None:
         """Gives the lines back."""
@@ -73,7 +75,7 @@ class LastResort:
                 task.stop()
             with suppress(Exception):
                 task.close()
-        self._tasks, self._outputs, self._pressure = [], None, None
+        self._tasks, self._outputs, self._power = [], None, None
 
     def _attach(self) -> None:
         from nidaqmx import Task
@@ -109,22 +111,22 @@ class LastResort:
             outputs.ao_channels.add_ao_voltage_chan(
                 self._table.physical(line.line), min_val=-volts, max_val=volts
             )
-        pressure.do_channels.add_do_chan(self._table.physical(self._table.pressure))
+        pressure.do_channels.add_do_chan(self._table.physical(self._table.power))
         self._open_writers(started=False)
 
     def _open_writers(self, started: bool) -> None:
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)
-        self._pressure = DigitalSingleChannelWriter(self._tasks[1].out_stream)
-        self._outputs.verify_array_shape = self._pressure.verify_array_shape = False
-        self._outputs.auto_start = self._pressure.auto_start = not started
+        self._power = DigitalSingleChannelWriter(self._tasks[1].out_stream)
+        self._outputs.verify_array_shape = self._power.verify_array_shape = False
+        self._outputs.auto_start = self._power.auto_start = not started
 
 
 def release(table: ChannelTable) -> bool:
     """Frees what a program that died has left on a gRPC device server.
 
-    Motor to zero, pressure off, its tasks ended. Returns whether there was anything. Raises
+    Forces to zero, power off, its tasks ended. Returns whether there was anything. Raises
     CardFault if the outputs could not be set.
     """
     resort = LastResort(table)
@@ -133,7 +135,7 @@ def release(table: ChannelTable) -> bool:
         left = True
     except CardFault:
         left = False
-    resort.pressure_off()
-    resort.force_off((0.0, 0.0))
+    resort.power_off()
+    resort.hold([0.0] * len(table.outputs))
     resort.close()
     return left

@@ -8,24 +8,21 @@ value = sign · scale · volts + offset, in both directions.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar
 
-from controllers import Measurements
 from controllers.quantity import Quantity, fields
 from rigtwin.description.changes import check_value, read_toml
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.channels import CHANNELS
+from rigtwin.hardware.daq.signals import RIG, Signal, Signals
 
 Group = TypeVar("Group")
-OUTPUTS = ("ground", "structure", "voltage")
-"""Commands that go to the card, in the order of its writes. The force demanded stays inside the
-controller."""
-UNITS = {(channel.topic, channel.name): channel.unit for channel in CHANNELS}
+OUTPUTS = tuple(signal.name for signal in RIG.outputs)
+"""Commands of the rig that go to the card, in the order of its writes."""
 HEADROOM = 1.05
 """A signal must be readable this far beyond its limit: one that stops at its limit can never be
 seen to exceed it."""
@@ -64,8 +61,15 @@ class Plausible(NamedTuple):
     ] = 100.0
 
 
+class Alive(NamedTuple):
+    """What living sensors of a described machine cannot do. stuck: same readings in a row; 0 where
+    a sensor that is alive may well give them."""
+
+    stuck: Annotated[float, Quantity("tick", 0.0, 1e9, "of readings as the card has them")] = 0.0
+
+
 class Line(NamedTuple):
-    """One signal of the rig.
+    """One signal of the machine.
 
     line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen
     the signal move the way that it should.
@@ -90,9 +94,10 @@ class ChannelTable:
     Parameters
     ----------
     inputs, outputs : tuple of Line
-        In the order of Measurements and of OUTPUTS.
-    pressure : str
-        The digital line that lets the hydraulics have pressure while high.
+        In the order of its machine's signals.
+    power : str
+        The digital line that lets the actuators have power while high: of the rig, the hydraulics
+        their pressure.
     plausible : Plausible
         What its sensors cannot do.
     device : str
@@ -103,18 +108,21 @@ class ChannelTable:
         hardware or software: whose clock the inputs follow.
     calibrated, operator, note : str
         When, by whom, and what they say.
+    signals : Signals
+        Of the machine that it is of.
     """
 
     inputs: tuple[Line, ...]
     outputs: tuple[Line, ...]
-    pressure: str
-    plausible: Plausible
+    power: str
+    plausible: Plausible | Alive
     device: str = "Dev1"
     address: str = ""
     timing: str = "hardware"
     calibrated: str = ""
     operator: str = ""
     note: str = ""
+    signals: Signals = RIG
 
     @property
     def lines(self) -> tuple[Line, ...]:
@@ -134,18 +142,21 @@ class ChannelTable:
         )
 
 
-def load_table(path: Path) -> ChannelTable:
-    """Reads a channel table. Raises RigtwinError naming file and fault."""
-    return read_toml(path, parse_table)
+def load_table(path: Path, signals: Signals = RIG) -> ChannelTable:
+    """Reads the channel table of a machine with these signals. Raises RigtwinError naming file and
+    fault."""
+    return read_toml(path, lambda tables: parse_table(tables, signals))
 
 
-def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
+def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTable:
     """Reads a channel table from TOML's tables.
 
     Parameters
     ----------
     tables : mapping
         [card], [plausible], [inputs.NAME], [outputs.NAME].
+    signals : Signals
+        Of its machine.
 
     Returns
     -------
@@ -168,17 +179,17 @@ def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
     if not isinstance(card, Mapping):
         raise RigtwinError("card: expected a table, [card]")
     for key, value in card.items():
-        if key not in (*_FREE_TEXT, "pressure"):
+        if key not in (*_FREE_TEXT, signals.power):
             raise RigtwinError(
-                f"unknown setting card.{key}; [card] has {', '.join((*_FREE_TEXT, 'pressure'))}"
+                f"unknown setting card.{key}; [card] has {', '.join((*_FREE_TEXT, signals.power))}"
             )
         if not isinstance(value, str):
             raise RigtwinError(f"card.{key} = {value!r}: expected text")
-    pressure = card.get("pressure", "")
-    if not _DIGITAL.fullmatch(pressure):
+    power = card.get(signals.power, "")
+    if not _DIGITAL.fullmatch(power):
         raise RigtwinError(
-            f"card.pressure = {pressure!r}: expected the hydraulics' digital line, "
-            "such as 'port0/line0'"
+            f"card.{signals.power} = {power!r}: expected the digital line that lets the actuators "
+            "have power, such as 'port0/line0'"
         )
     timing = card.get("timing", "hardware")
     if timing not in _TIMINGS:
@@ -188,8 +199,8 @@ def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
             f"card.device = {card['device']!r}: expected the driver's name of the card, "
             "such as 'Dev1'"
         )
-    inputs = _lines("inputs", tables.get("inputs", {}), Measurements._fields, "/sensor")
-    outputs = _lines("outputs", tables.get("outputs", {}), OUTPUTS, "/command")
+    inputs = _lines("inputs", tables.get("inputs", {}), signals.inputs)
+    outputs = _lines("outputs", tables.get("outputs", {}), signals.outputs)
     taken: dict[str, str] = {}
     for line in inputs + outputs:
         if line.line in taken:
@@ -199,12 +210,14 @@ def parse_table(tables: Mapping[str, Any]) -> ChannelTable:
             )
         taken[line.line] = line.name
     texts = {key: card[key] for key in _FREE_TEXT if key in card}
+    plausible = Plausible if signals is RIG else Alive
     return ChannelTable(
         inputs,
         outputs,
-        pressure,
-        _numbers("plausible", tables.get("plausible", {}), Plausible),
+        power,
+        _numbers("plausible", tables.get("plausible", {}), plausible),
         **texts,
+        signals=signals,
     )
 
 
@@ -220,7 +233,8 @@ def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
     )
 
 
-def _lines(group: str, tables: Any, names: tuple[str, ...], topic: str) -> tuple[Line, ...]:
+def _lines(group: str, tables: Any, signals: Sequence[Signal]) -> tuple[Line, ...]:
+    names = [signal.name for signal in signals]
     if not isinstance(tables, Mapping):
         raise RigtwinError(f"{group}: expected tables, such as [{group}.{names[0]}]")
     for name in tables:
@@ -231,7 +245,7 @@ def _lines(group: str, tables: Any, names: tuple[str, ...], topic: str) -> tuple
             raise RigtwinError(
                 f"[{group}.{name}] is missing; each of {', '.join(names)} needs its line"
             )
-    return tuple(_line(group, name, tables[name], UNITS[topic, name]) for name in names)
+    return tuple(_line(group, s.name, tables[s.name], s.unit) for s in signals)
 
 
 def _line(group: str, name: str, table: Any, unit: str) -> Line:
@@ -263,18 +277,27 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
 
 
 def require_ranges(table: ChannelTable, safety: Safety) -> None:
-    """Raises RigtwinError unless every limit lies within what its line can carry."""
-    limits = {
-        "ground_lvdt": ("safety.ground", safety.ground),
-        "structure_lvdt": ("safety.structure", safety.structure),
-        "suspension_lvdt": ("safety.travel", safety.travel),
-        "load_cell": ("safety.force", safety.force),
-        "ground": ("safety.ground", safety.ground),
-        "structure": ("safety.structure", safety.structure),
-    }
+    """Raises RigtwinError unless every limit of the rig lies within what its line can carry."""
+    require_reach(
+        table,
+        {
+            "ground_lvdt": ("safety.ground", safety.ground),
+            "structure_lvdt": ("safety.structure", safety.structure),
+            "suspension_lvdt": ("safety.travel", safety.travel),
+            "load_cell": ("safety.force", safety.force),
+            "ground": ("safety.ground", safety.ground),
+            "structure": ("safety.structure", safety.structure),
+        },
+    )
+
+
+def require_reach(table: ChannelTable, limits: Mapping[str, tuple[str, float]]) -> None:
+    """Raises RigtwinError unless every limit lies within what its line can carry. limits: signal →
+    the limit's name, and its magnitude."""
+    inputs = [line.name for line in table.inputs]
     for line in table.lines:
         key, limit = limits.get(line.name, ("", 0.0))
-        if line.reach < HEADROOM * limit and line.name in Measurements._fields:
+        if line.reach < HEADROOM * limit and line.name in inputs:
             raise RigtwinError(
                 "range too small for the limit: "
                 f"{line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
@@ -296,10 +319,12 @@ def require_trust(table: ChannelTable, today: date) -> None:
     """
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
-        raise RigtwinError(
-            f"sign not checked: {', '.join(unchecked)}; "
+        how = (
             "rigtwin card check moves each a little and looks"
+            if table.signals is RIG
+            else "move each a little, and say sign_checked = true once it goes the right way"
         )
+        raise RigtwinError(f"sign not checked: {', '.join(unchecked)}; {how}")
     try:
         calibrated = date.fromisoformat(table.calibrated)
     except ValueError:
@@ -311,7 +336,7 @@ def require_trust(table: ChannelTable, today: date) -> None:
     if (today - calibrated).days > OLDEST:
         raise RigtwinError(
             f"card.calibrated = {table.calibrated}: that is more than {OLDEST // 365} years ago; "
-            "rigtwin card check calibrates anew"
+            "calibrate it anew"
         )
     if not table.operator.strip():
         raise RigtwinError("card.operator is missing: expected who calibrated it")
@@ -319,7 +344,7 @@ def require_trust(table: ChannelTable, today: date) -> None:
 
 def to_toml(table: ChannelTable) -> str:
     """The table as TOML."""
-    lines = ["[card]", f"pressure = {_quote(table.pressure)}"]
+    lines = ["[card]", f"{table.signals.power} = {_quote(table.power)}"]
     lines += [f"{key} = {_quote(getattr(table, key))}" for key in _FREE_TEXT]
     lines += [
         "",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controllers import Commands, Measurements
+from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import RigPlant
 from rigtwin.description.configuration import Configuration
@@ -15,13 +15,10 @@ from rigtwin.hardware.daq.conversion import (
     Conversion,
     conversion,
     digitise,
-    to_values,
-    to_volts,
     values_of,
     volts_of,
 )
 from rigtwin.hardware.daq.table import ChannelTable
-from rigtwin.hardware.realtime import Pacer
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sample_sensors, sensors
@@ -111,13 +108,13 @@ class Terminals:
             self._live, twin.sensing, self._noise[0], self._inputs, self.truth, self.volts
         )
 
-    def advance(self, written: Array, pressure: bool) -> None:
+    def advance(self, written: Array, power: bool) -> None:
         """One period under voltages that the outputs hold, shape (3,), then the next sample."""
         self._place += 1
         if self._place == AHEAD:
             self._noise, self._place = self._twin.disturbance.take(AHEAD), 0
         _advance(
-            plant=self._live if pressure else self._dead,
+            plant=self._live if power else self._dead,
             sensing=self._twin.sensing,
             disturbance=self._noise[self._place],
             inputs=self._inputs,
@@ -127,66 +124,3 @@ class Terminals:
             truth=self.truth,
             volts=self.volts,
         )
-
-
-class WiredTwin:
-    """The twin as a rig behind the converters of a channel table, without a card: a `DrivenRig`."""
-
-    def __init__(self, terminals: Terminals, table: ChannelTable) -> None:
-        self._terminals, self.missed = terminals, 0
-        self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
-        self._held, self._values, self._commands = np.zeros(3), np.empty(4), np.empty(3)
-        self._pressure, self._fresh = False, True
-
-    @property
-    def truth(self) -> Measurements:
-        """The last measurements without noise."""
-        return Measurements(*self._terminals.truth.tolist())
-
-    def start(self) -> None:
-        """Nothing to do: a twin stands where it was built."""
-
-    def read(self) -> Measurements:
-        if not self._fresh:
-            self._terminals.advance(self._held, self._pressure)
-        self._fresh = False
-        to_values(self._inputs, self._terminals.volts, self._values)
-        return Measurements(*self._values.tolist())
-
-    def write(self, commands: Commands) -> None:
-        self._commands[:] = commands.ground, commands.structure, commands.voltage
-        to_volts(self._outputs, self._commands, self._held)
-
-    def pressure(self, on: bool) -> None:
-        self._pressure = on
-
-    def stop(self) -> None:
-        """Motor to zero, pressure off."""
-        self._commands[:] = 0.0, 0.0, 0.0
-        to_volts(self._outputs, self._commands, self._commands)
-        self._held[2], self._pressure = self._commands[2], False
-
-
-class InRealTime:
-    """A twin that is read in real time: a `DrivenRig` around another."""
-
-    def __init__(self, rig: WiredTwin, period: float) -> None:
-        self._rig, self._pacer, self.missed, self.late = rig, Pacer(period), 0, 0.0
-
-    def start(self) -> None:
-        self._rig.start()
-
-    def read(self) -> Measurements:
-        self.missed, self.late = self._pacer.wait(), self._pacer.late
-        for _ in range(self.missed):
-            self._rig.read()
-        return self._rig.read()
-
-    def write(self, commands: Commands) -> None:
-        self._rig.write(commands)
-
-    def pressure(self, on: bool) -> None:
-        self._rig.pressure(on)
-
-    def stop(self) -> None:
-        self._rig.stop()

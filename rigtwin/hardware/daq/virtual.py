@@ -13,15 +13,14 @@ import re
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from google.protobuf.message import Message
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.realtime import monotonic, sleep_until
-from rigtwin.numerics.arrays import Array
 
 NO_DEVICE, NO_CHANNEL, RESERVED, BAD_VALUE, OVERWRITTEN, TIMEOUT, NO_TASK, GONE = (
     -200220, -200170, -50103, -200077, -200279, -200284, -200088, -88705
@@ -46,15 +45,6 @@ class DriverError(Exception):
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
         self.code = code
-
-
-class Wired(Protocol):
-    """What is at the card's terminals."""
-
-    @property
-    def volts(self) -> Array: ...
-
-    def advance(self, written: Array, pressure: bool) -> None: ...
 
 
 class OnDemand:
@@ -112,7 +102,7 @@ class VirtualCard:
 
     Thread-safe. `answer` takes a call's name, its request, and the class of its response.
 
-    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). pressure: the digital
+    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). power: the digital
     line. Before the first tick and after `disconnect` all outputs are at zero. wiring: the card's
     name, and which lines the terminals' signals are on.
     """
@@ -128,8 +118,8 @@ class VirtualCard:
             [line.line for line in wiring.inputs],
             [line.line for line in wiring.outputs],
         )
-        self._pressure_line = wiring.pressure
-        self.outputs, self.pressure, self.tick, self.connected = np.zeros(4), False, 0, True
+        self._power_line = wiring.power
+        self.outputs, self.power, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
         self._places = [int(line[2:]) for line in self._outputs]
         self._tasks: dict[str, _Task] = {}
@@ -178,7 +168,7 @@ class VirtualCard:
 
     def disconnect(self) -> None:
         """The cable is pulled: the outputs' terminals are at zero and nothing answers any more."""
-        self.connected, self.pressure = False, False
+        self.connected, self.power = False, False
         self.outputs[:] = 0.0
 
     def run_until(self, tick: int) -> None:
@@ -189,7 +179,7 @@ class VirtualCard:
 
     def _step(self) -> None:
         self._volts[:] = self.outputs[self._places]
-        self._terminals.advance(self._volts, self.pressure)
+        self._terminals.advance(self._volts, self.power)
         self.tick += 1
         self._samples.append(self._terminals.volts.tolist())
 
@@ -262,7 +252,7 @@ class VirtualCard:
         self._require_device(request.device_name)
         self._tasks.clear()
         self.outputs[:] = 0.0
-        self.pressure = False
+        self.power = False
         return response()
 
     def _CreateTask(self, request: Message, response: Response) -> Message:
@@ -392,8 +382,8 @@ class VirtualCard:
     def _WriteDigitalLines(self, request: Message, response: Response) -> Message:
         task = self._task(request)
         for line, level in zip(task.lines, request.write_array, strict=False):
-            if line == self._pressure_line:
-                self.pressure = bool(level)
+            if line == self._power_line:
+                self.power = bool(level)
         return response(samps_per_chan_written=1)
 
     def _GetErrorString(self, _: Message, response: Response) -> Message:

@@ -74,14 +74,14 @@ class FaultyBench:
         self.truth = np.zeros((ticks, 4))
         self._read, self._true = np.empty(4), np.empty(4)
 
-    def advance(self, written: Array, pressure: bool) -> None:
+    def advance(self, written: Array, power: bool) -> None:
         """Advances by one period under the outputs' volts, shape (3,)."""
         if self.tick < len(self.written):
-            self.written[self.tick], self.pressure[self.tick] = written, pressure
+            self.written[self.tick], self.pressure[self.tick] = written, power
         acting = written.copy()
         if self.tick >= self._at:
             self._actuate(acting)
-        self._terminals.advance(acting, pressure)
+        self._terminals.advance(acting, power)
         if self.tick < len(self.truth):
             self.truth[self.tick] = self._terminals.truth
         self.tick += 1

@@ -22,10 +22,11 @@ from rigtwin.hardware.daq.transport import InProcess
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, Response, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
 from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
+from rigtwin.hardware.rig_operation import ARMED, LOOKING, SETTLING, Update
 from rigtwin.hardware.session.own_controller import OwnController
-from rigtwin.hardware.session.record import Test, record_at_leisure
+from rigtwin.hardware.session.record import record_at_leisure
 from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.supervision import ARMED, LOOKING, SETTLING, Update
+from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 from rigtwin.simulation.experiment import Experiment
@@ -262,7 +263,7 @@ def try_fault(
         if fails:
             updating = _make_failing_update(fault, virtual, updating)
         try:
-            record_at_leisure(card, test, path, stop, show_full_disk, updating)
+            record_at_leisure(card, test, path, stop, show_full_disk, test.operation(updating))
         except RigtwinError:
             if not interrupted:
                 raise

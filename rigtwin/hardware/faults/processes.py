@@ -35,7 +35,8 @@ from rigtwin.hardware.faults.campaign import (
 )
 from rigtwin.hardware.realtime import in_real_time, monotonic
 from rigtwin.hardware.session.guardian import Guardian
-from rigtwin.hardware.session.record import Test, guardian_settings
+from rigtwin.hardware.session.record import guardian_settings
+from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervision import supervise
 from rigtwin.simulation.experiment import Experiment
 
@@ -109,7 +110,7 @@ def _try_once(fault: Fault, test: Test, folder: Path) -> FaultResult:
     try:
         controller.start()
         at = clock.tick_at(_strike(controller, virtual, fault, hung))
-        _wait_until(lambda: not virtual.pressure, "the pressure to be taken off")
+        _wait_until(lambda: not virtual.power, "the power to be taken off")
         _wait_until(lambda: _has_ended(path), "the recording to be ended")
         virtual.run_until(virtual.tick + 1)
     finally:
@@ -183,7 +184,7 @@ def _control(test: Test, path: Path, fault: Fault, hung: Synchronized[float]) ->
         return healthy(controlling, state, measured, demand)
 
     with in_real_time():
-        supervise(card, test.card_configuration, test.demands, guardian, updating=hang)
+        supervise(card, test.operation(hang), guardian)
     guardian.finish("completed")
 
 

@@ -10,52 +10,22 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
-from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, to_toml
-from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
-from rigtwin.simulation.peaks import Peak, peaks
 
 
-def predict_peaks(recording: Recording, configuration: Configuration) -> tuple[Peak, ...]:
-    """Predicts how near to every limit a session comes.
-
-    Parameters
-    ----------
-    recording : Recording
-        Of its dry run.
-    configuration : Configuration
-        With the limits.
-
-    Returns
-    -------
-    tuple of Peak
-        One for each limit.
-    """
-    commands = np.column_stack([recording.column("/command", name) for name in Commands._fields])
-    measurements = np.column_stack(
-        [recording.column("/sensor", name) for name in Measurements._fields]
-    )
-    return peaks(commands, measurements, configuration)
-
-
-def digest(
-    experiment: str, configuration: Configuration, demands: Array, table: ChannelTable
-) -> str:
+def digest(told: str, configuration: Configuration, demands: bytes, table: ChannelTable) -> str:
     """Computes a key of all that makes a session another one.
 
     Parameters
     ----------
-    experiment : str
-        Its name.
+    told : str
+        The experiment's name, and what else is told of it in words.
     configuration : Configuration
         Every setting.
-    demands : Array
-        Shape (ticks, 3).
+    demands : bytes
+        What is demanded.
     table : ChannelTable
         Of the card.
 
@@ -64,8 +34,8 @@ def digest(
     str
         SHA-256, in hexadecimal.
     """
-    told = json.dumps([experiment, flatten(configuration), to_toml(table)], sort_keys=True)
-    return hashlib.sha256(told.encode() + np.ascontiguousarray(demands).tobytes()).hexdigest()
+    known = json.dumps([told, flatten(configuration), to_toml(table)], sort_keys=True)
+    return hashlib.sha256(known.encode() + demands).hexdigest()
 
 
 def ledger(card: Path) -> Path:

@@ -9,6 +9,7 @@ import multiprocessing
 import os
 import threading
 import time
+from collections.abc import Sequence
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.realtime import monotonic
@@ -16,18 +17,16 @@ from rigtwin.hardware.session.guardian_process import guard
 from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
-    GROUND,
     GUARDED,
-    NUMBERS,
     PREPARED,
     READ,
     RING,
-    STRUCTURE,
+    SAFE,
     WRITTEN,
     GuardianSettings,
+    memory_size,
     split_memory,
 )
-from rigtwin.hardware.session.recorder import ROW
 from rigtwin.hardware.supervisor import Transition
 from rigtwin.interruptions import held_back
 
@@ -45,8 +44,9 @@ class Guardian:
         self._settings, self._finishing = settings, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
-        memory = context.RawArray("d", NUMBERS + RING * ROW)
-        self._shared, self._ring = split_memory(memory)
+        layout = settings.layout
+        memory = context.RawArray("d", memory_size(layout))
+        self._shared, self._ring = split_memory(memory, layout)
         self._pipe, theirs = context.Pipe()
         arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
@@ -64,10 +64,11 @@ class Guardian:
             raise
         threading.Thread(target=self._listen, daemon=True).start()
 
-    def beat(self, ground: float, structure: float) -> None:
-        """Tells that the loop is alive, and the positions held, m; sees whether the guardian is."""
+    def beat(self, outputs: Sequence[float]) -> None:
+        """Tells that the loop is alive, and which outputs are safe; sees whether the guardian
+        is."""
         shared, now = self._shared, time.monotonic()
-        shared[GROUND], shared[STRUCTURE], shared[BEAT] = ground, structure, now
+        shared[SAFE:], shared[BEAT] = outputs, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
 

@@ -18,18 +18,17 @@ from rigtwin.hardware.realtime import PRIORITY, monotonic
 from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
-    GROUND,
     GUARDED,
     PREPARED,
     READ,
     RING,
-    STRUCTURE,
+    SAFE,
     WRITTEN,
     GuardianSettings,
     SharedMemory,
     split_memory,
 )
-from rigtwin.hardware.session.recorder import FIELDS, SESSION, Keeper
+from rigtwin.hardware.session.recorder import SESSION, Keeper
 from rigtwin.hardware.supervisor import Cause, Phase, Transition
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -66,7 +65,7 @@ def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, ow
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    shared, ring = split_memory(memory)
+    shared, ring = split_memory(memory, settings.layout)
     try:
         writer = settings.open_writer()
         writer.reserve()
@@ -97,7 +96,7 @@ def _open_live_view(settings: GuardianSettings) -> Callable[[str, Array], None] 
         return None
     from rigtwin.hardware.session.live import open_live_view
 
-    return open_live_view(settings.live)
+    return open_live_view(settings.live, settings.layout.fields)
 
 
 def _guard_loop(
@@ -145,7 +144,7 @@ class _GuardianKeeper:
         ring: Array,
     ) -> None:
         self._shared, self._ring = shared, ring
-        self._writer, self._keeper = writer, Keeper(writer)
+        self._writer, self._keeper = writer, Keeper(writer, settings.layout)
         self._pipe, self._settings, self._view = pipe, settings, view
         self._last: Transition | None = None
         self._reason: str | None = None
@@ -181,7 +180,7 @@ class _GuardianKeeper:
             self._keeper.block(rows)
             self._time = float(rows[-1, 0])
             if self._view is not None:
-                self._view(SESSION, rows[:, : len(FIELDS)])
+                self._view(SESSION, rows[:, : len(self._settings.layout.session)])
 
     def make_ready(self) -> None:
         """Everything that takes time, before there is anything to guard."""
@@ -212,14 +211,14 @@ class _GuardianKeeper:
         self._reason = reason
 
     def stop_rig(self, cause: Cause, shared: Array) -> None:
-        """Force off now, pressure off after the hold."""
+        """Outputs safe now, power off after the hold."""
         said = cause.reason
         resort = self._resort
         if resort is not None:
-            failed = _try_often(lambda: resort.force_off((shared[GROUND], shared[STRUCTURE])))
+            failed = _try_often(lambda: resort.hold(shared[SAFE:]))
             if failed is None:
                 time.sleep(self._settings.hold)
-            failed = _try_often(resort.pressure_off) or failed
+            failed = _try_often(resort.power_off) or failed
             if failed is not None:
                 said = f"{said}; and {failed}: stop the rig by hand"
             resort.close()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import topic_fields
 from rigtwin.recording.schema import descriptor, encode, type_name
 
 HOST = "127.0.0.1"
@@ -15,8 +14,9 @@ SHOWN = 10
 """Every so many ticks one is shown."""
 
 
-def open_live_view(port: int) -> Callable[[str, Array], None]:
+def open_live_view(port: int, fields: Mapping[str, Sequence[str]]) -> Callable[[str, Array], None]:
     """Starts serving; returns what takes rows of a topic whose first column is the time in s.
+    fields: of each topic.
 
     Raises RigtwinError.
     """
@@ -37,7 +37,7 @@ def open_live_view(port: int) -> Callable[[str, Array], None]:
             schema = foxglove.Schema(
                 name=type_name(topic),
                 encoding="protobuf",
-                data=descriptor(topic, topic_fields(topic)),
+                data=descriptor(topic, fields[topic]),
             )
             channels[topic] = foxglove.Channel(topic, schema=schema, message_encoding="protobuf")
         for row in rows[::SHOWN]:

@@ -11,7 +11,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table import require_trust
 from rigtwin.hardware.session.dry_run import digest, has_passed
-from rigtwin.hardware.session.record import Test, open_card
+from rigtwin.hardware.session.record import open_card
+from rigtwin.hardware.session.test import AnyTest
 
 
 @dataclass(frozen=True)
@@ -22,13 +23,13 @@ class Permission:
     notes: tuple[tuple[str, dict[str, str]], ...]
 
 
-def key_of(test: Test) -> str:
+def key_of(test: AnyTest) -> str:
     """By which a dry run of just this session is known."""
     told = test.experiment if test.own is None else f"{test.experiment} by {test.own.told}"
-    return digest(told, test.configuration, test.demands, test.table)
+    return digest(told, test.configuration, test.list_demands(), test.table)
 
 
-def require_permission(test: Test, card: Path, without_dry_run: str | None) -> Permission:
+def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -> Permission:
     """What a test needs to be run on the rig.
 
     Parameters
@@ -48,7 +49,8 @@ def require_permission(test: Test, card: Path, without_dry_run: str | None) -> P
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     require_trust(test.table, date.today())
-    _ = test.card_configuration
+    test.operation()
+    test.require_limits()
     opened = open_card(test)
     if has_passed(card, key_of(test)):
         return Permission(opened, ())
@@ -62,10 +64,14 @@ def require_permission(test: Test, card: Path, without_dry_run: str | None) -> P
     return Permission(opened, (note,))
 
 
-def list_obstacles(test: Test) -> tuple[str, ...]:
+def list_obstacles(test: AnyTest) -> tuple[str, ...]:
     """What would keep a test off the rig besides its dry run, a line each."""
     lacking: list[str] = []
-    for look in (lambda: require_trust(test.table, date.today()), lambda: open_card(test)):
+    for look in (
+        lambda: require_trust(test.table, date.today()),
+        test.require_limits,
+        lambda: open_card(test),
+    ):
         try:
             look()
         except RigtwinError as error:

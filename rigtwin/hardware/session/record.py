@@ -7,27 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from controllers import update
 from rigtwin import __version__
-from rigtwin.description.configuration import Configuration, flatten
-from rigtwin.description.effects import apply_effects
-from rigtwin.description.machine import OWN
+from rigtwin.description.configuration import flatten
 from rigtwin.hardware.daq.card import Card, connect, require_client
-from rigtwin.hardware.daq.table import ChannelTable, require_ranges, to_toml
-from rigtwin.hardware.daq.terminals import Terminals
-from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard, Wired
+from rigtwin.hardware.daq.table import to_toml
+from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
+from rigtwin.hardware.daq.wired import Wired
+from rigtwin.hardware.operation import Operation
 from rigtwin.hardware.realtime import Lateness, Pacer, describe_grants, in_real_time
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.guardian_settings import GuardianSettings
-from rigtwin.hardware.session.own_controller import OwnController, OwnUpdate
 from rigtwin.hardware.session.recorder import Keeper
-from rigtwin.hardware.supervision import SessionEnd, Update, supervise
-from rigtwin.numerics.arrays import Array
+from rigtwin.hardware.session.test import AnyTest
+from rigtwin.hardware.supervision import SessionEnd, supervise
 from rigtwin.recording import Writer, twin_values
 from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
 from rigtwin.simulation.rig import DrivenRig
@@ -36,75 +31,12 @@ LONGEST = 1.0
 """s that a guardian waits for a tick at most, however many may be missed."""
 
 
-@dataclass(frozen=True)
-class Test:
-    """What is to be done.
-
-    Parameters
-    ----------
-    experiment : str
-        Its name.
-    configuration : Configuration
-        Of rig, controller and clocks.
-    demands : Array
-        Columns of controllers.Demand, shape (ticks, 3).
-    seed : int
-        Of the twin's noise.
-    table : ChannelTable
-        Of the card.
-    effects : sequence of str
-        Of the twin, as `--effect` takes them; none on a real rig.
-    own : OwnController, optional
-        One's own instead of the rig's.
-    """
-
-    __test__ = False  # not one of pytest's
-
-    experiment: str
-    configuration: Configuration
-    demands: Array
-    seed: int
-    table: ChannelTable
-    effects: Sequence[str] = ()
-    own: OwnController | None = None
-
-    @property
-    def controller_settings(self) -> dict[str, Any]:
-        """What a recording says of the controller: of one's own only where the test started."""
-        told: dict[str, Any] = flatten(self.configuration)["controller"]
-        if self.own is None:
-            return told
-        return {OWN: True, **{name: told[name] for name in ("start", "preload")}}
-
-    def updating(self) -> Update:
-        """The controller of one session."""
-        return update if self.own is None else OwnUpdate(self.own, self.configuration)
-
-    @property
-    def card_configuration(self) -> Configuration:
-        """The configuration with the limits that the card's table adds.
-
-        Raises
-        ------
-        RigtwinError
-            Where a limit does not fit the card's lines.
-        """
-        require_ranges(self.table, self.configuration.safety)
-        return self.configuration._replace(safety=self.table.tighten(self.configuration.safety))
-
-    def terminals(self) -> Terminals:
-        """Builds the twin at the card's terminals, wired as the table says."""
-        return Terminals(
-            apply_effects(self.configuration, list(self.effects)), self.table, self.seed
-        )
-
-
-def open_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
+def open_virtual_card(test: AnyTest, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
     """Opens a virtual card in this process, behind the unmodified nidaqmx client.
 
     Parameters
     ----------
-    test : Test
+    test : AnyTest
         Its period, table and, by default, twin.
     terminals : Wired, optional
         What the card is wired to.
@@ -122,41 +54,42 @@ def open_virtual_card(test: Test, terminals: Wired | None = None) -> tuple[Card,
     require_client()
     from rigtwin.hardware.daq.transport import InProcess
 
-    period = test.configuration.timing.period
+    period = test.period
     virtual = VirtualCard(terminals or test.terminals(), test.table, OnDemand())
     card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     card.inspect()
     return card, virtual
 
 
-def metadata(test: Test, virtual: bool) -> dict[str, dict[str, str]]:
+def metadata(test: AnyTest, virtual: bool) -> dict[str, dict[str, str]]:
     """Says what a recording holds beyond the test: the channel table, and how a twin made it."""
     told = {CARD_RECORD: {"table": to_toml(test.table)}}
     if virtual:
-        told[TWIN_RECORD] = twin_values(
-            test.seed, flatten(test.configuration), test.effects, __version__
-        )
+        settings = flatten(test.configuration)
+        told[TWIN_RECORD] = twin_values(test.seed, settings, test.effects, __version__)
     return told
 
 
-def _writer_of(path: Path, test: Test) -> Callable[[], Writer]:
+def _writer_of(path: Path, test: AnyTest) -> Callable[[], Writer]:
     """What opens the recording, here or in another process."""
     return partial(
         Writer,
         path,
         test.experiment,
-        test.configuration.timing.period,
+        test.period,
         controller=test.controller_settings,
+        machine=test.machine_name,
+        fields=test.layout.fields,
     )
 
 
 def record_at_leisure(
     rig: DrivenRig,
-    test: Test,
+    test: AnyTest,
     path: Path,
     stop: Callable[[], str | None] = lambda: None,
     progress: Callable[[int], object] = lambda _: None,
-    updating: Update | None = None,
+    operation: Operation | None = None,
 ) -> SessionEnd:
     """Records on a twin whose time waits for the loop, as fast as it goes.
 
@@ -164,7 +97,7 @@ def record_at_leisure(
     ----------
     rig : DrivenRig
         The twin, or a virtual card.
-    test : Test
+    test : AnyTest
         What is to be done.
     path : Path
         Of the recording.
@@ -172,8 +105,8 @@ def record_at_leisure(
         Called in every tick; a text stops the session and is its reason.
     progress : callable
         Called with the ticks done since its last call.
-    updating : Update, optional
-        The controller; the test's by default.
+    operation : Operation, optional
+        The test's by default.
 
     Returns
     -------
@@ -185,20 +118,19 @@ def record_at_leisure(
     RigtwinError
         Before anything is recorded.
     """
-    limited, updating = test.card_configuration, updating or test.updating()
+    operation = operation or test.operation()
     with _writer_of(path, test)() as writer:
         writer.reserve()
         for name, values in metadata(test, virtual=True).items():
             writer.add_metadata(name, values)
-        ended = supervise(
-            rig, limited, test.demands, Keeper(writer), stop, updating=updating, progress=progress
-        )
+        keeper = Keeper(writer, test.layout)
+        ended = supervise(rig, operation, keeper, stop, progress=progress)
         writer.finish(ended.cause.reason)
     return ended
 
 
 def guardian_settings(
-    test: Test,
+    test: AnyTest,
     path: Path,
     guarded: bool,
     notes: Sequence[tuple[str, dict[str, str]]] = (),
@@ -208,7 +140,7 @@ def guardian_settings(
 
     Parameters
     ----------
-    test : Test
+    test : AnyTest
         What is to be done.
     path : Path
         Of the recording.
@@ -224,23 +156,24 @@ def guardian_settings(
     GuardianSettings
         Picklable.
     """
-    safety = test.configuration.safety
+    operation = test.operation()
     # The last tick that may be late comes `missed` + 1 periods after the one before, and a bit.
-    patience = min((safety.missed + 1.5) * test.configuration.timing.period, LONGEST)
+    patience = min((operation.missed + 1.5) * test.period, LONGEST)
     told = metadata(test, virtual=not guarded) | dict(notes)
     return GuardianSettings(
         _writer_of(path, test),
         metadata=told,
+        layout=test.layout,
         table=test.table if guarded else None,
         patience=patience,
-        hold=safety.hold,
+        hold=operation.course.hold,
         live=live,
     )
 
 
 def record_in_real_time(
     rig: DrivenRig,
-    test: Test,
+    test: AnyTest,
     path: Path,
     stop: Callable[[], str | None],
     guarded: bool,
@@ -255,7 +188,7 @@ def record_in_real_time(
     ----------
     rig : DrivenRig
         The card, or a twin in real time.
-    test : Test
+    test : AnyTest
         What is to be done.
     path : Path
         Of the recording.
@@ -282,24 +215,15 @@ def record_in_real_time(
     RigtwinError
         Before anything moves.
     """
-    limited = test.card_configuration
-    safety, period = limited.safety, limited.timing.period
-    whole = len(test.demands) + round(2.0 * (safety.ramp + safety.hold + 1.0) / period)
+    operation = test.operation()
+    course = operation.course
+    whole = operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
     lateness = Lateness(whole)
     guardian = Guardian(guardian_settings(test, path, guarded, notes, live))
     with ExitStack() as stack:
         grants = stack.enter_context(in_real_time(fifo))
         try:
-            ended = supervise(
-                rig,
-                limited,
-                test.demands,
-                guardian,
-                stop,
-                lateness,
-                updating=test.updating(),
-                progress=progress,
-            )
+            ended = supervise(rig, operation, guardian, stop, lateness, progress)
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
             raise
@@ -308,9 +232,9 @@ def record_in_real_time(
     return ended
 
 
-def open_card(test: Test) -> Card:
+def open_card(test: AnyTest) -> Card:
     """Opens the card itself and inspects it. Raises CardFault; moves nothing."""
-    period = test.configuration.timing.period
+    period = test.period
     channel = connect(test.table.address)
     pacer = Pacer(period) if test.table.timing == "software" else None
     card = Card(test.table, period, channel, pacer=pacer)

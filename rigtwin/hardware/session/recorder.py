@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from controllers import Commands, Measurements
+from controllers import Commands
 from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq.signals import RIG, Signals
 from rigtwin.hardware.supervisor import Transition
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -16,13 +18,61 @@ from rigtwin.recording.schema import TRANSITION_RECORD
 from rigtwin.simulation.loop import BLOCK
 
 SESSION = "/session"
-FIELDS = topic_fields(SESSION)
-SENSORS = [FIELDS.index(name) for name in Measurements._fields]
-COMMANDS = slice(len(FIELDS), len(FIELDS) + len(Commands._fields))
-NUMBER = len(FIELDS) + len(Commands._fields)
-ROW = NUMBER + 1
-"""Numbers of a tick as a `rigtwin.hardware.supervision.Recorder` gets them: /session, /command,
-the tick's number in the test."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the numbers of a tick lie, as a `rigtwin.hardware.supervision.Recorder` gets them: those
+    of /session, commands, the tick's number in the test.
+
+    Parameters
+    ----------
+    session : tuple of str
+        Fields of /session.
+    topics : dict
+        Topic → its fields in a recording, each with the place of its number.
+    number : int
+        Place of the tick's number.
+    outputs : int
+        How many are written to the card.
+    """
+
+    session: tuple[str, ...]
+    topics: Mapping[str, Mapping[str, int]]
+    number: int
+    outputs: int
+
+    @property
+    def row(self) -> int:
+        """Numbers of a tick."""
+        return self.number + 1
+
+    @property
+    def fields(self) -> dict[str, tuple[str, ...]]:
+        """Topic → field names, as a `Writer` takes them."""
+        return {SESSION: self.session, **{name: tuple(at) for name, at in self.topics.items()}}
+
+
+def layout_of(signals: Signals) -> Layout:
+    """That of a machine."""
+    inputs, outputs = signals.inputs, signals.outputs
+    session = ("time", "phase", *(s.name for s in outputs), signals.power)
+    first = len(session)
+    session = (*session, *(s.name for s in inputs), "late", "missed")
+    topics: dict[str, dict[str, int]] = {}
+    if signals is RIG:
+        given = [("/command", name) for name in Commands._fields]
+    else:
+        given = [*(s.channel for s in outputs), *signals.given]
+    for place, (topic, name) in enumerate(given):
+        topics.setdefault(topic, {})[name] = len(session) + place
+    for place, signal in enumerate(inputs):
+        topics.setdefault(signal.channel[0], {})[signal.channel[1]] = first + place
+    return Layout(session, topics, len(session) + len(given), len(outputs))
+
+
+RIG_LAYOUT = layout_of(RIG)
+assert RIG_LAYOUT.session == topic_fields(SESSION)
 
 
 class Keeper:
@@ -31,10 +81,13 @@ class Keeper:
     What cannot be written is no exception but a `fault`: the rig has to be stopped first.
     """
 
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
+    def __init__(self, writer: Writer, layout: Layout) -> None:
+        self._writer, self._layout = writer, layout
         self.fault: str | None = None
-        self._rows, self._kept = np.empty((BLOCK, ROW)), 0
+        self._rows, self._kept = np.empty((BLOCK, layout.row)), 0
+        self._places = {
+            topic.strip("/"): list(fields.values()) for topic, fields in layout.topics.items()
+        }
 
     def tick(self, row: tuple[float, ...]) -> None:
         self._rows[self._kept] = row
@@ -48,14 +101,15 @@ class Keeper:
         self.block(rows)
 
     def block(self, rows: Array) -> None:
-        """Consecutive ticks, shape (ticks, ROW)."""
+        """Consecutive ticks, shape (ticks, numbers)."""
         if self.fault is not None or not len(rows):
             return
-        tested = rows[np.isfinite(rows[:, NUMBER])]
+        number = self._layout.number
+        tested = rows[np.isfinite(rows[:, number])]
         if len(tested):
-            topics = {"command": tested[:, COMMANDS], "sensor": tested[:, SENSORS]}
-            self._try(lambda: self._writer.append_at(tested[:, NUMBER].astype(np.int64), topics))
-        session = np.ascontiguousarray(rows[:, : len(FIELDS)])
+            topics = {topic: tested[:, places] for topic, places in self._places.items()}
+            self._try(lambda: self._writer.append_at(tested[:, number].astype(np.int64), topics))
+        session = np.ascontiguousarray(rows[:, : len(self._layout.session)])
         self._try(lambda: self._writer.append_beside(SESSION, session, session[:, 0]))
 
     def transition(self, transition: Transition) -> None:
@@ -65,7 +119,7 @@ class Keeper:
     def ready(self) -> None:
         """It is, since the writer is there."""
 
-    def beat(self, ground: float, structure: float) -> None:
+    def beat(self, outputs: Sequence[float]) -> None:
         """Nobody watches this process."""
 
     def _try(self, write: Callable[[], None]) -> None:

@@ -24,7 +24,8 @@ from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
 from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import Test, record_at_leisure, record_in_real_time
+from rigtwin.hardware.session.record import record_at_leisure, record_in_real_time
+from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording import load
 

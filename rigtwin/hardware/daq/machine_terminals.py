@@ -1,0 +1,76 @@
+"""The twin of a described machine as it looks at a card's terminals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigtwin.components.sensors import start_transducer, transduce, transducer
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.machine import Machine, Row
+from rigtwin.hardware.daq.conversion import conversion, to_bits, to_values, to_volts
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.models.coupled_twin import begin_live
+from rigtwin.models.demands import list_sensors
+from rigtwin.models.reading import make_noise, round_reading
+from rigtwin.numerics.arrays import Array
+
+AHEAD = 1000
+"""Ticks for which noise is drawn at a time."""
+
+
+class MachineTerminals:
+    """A described machine at rest as its MJCF has it, without power.
+
+    Without power nothing moves: its brakes hold it. `wiring` says what a volt truly means on each
+    line, whatever the table of who reads it says.
+
+    volts: at the inputs now, as 16 bits hold them, shape (inputs,).
+    """
+
+    def __init__(
+        self, machine: Machine, configuration: Configuration, wiring: ChannelTable, seed: int
+    ) -> None:
+        plant, period = configuration.plant, configuration.timing.period
+        rows = []
+        for name, kind in list_sensors(machine).items():
+            component = machine.components[name]
+            assert component.channel is not None
+            rows.append(Row(name, kind, component.channel, component.unit))
+        self._names, self._plant, self._period = [row.name for row in rows], plant, period
+        outputs = [line.name for line in wiring.outputs]
+        self._stepped = begin_live(machine, configuration, outputs, rows)
+        self._models = [transducer(getattr(plant, name), period) for name in self._names]
+        self._states = [start_transducer(model) for model in self._models]
+        self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
+        self._random, self._place = np.random.default_rng([seed, 3]), AHEAD
+        self._noise: list[Array] = []
+        self._written = np.zeros(len(outputs))
+        self._values, self.volts = np.zeros(len(rows)), np.zeros(len(rows))
+        self._sample()
+
+    def advance(self, written: Array, power: bool) -> None:
+        """One period under voltages that the outputs hold, shape (outputs,), then the next
+        sample."""
+        if power:
+            to_bits(self._outputs, written, self._written)
+            to_values(self._outputs, self._written, self._written)
+            self._stepped.step(self._written.tolist())
+        self._sample()
+
+    def _sample(self) -> None:
+        if self._place == AHEAD:
+            self._noise = [
+                make_noise(self._plant, name, AHEAD, self._period, self._random)
+                for name in self._names
+            ]
+            self._place = 0
+        true = self._stepped.sense()
+        for number, name in enumerate(self._names):
+            value = transduce(self._models[number], self._states[number], true[name])
+            self._values[number] = value + self._noise[number][self._place]
+            if getattr(self._plant, name).resolution > 0.0:
+                reading = round_reading(self._plant, name, self._values[number : number + 1])
+                self._values[number] = reading[0]
+        self._place += 1
+        to_volts(self._inputs, self._values, self.volts)
+        to_bits(self._inputs, self.volts, self.volts)
