@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import require_path, write_whole
 
 if TYPE_CHECKING:
     from rigtwin.description.configuration import Configuration
@@ -36,6 +36,7 @@ def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
 def writable(out: Path) -> None:
     """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is
     done."""
+    require_path(out)
     if not out.name:
         raise RigtwinError("an output without a name; expected a file")
     if out.is_dir():

@@ -101,10 +101,17 @@ def keep_apart(out: str | Path, *inputs: Path) -> Path:
     return path
 
 
+def require_path(path: Path) -> None:
+    """Raises RigtwinError for what no file can be called."""
+    if "\0" in str(path):
+        raise RigtwinError(f"{str(path)!r:.60} is no name of a file: it has a zero byte")
+
+
 def recordable(out: str | Path) -> Path:
     """A file that a recording can be written to and read from again. Raises RigtwinError for a
     device or a pipe, before a test runs for nothing."""
     path = Path(out)
+    require_path(path)
     if path.exists() and not path.is_file():
         what = "a folder" if path.is_dir() else "no file but a device or a pipe"
         raise RigtwinError(f"cannot record to {path}: it is {what}")

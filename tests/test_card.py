@@ -263,7 +263,7 @@ def test_a_table_that_is_not_the_wiring_reads_wrong():
             lambda t: replace(t, inputs=(t.inputs[0]._replace(line="ai40"), *t.inputs[1:])),
             "PCI-6229 has no line ai40",
         ),
-        (lambda t: replace(t, pressure="port0/line77"), "PCI-6229 has no line port0/line77"),
+        (lambda t: replace(t, power="port0/line77"), "PCI-6229 has no line port0/line77"),
         (
             lambda t: replace(t, outputs=(t.outputs[0]._replace(line="ao7"), *t.outputs[1:])),
             "PCI-6229 has no line ao7",

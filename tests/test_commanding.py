@@ -141,9 +141,13 @@ def test_commands_played_back_move_the_machine_the_same(tmp_path: Path) -> None:
 
 
 def test_a_controller_that_gives_no_number_is_told_so(tmp_path: Path) -> None:
-    with pytest.raises(rigtwin.RigtwinError, match="the controller gave 'much'; expected a number"):
+    with pytest.raises(
+        rigtwin.RigtwinError, match="the controller gave 'much'; expected a finite number"
+    ):
         rigtwin.run(machine(tmp_path), step, controller=lambda *_: "much")
-    with pytest.raises(rigtwin.RigtwinError, match=r"gave \{'push': 1.0\}; expected a number"):
+    with pytest.raises(
+        rigtwin.RigtwinError, match=r"gave \{'push': 1.0\}; expected a finite number"
+    ):
         rigtwin.run(machine(tmp_path), step, controller=lambda *_: {"push": 1.0})
 
 
@@ -243,3 +247,115 @@ def test_a_limit_that_cannot_be_is_refused(tmp_path: Path, line: str, said: str)
     _, mistakes = examine(path)
     assert len(mistakes) >= 1
     assert said in mistakes[0]
+
+
+MOTOR = '<motor name="drive" joint="rail"/>'
+TIED = """<equality><joint joint1="rail" joint2="pivot" polycoef="0 1 0 0 0"/></equality>
+  <actuator>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            'sensor = "angle"',
+            'sensor = "angle"\nchannel = "place"',
+            "[components.angle]: its channel 'place' is that of place",
+        ),
+        (
+            'moved_by = ["drive"]',
+            'moved_by = ["drive", "drive"]',
+            "moved_by: drive stands there twice",
+        ),
+        (
+            "[[replays]]",
+            "[limits]\nplace = true\n[[replays]]",
+            "[limits] place: True: expected a number",
+        ),
+    ],
+)
+def test_a_mistake_of_a_coupled_machine_is_one_line(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL)
+    path = tmp_path / "upright.toml"
+    assert old in TABLES
+    path.write_text(TABLES.replace(old, new, 1))
+    _, mistakes = examine(path)
+    assert len(mistakes) == 1
+    assert said in mistakes[0]
+
+
+def test_a_joint_that_an_equality_ties_to_another_is_not_free(tmp_path: Path) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL.replace("<actuator>", TIED))
+    path = tmp_path / "upright.toml"
+    path.write_text(TABLES)
+    _, mistakes = examine(path)
+    assert "an equality ties rail to pivot, so it goes with that; leave rail out" in mistakes[0]
+
+
+@pytest.mark.parametrize(
+    ("actuator", "said"),
+    [
+        ('<velocity name="drive" joint="rail" kv="3"/>', "actuator drive: its force by velocity"),
+        (
+            '<general name="drive" joint="rail" biastype="affine" biasprm="5 0 0"/>',
+            "actuator drive: its constant force 5",
+        ),
+    ],
+)
+def test_what_an_actuator_does_besides_is_not_overlooked_in_silence(
+    tmp_path: Path, actuator: str, said: str
+) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL.replace(MOTOR, actuator))
+    path = tmp_path / "upright.toml"
+    path.write_text(TABLES)
+    assert any(said in each for each in rigtwin.machine(path).overlooked)
+
+
+@pytest.mark.parametrize("name", ["_k", "__class__", "1k", ""])
+def test_a_setting_has_a_name_that_can_be_written(tmp_path: Path, name: str) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL)
+    path = tmp_path / "upright.toml"
+    tables = (
+        f'[controller]\noutput = "force"\nformula = "place"\n[controller.settings]\n"{name}" = 1'
+    )
+    path.write_text(f"{TABLES}{tables}\n")
+    _, mistakes = examine(path)
+    assert f"{name!r} cannot be a setting's name" in mistakes[0]
+
+
+def test_what_a_machine_can_never_show_is_worked_out_with_a_controller_too(tmp_path: Path) -> None:
+    tables = '[controller]\noutput = "force"\nformula = "kp * (reference - place)"\n'
+    of = machine(tmp_path, f"{tables}[controller.settings]\nkp = 1.0\n")
+    assert rigtwin.identifiability(of).motions == ()
+
+
+def test_a_controller_of_sensors_alone_needs_no_demands(tmp_path: Path) -> None:
+    (tmp_path / "upright.xml").write_text(MODEL)
+    path = tmp_path / "upright.toml"
+    head = TABLES[: TABLES.index("[experiments.step]")]
+    path.write_text(
+        f'{head}[controller]\noutput = "force"\nformula = "-5 * place - 5 * pace"\n'
+        "[experiments.rest]\nduration = 0.5\n[experiments.rest.demands]\n"
+    )
+    assert rigtwin.run(rigtwin.machine(path), "rest").ticks == 500
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), 10**400, None, "x", [1.0, 2.0]])
+@pytest.mark.parametrize("of", ["emps", "upright"])
+def test_a_command_is_a_finite_number(tmp_path: Path, of: str, value: Any) -> None:
+    name = "positioning" if of == "emps" else step
+    where = of if of == "emps" else machine(tmp_path)
+    demands = (lambda *_: {}) if of == "emps" else name
+    short = {"timing": {"duration": 0.1}}
+    with pytest.raises(rigtwin.RigtwinError, match="expected a finite number"):
+        rigtwin.run(where, demands, controller=lambda *_: value, settings=short)
+
+
+@pytest.mark.parametrize(
+    "value", [None, [1, 2], {3: [0.0]}, {"reference": ["a"]}, {"reference": 5}]
+)
+def test_demands_are_signals_by_channel(tmp_path: Path, value: Any) -> None:
+    with pytest.raises(rigtwin.RigtwinError, match="demand"):
+        rigtwin.run(machine(tmp_path, by_formula()), lambda *_: value)

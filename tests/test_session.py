@@ -20,7 +20,6 @@ from controllers import Measurements
 from experiments import find
 from rigtwin.cli import main
 from rigtwin.description.changes import from_assignments
-from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.calibration import (
@@ -37,7 +36,7 @@ from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
 from rigtwin.hardware.session import permission
-from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger, predict_peaks
+from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger
 from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import record_in_real_time
 from rigtwin.hardware.session.test import Test
@@ -101,7 +100,7 @@ def test_a_dry_run_predicts_and_is_noted(card, tmp_path, capsys):
     entries = json.loads(ledger(card).read_text())
     assert [entry["experiment"] for entry in entries.values()] == ["imposed"]
     recording = load(out)
-    figures = {figure.name: figure for figure in predict_peaks(recording, Configuration())}
+    figures = {figure.name: figure for figure in session().predict_peaks(recording)}
     force = np.abs(recording.column("/sensor", "load_cell"))
     assert figures["force"].peak == pytest.approx(float(force.max()))
     assert figures["force"].margin == pytest.approx(1.0 - float(force.max()) / 1500.0)
@@ -588,10 +587,15 @@ def test_a_list_is_run_on_the_twin_of_any_machine(tmp_path, capsys):
     assert (one.ticks, two.ticks) == (1000, 4000)
     assert main([*session, "--resume"]) == 0
     assert "2 of 2 tests are done already" in capsys.readouterr().out
-    for option in (["--card", "card.toml"], ["--target", "daq"], ["--real-time"], ["--dry-run"]):
-        assert main([*session, "--resume", *option]) == 1
+    for option, said in (
+        (["--card", "card.toml"], "cannot read card.toml"),
+        (["--target", "daq"], "--target daq needs the card's channel table"),
+        (["--real-time"], "--real-time of bench needs a channel table of it"),
+        (["--dry-run"], "--dry-run, --without-dry-run and --arm go with --target daq"),
+    ):
+        assert main([*session[:-1], str(tmp_path / "new"), *option]) == 1
         error = capsys.readouterr().err
-        assert f"{option[0]} is of the nominal suspension rig alone" in error
+        assert said in error
         assert error.count("\n") == 1
 
 

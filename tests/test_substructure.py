@@ -217,3 +217,18 @@ def test_what_a_client_must_not_do_is_said(sizes: list[int], message: object, sa
 def test_a_port_that_is_taken_is_said() -> None:
     with served() as (model, server), pytest.raises(RigtwinError, match="cannot listen at 127"):
         GenericClientServer(model, 0.0, port=server.port)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"ticks": 1.5}, "a target every 1.5 ticks"),
+        ({"ticks": float("nan")}, "a target every nan ticks"),
+        ({"latest": float("nan")}, "latest = nan: expected a finite number from 0"),
+        ({"latest": -1.0}, "latest = -1.0: expected a finite number from 0"),
+        ({"start": "x"}, "start = 'x': expected a finite number"),
+    ],
+)
+def test_a_slow_model_of_odd_numbers_is_refused(given, said):
+    with pytest.raises(RigtwinError, match=said):
+        SlowModel(**{"start": 0.0, "ticks": 10, **given})

@@ -15,6 +15,8 @@ from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, load
 from rigtwin.components import RigPlant
 from rigtwin.description.changes import read_toml, with_changes
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.limits import require_order
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.files import recordable
@@ -116,9 +118,11 @@ def plan_test(
     RigtwinError
         For any mistake in these.
     """
+    if not isinstance(seed, int) or seed < 0:
+        raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
     on = the_machine(machine)
     found = find_experiment(on, experiment)
-    configuration = with_changes(found.configuration, settings)
+    configuration = check_settings(on, found.configuration, settings)
     own = None if controller is None else own_controller(controller)
     told = tuple(effect_texts(effects))
     if is_the_rig(on):
@@ -135,6 +139,14 @@ def plan_test(
     table = load_table(Path(card), signals)
     demands = found.demands(configuration, seed)
     return MachineTest(on, found.name, configuration, demands, seed, table, told, own)
+
+
+def check_settings(machine: Machine, base: Configuration, changes: Settings) -> Configuration:
+    """The settings of a test that can be run. Raises RigtwinError for one that cannot."""
+    configuration = with_changes(base, changes)
+    require_order(machine, configuration)
+    _ = configuration.ticks, configuration.substeps
+    return configuration
 
 
 def is_the_rig(machine: Machine) -> bool:
@@ -194,7 +206,7 @@ def dry_run(
     passed = ended.cause == COMPLETED
     peaks = test.predict_peaks(recording) if recording is not None else ()
     # The shipped table arms nothing, and where it lies nothing is written.
-    shipped = Path(card).resolve() == CARD.resolve()
+    shipped = Path(card).resolve().parent == CARD.resolve().parent
     if passed and not test.effects and not shipped:
         said = {"experiment": test.experiment, "date": date.today().isoformat()}
         enter(Path(card), key_of(test), said)
@@ -388,7 +400,7 @@ def run_session(
     def check(test: PlannedTest) -> object:
         if on.structure is Structure.QUARTER_CAR:
             return plan_test(test.experiment, seed=test.seed, settings=test.changes)
-        return with_changes(find_test(test.experiment).configuration, test.changes)
+        return check_settings(on, find_test(test.experiment).configuration, test.changes)
 
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
     try:
@@ -464,5 +476,5 @@ def _result(path: Path, ended: SessionEnd) -> SessionResult:
 
 
 def _require_port(live: int) -> None:
-    if not 0 <= live <= PORTS:
-        raise RigtwinError(f"live {live}: expected a port up to {PORTS}")
+    if not isinstance(live, int) or not 0 <= live <= PORTS:
+        raise RigtwinError(f"live {live!r:.40}: expected a port up to {PORTS}")

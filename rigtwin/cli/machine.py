@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -73,7 +74,12 @@ def _print_never(machine: Machine) -> None:
     """What can never be identified, before there are any data."""
     import rigtwin
 
+    told = "working out what its sensors can show ..."
+    if sys.stderr.isatty():
+        print(told, end="\r", file=sys.stderr, flush=True)
     can = rigtwin.identifiability(machine)
+    if sys.stderr.isatty():
+        print(" " * len(told), end="\r", file=sys.stderr, flush=True)
     if not can.motions:
         print("never identifiable: not worked out; give its joints a range")
     for name in can.unseen:

@@ -105,8 +105,6 @@ def _fresh(stem: str) -> Path:
 
 def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) -> int:
     require_card(parsed, machine)
-    if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
-        raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
         raise RigtwinError(
             "--live goes with a session in real time: --real-time, "

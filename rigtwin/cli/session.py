@@ -90,7 +90,7 @@ def _needs_card(parsed: argparse.Namespace) -> bool:
 
 def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
     """Runs the list on the twin of any machine."""
-    from rigtwin.description.changes import with_changes
+    from rigtwin.api.session import check_settings
     from rigtwin.simulation.experiment import find_experiment
 
     code = 0
@@ -117,7 +117,8 @@ def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
         run,
         machine=machine,
         resume=parsed.resume,
-        prepare=lambda test: with_changes(
+        prepare=lambda test: check_settings(
+            machine,
             find_experiment(machine, test.experiment).configuration,
             settings_of(_command_line(parsed, test)),
         ),

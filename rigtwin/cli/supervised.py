@@ -66,7 +66,10 @@ def add_supervised(parser: argparse.ArgumentParser) -> None:
 
 
 def require_card(parsed: argparse.Namespace, machine: Machine) -> None:
-    """Raises RigtwinError for a session that needs a channel table and has none."""
+    """Raises RigtwinError for a session that needs a channel table and has none, or for options
+    that go with the card alone."""
+    if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
+        raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.card is None and parsed.target == "daq":
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
     if parsed.card is None and parsed.real_time and machine.name != DEFAULT_MACHINE:
@@ -137,7 +140,7 @@ def _tell_dry_run(parsed: argparse.Namespace, test: AnyTest, path: Path, found: 
         print(table(rows))
     for lacking in found.obstacles:
         print(f"before the rig may be armed: {lacking}")
-    if found.passed and not test.effects:
+    if found.passed and not test.effects and ledger(parsed.card).exists():
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code
 

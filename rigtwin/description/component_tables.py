@@ -151,6 +151,12 @@ class Components:
                     f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; "
                     f"this is a {kind}",
                 )
+        for other, known in self.found.items():
+            if channel is not None and known.channel == channel and kind in SENSED:
+                self.mistakes.note(
+                    where,
+                    f"its channel {channel[1]!r} is that of {other}; expected one for each sensor",
+                )
         self.found[name] = Component(
             name=name,
             element=element,

@@ -12,7 +12,7 @@ from typing import Any
 from controllers.formula import Formula, formula
 from rigtwin.components import Computer, Mains, RigPlant
 from rigtwin.components.plant import plant_of
-from rigtwin.description.component_tables import MOVING, Components
+from rigtwin.description.component_tables import MOVING, NAME, Components
 from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
 from rigtwin.description.limits import read_limits
 from rigtwin.description.machine import Machine, Structure
@@ -154,7 +154,7 @@ class _Reader:
                 if key in table:
                     self._mistakes.number(f"{where} {key}", table[key], low, high)
             demands = table.get("demands")
-            if not isinstance(demands, Mapping) or not demands:
+            if not isinstance(demands, Mapping):
                 self._mistakes.note(
                     where, 'demands is missing; expected CHANNEL = "formula of time"'
                 )
@@ -229,6 +229,13 @@ class _Reader:
                 "[controller] inputs", 'expected a table, such as { position = "/sensor.position" }'
             )
             return None
+        for key in settings:
+            if not NAME.fullmatch(key):
+                self._mistakes.note(
+                    "[controller] settings",
+                    f"{key[:40]!r} cannot be a setting's name; expected letters, digits and _",
+                )
+                return None
         values = {
             key: self._mistakes.number(f"[controller] settings.{key}", v, -1e300, 1e300)
             for key, v in settings.items()

@@ -69,6 +69,13 @@ class JoinedReplays:
                 self._mistakes.note(where, f"free: {joint!r} is no joint; {near(joint, known)}")
             elif free.count(joint) > 1:
                 self._mistakes.note(where, f"free: {joint} stands there twice")
+        for tie in self._mechanism.ties():
+            if tie.joint in free and tie.to in free:
+                self._mistakes.note(
+                    where,
+                    f"free: an equality ties {tie.joint} to {tie.to}, so it goes with that; "
+                    f"leave {tie.joint} out",
+                )
         held = []
         for mover in movers:
             if types[mover] not in MOVERS:

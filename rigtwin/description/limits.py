@@ -87,14 +87,29 @@ def read_limits(table: object, components: Mapping[str, Component], mistakes: Mi
         if len(ends) != 2:
             mistakes.note(where, f"{str(given)[:40]}: expected [low, high], or a number")
             continue
-        low, high = (mistakes.number(where, end, -UNBOUNDED, UNBOUNDED) for end in ends)
-        low = low if isinstance(given, list) else -high
+        before = len(mistakes)
+        numbers = [
+            mistakes.number(where, end, -UNBOUNDED, UNBOUNDED)
+            for end in (ends if isinstance(given, list) else ends[:1])
+        ]
+        if len(mistakes) > before:
+            continue
+        low, high = numbers if isinstance(given, list) else (-numbers[0], numbers[0])
         if not low < high:
             expected = "low below high" if isinstance(given, list) else "a number above 0"
             mistakes.note(where, f"{str(given)[:40]}: expected {expected}")
         meaning = Quantity(limited[name].unit or "1", -UNBOUNDED, UNBOUNDED, SOURCE)
         values |= {name + LOW: (low, meaning), name + HIGH: (high, meaning)}
     return group_of(values) if values else Nothing()
+
+
+def require_order(machine: Machine, configuration: Configuration) -> None:
+    """Raises RigtwinError for limits whose low one is not below the high one."""
+    told = configuration.safety._asdict()
+    for name in machine.components:
+        if name + LOW in told and not told[name + LOW] < told[name + HIGH]:
+            key, low, high = f"safety.{name}", told[name + LOW], told[name + HIGH]
+            raise RigtwinError(f"{key}{LOW} = {low:g}, {key}{HIGH} = {high:g}: expected low below")
 
 
 def limited_signals(
@@ -119,16 +134,14 @@ def limited_signals(
     Raises
     ------
     RigtwinError
-        For limits whose low one is not below the high one.
+        As `require_order`.
     """
+    require_order(machine, configuration)
     told = configuration.safety._asdict()
     for name, component in machine.components.items():
         if component.channel is None or name + LOW not in told:
             continue
         low, high = told[name + LOW], told[name + HIGH]
-        if not low < high:
-            key = f"safety.{name}"
-            raise RigtwinError(f"{key}{LOW} = {low:g}, {key}{HIGH} = {high:g}: expected low below")
         topic, field = component.channel
         if field in columns.get(topic, {}):
             yield Limit(name, low, high, component.unit), columns[topic][field]

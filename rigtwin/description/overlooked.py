@@ -104,6 +104,12 @@ def _actuators(model: mujoco.MjModel) -> Iterator[str]:
             yield f"actuator {name}: it is a muscle"
         elif model.actuator_dyntype[number] != mujoco.mjtDyn.mjDYN_NONE:
             yield f"actuator {name}: its activation dynamics"
+        bias = model.actuator_biasprm[number]
+        if model.actuator_biastype[number] != mujoco.mjtBias.mjBIAS_NONE and not bias[1]:
+            if bias[0]:
+                yield f"actuator {name}: its constant force {bias[0]:g}"
+            if bias[2]:
+                yield f"actuator {name}: its force by velocity, {bias[2]:g}"
         low, high = model.actuator_forcerange[number]
         if model.actuator_forcelimited[number] and not np.isclose(low, -high):
             yield f"actuator {name}: its forcerange's lower end {low:g}; taken as {-high:g}"

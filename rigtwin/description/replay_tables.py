@@ -75,6 +75,9 @@ class Replays:
                 f"moved_by {said}; expected an actuator or a sensor of the motion: {there}",
             )
             movers = []
+        for mover in dict.fromkeys(map(str, movers)):
+            if movers.count(mover) > 1:
+                self._mistakes.note(where, f"moved_by: {mover} stands there twice")
         for mover in movers:
             if mover not in known:
                 self._mistakes.note(

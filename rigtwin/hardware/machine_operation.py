@@ -48,7 +48,8 @@ class MachineOperation:
         self._command, self._outputs, self._stuck = command, list(outputs), stuck
         self._fields = [machine.components[name].channel or ("", name) for name in outputs]
         self._given = {channel: signal.tolist() for channel, signal in demands.items()}
-        self._channels = [*(s.channel for s in signals.outputs), *signals.given]
+        written = [signal.channel for signal in signals.outputs]
+        self._channels = [*written, *(c for c in demands if c not in written)]
         names = [s.name for s in (*signals.inputs, *signals.outputs)]
         self._reach = [(s, *reach_of(configuration, s.name)) for s in signals.inputs]
         self._bounds = [(s, *reach_of(configuration, s.name)) for s in signals.outputs]

@@ -3,6 +3,7 @@ it commands by that."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -78,16 +79,18 @@ class Readings:
 def commands_of(found: object, names: Sequence[str]) -> list[float]:
     """The commands that a controller gave, one a name.
 
-    Raises RigtwinError for anything but a number for each.
+    Raises RigtwinError for anything but a finite number for each.
     """
     given: Mapping[str, Any] = found if isinstance(found, Mapping) else dict.fromkeys(names, found)
     if (isinstance(found, Mapping) or len(names) == 1) and set(given) == set(names):
         try:
-            return [float(given[name]) for name in names]
-        except (TypeError, ValueError):
-            pass
+            commands = [float(given[name]) for name in names]
+        except (TypeError, ValueError, OverflowError):
+            commands = [math.nan]
+        if all(map(math.isfinite, commands)):
+            return commands
     expected = f"expected {{{', '.join(f'{name!r}: number' for name in names)}}}"
-    or_one = "expected a number" if len(names) == 1 else expected
+    or_one = "expected a finite number" if len(names) == 1 else expected
     raise RigtwinError(f"the controller gave {found!r:.60}; {or_one}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,7 +11,6 @@ from rigtwin.components import PUSHERS, measures
 from rigtwin.description.control import Channel
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.models.commanding import Tick
 from rigtwin.numerics.arrays import Array
 
 Columns = dict[str, dict[str, Array]]
@@ -82,7 +82,7 @@ def list_sensed(machine: Machine) -> set[Channel]:
 
 
 def list_wanted(
-    machine: Machine, demands: Mapping[str, Array], controller: Tick | None
+    machine: Machine, demands: Mapping[str, Array], controller: object | None
 ) -> tuple[list[Channel], list[str]]:
     """What has to be demanded, and what is commanded tick by tick.
 
@@ -123,10 +123,14 @@ def list_wanted(
 def check_demands(
     machine: Machine, wanted: Sequence[Channel], demands: Mapping[str, Array]
 ) -> Columns:
+    if not isinstance(demands, Mapping) or not all(isinstance(name, str) for name in demands):
+        raise RigtwinError(
+            f"{machine.name}: a test demands {demands!r:.60}; expected signals by channel"
+        )
     columns: Columns = {}
     names = {f"{topic}.{name}" for topic, name in wanted} | {name for _, name in wanted}
     if unknown := [name for name in demands if name not in names]:
-        there = ", ".join(name for _, name in wanted)
+        there = ", ".join(name for _, name in wanted) or "none: nothing need be demanded"
         raise RigtwinError(
             f"{machine.name}: nothing takes the demand {unknown[0]!r}; there are {there}"
         )
@@ -138,7 +142,10 @@ def check_demands(
             raise RigtwinError(
                 f"{machine.name}: no demand for {topic}.{name}; a test gives {there}"
             )
-        values = np.asarray(given, float)
+        try:
+            values = np.asarray(given, float)
+        except (TypeError, ValueError, OverflowError):
+            values = np.array(math.nan)
         if values.ndim != 1 or not len(values) or not np.isfinite(values).all():
             raise RigtwinError(
                 f"{machine.name}: demand {name}: expected finite numbers, one a tick"

@@ -11,7 +11,7 @@ from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
-from rigtwin.description.limits import Tripped, find_trip
+from rigtwin.description.limits import Tripped, find_trip, require_order
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.models.carried_twin import carry
@@ -128,6 +128,7 @@ def simulate_machine(
     RigtwinError
         If a demand is missing or not a number, or the machine runs away without meeting a limit.
     """
+    require_order(machine, configuration)
     wanted, outputs = list_wanted(machine, demands, controller)
     columns = check_demands(machine, wanted, demands)
     signals = [signal for names in columns.values() for signal in names.values()]

@@ -59,10 +59,12 @@ reads it."""
 def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
     """The channels that a recording holds, those of the table first, with unit and meaning.
 
-    Then whatever else there is.
+    Then whatever else there is. Where none of the rig's sensors is, names of its table that
+    another machine has too mean something else there.
     """
     there = [(topic, name) for topic, names in columns.items() for name in names]
-    known = [channel for channel in CHANNELS if (channel.topic, channel.name) in there]
+    rig = any(topic == "/sensor" and name in Measurements._fields for topic, name in there)
+    known = [c for c in CHANNELS if rig and (c.topic, c.name) in there]
     named = {(channel.topic, channel.name) for channel in known}
     return known + [
         Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named

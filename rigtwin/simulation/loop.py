@@ -89,11 +89,12 @@ def check_commands(given: object) -> Commands:
     """
     try:
         commands = Commands(*(float(value) for value in given))  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         commands = Commands(math.nan, math.nan, math.nan, math.nan)
     if not all(math.isfinite(value) for value in commands):
         names = ", ".join(Commands._fields)
-        raise RigtwinError(f"the controller gave {str(given)[:80]}; expected finite {names}")
+        shown = " ".join(str(given)[:200].split())[:80]
+        raise RigtwinError(f"the controller gave {shown}; expected finite {names}")
     return commands
 
 

@@ -9,6 +9,7 @@ test.
 
 from __future__ import annotations
 
+import math
 import threading
 
 from rigtwin.errors import RigtwinError
@@ -41,8 +42,14 @@ class SlowModel:
     def __init__(
         self, start: float, ticks: int, *, waits: bool = False, latest: float = LATEST
     ) -> None:
-        if ticks < 1:
-            raise RigtwinError(f"a target every {ticks} ticks: expected 1 or more")
+        if not isinstance(ticks, int) or ticks < 1:
+            raise RigtwinError(
+                f"a target every {ticks!r:.40} ticks: expected a whole number from 1"
+            )
+        for name, value, low in (("start", start, -1e300), ("latest", latest, 0.0)):
+            if not isinstance(value, int | float) or not low <= value < math.inf:
+                least = "" if low < 0.0 else f" from {low:g}"
+                raise RigtwinError(f"{name} = {value!r:.40}: expected a finite number{least}")
         self.late = 0
         """Ticks that the plate was held because there was no target."""
         self._targets = [start, start, start]

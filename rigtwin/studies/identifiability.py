@@ -186,7 +186,10 @@ def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | 
     """(middle, half) of what a channel may demand; None if nothing says it."""
     if machine.structure in (Structure.MOVED, Structure.COUPLED):
         mechanism = Mechanism(machine.model)
-        moved = next(c for c in machine.components.values() if c.channel == channel)
+        moved = next((c for c in machine.components.values() if c.channel == channel), None)
+        if moved is None:
+            # What a controller is told: how far that may go is not said.
+            return None
         joint = mechanism.joint(moved.joint or moved.acts_on[0][0])
         middle, half = _range(joint)
         if not isinstance(getattr(machine.plant, moved.name), ForceActuator):

@@ -43,8 +43,6 @@ class Signals:
     ----------
     inputs, outputs : tuple of Signal
         In the order of what is read, and of what is written.
-    given : tuple of Channel
-        What is demanded besides and goes nowhere but to the controller.
     power : str
         What the digital line is called that lets the actuators have power while high.
     released : tuple of bool
@@ -57,7 +55,6 @@ class Signals:
 
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
-    given: tuple[Channel, ...]
     power: str
     released: tuple[bool, ...]
     written: tuple[int, ...]
@@ -88,7 +85,6 @@ RIG = Signals(
         Signal(name, ("/sensor", name), UNITS["/sensor", name]) for name in Measurements._fields
     ),
     outputs=tuple(Signal(name, ("/command", name), UNITS["/command", name]) for name in _WRITTEN),
-    given=(),
     power="pressure",
     released=(False, False, True),
     written=tuple(Commands._fields.index(name) for name in _WRITTEN),
@@ -131,10 +127,6 @@ def signals_of(machine: Machine) -> Signals:
                 f"{machine.name}: a component called {name} cannot be on a card; "
                 f"these names are a session's own: {', '.join(RESERVED)}"
             )
-    control = machine.control
-    sensed = {components[name].channel for name in sensors}
-    known = {*sensed, *pushers.values()}
-    given = () if control is None else tuple(c for c in control.channels if c not in known)
 
     def signal(name: str, channel: Channel | None) -> Signal:
         assert channel is not None
@@ -143,7 +135,6 @@ def signals_of(machine: Machine) -> Signals:
     return Signals(
         inputs=tuple(signal(name, components[name].channel) for name in sensors),
         outputs=tuple(signal(name, channel) for name, channel in pushers.items()),
-        given=given,
         power="enable",
         released=tuple(isinstance(getattr(machine.plant, n), ForceActuator) for n in pushers),
         written=tuple(range(len(pushers))),

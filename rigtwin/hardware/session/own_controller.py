@@ -7,6 +7,7 @@ import hashlib
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from controllers import Commands, Controller, Demand, Measurements
 from controllers.mil import State
@@ -14,8 +15,9 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.loop import Tick, TickController, check_commands
 
-Making = Callable[[Configuration], TickController]
-"""Makes a new controller for a test of these settings."""
+Making = Callable[[Configuration], TickController | Callable[..., Any]]
+"""Makes a new controller for a test of these settings: an object with a method `tick`, or a
+function."""
 
 
 @dataclass(frozen=True)
@@ -49,14 +51,30 @@ def own_controller(make: Making) -> OwnController:
     return OwnController(make, f"{name} {hashlib.sha256(source.encode()).hexdigest()[:16]}")
 
 
+def make_own(own: OwnController, configuration: Configuration) -> Callable[..., Any]:
+    """A new controller: what it does in a tick.
+
+    Raises RigtwinError if it cannot be made.
+    """
+    try:
+        made: Any = own.make(configuration)
+    except Exception as error:
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        raise RigtwinError(f"controller {own.told}: it cannot be made: {said}") from error
+    tick = getattr(made, "tick", made)
+    if not callable(tick):
+        raise RigtwinError(
+            f"controller {own.told}: made {made!r:.40}; expected a function, or a method tick"
+        )
+    return tick
+
+
 class OwnUpdate:
     """It as a session asks for commands. It is not asked before the test begins: it may be one
     whose every answer counts."""
 
     def __init__(self, own: OwnController, configuration: Configuration) -> None:
-        self._own, self._configuration = own, configuration
-        made = own.make(configuration)
-        self._tick: Tick = getattr(made, "tick", made)  # type: ignore[assignment]
+        self._tick: Tick = make_own(own, configuration)
         self._tried = False
 
     def __call__(

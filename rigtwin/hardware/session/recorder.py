@@ -9,7 +9,7 @@ import numpy as np
 
 from controllers import Commands
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.signals import RIG, Signals
+from rigtwin.hardware.daq.signals import RIG, Channel, Signals
 from rigtwin.hardware.supervisor import Transition
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -53,22 +53,22 @@ class Layout:
         return {SESSION: self.session, **{name: tuple(at) for name, at in self.topics.items()}}
 
 
-def layout_of(signals: Signals) -> Layout:
-    """That of a machine."""
+def layout_of(signals: Signals, given: Sequence[Channel] = ()) -> Layout:
+    """That of a machine. given: what is demanded besides its outputs."""
     inputs, outputs = signals.inputs, signals.outputs
     session = ("time", "phase", *(s.name for s in outputs), signals.power)
     first = len(session)
     session = (*session, *(s.name for s in inputs), "late", "missed")
     topics: dict[str, dict[str, int]] = {}
     if signals is RIG:
-        given = [("/command", name) for name in Commands._fields]
+        told = [("/command", name) for name in Commands._fields]
     else:
-        given = [*(s.channel for s in outputs), *signals.given]
-    for place, (topic, name) in enumerate(given):
+        told = [*(s.channel for s in outputs), *given]
+    for place, (topic, name) in enumerate(told):
         topics.setdefault(topic, {})[name] = len(session) + place
     for place, signal in enumerate(inputs):
         topics.setdefault(signal.channel[0], {})[signal.channel[1]] = first + place
-    return Layout(session, topics, len(session) + len(given), len(outputs))
+    return Layout(session, topics, len(session) + len(told), len(outputs))
 
 
 RIG_LAYOUT = layout_of(RIG)

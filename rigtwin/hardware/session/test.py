@@ -20,7 +20,7 @@ from rigtwin.hardware.daq.table import Alive, ChannelTable, require_ranges, requ
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.machine_operation import MachineOperation
 from rigtwin.hardware.rig_operation import RigOperation, Update
-from rigtwin.hardware.session.own_controller import OwnController, OwnUpdate
+from rigtwin.hardware.session.own_controller import OwnController, OwnUpdate, make_own
 from rigtwin.hardware.session.recorder import RIG_LAYOUT, Layout, layout_of
 from rigtwin.models.commanding import Command, command_by_function
 from rigtwin.models.demands import check_demands, list_wanted
@@ -160,7 +160,20 @@ class MachineTest:
 
     @property
     def layout(self) -> Layout:
-        return layout_of(self.table.signals)
+        demanded, _ = self._plan()
+        written = [signal.channel for signal in self.table.signals.outputs]
+        return layout_of(self.table.signals, [c for c in demanded if c not in written])
+
+    def _plan(self) -> tuple[dict[tuple[str, str], Array], list[str]]:
+        """What is demanded of each channel, and actuators that a controller commands."""
+        wanted, outputs = list_wanted(self.machine, self.demands, self.own)
+        columns = check_demands(self.machine, wanted, self.demands)
+        demanded = {
+            (topic, name): signal
+            for topic, names in columns.items()
+            for name, signal in names.items()
+        }
+        return demanded, outputs
 
     @property
     def controller_settings(self) -> dict[str, Any]:
@@ -175,13 +188,13 @@ class MachineTest:
             if s.name + LOW in safety
         }
         require_reach(self.table, limits)
-        own = None if self.own is None else self.own.make(self.configuration)
-        tick: Any = None if own is None else getattr(own, "tick", own)
-        wanted, outputs = list_wanted(self.machine, self.demands, tick)
-        columns = check_demands(self.machine, wanted, self.demands)
+        demanded, outputs = self._plan()
+        columns: dict[str, dict[str, Array]] = {}
+        for (topic, name), signal in demanded.items():
+            columns.setdefault(topic, {})[name] = signal
         command: Command | None = None
-        if tick is not None:
-            command = command_by_function(tick, columns)
+        if self.own is not None:
+            command = command_by_function(make_own(self.own, self.configuration), columns)
         elif outputs:
             command = command_of(self.machine, self.configuration, columns)
         alive = self.table.plausible
@@ -189,11 +202,7 @@ class MachineTest:
             machine=self.machine,
             configuration=self.configuration,
             signals=signals,
-            demands={
-                (topic, name): signal
-                for topic, names in columns.items()
-                for name, signal in names.items()
-            },
+            demands=demanded,
             outputs=outputs,
             command=command,
             stuck=alive.stuck if isinstance(alive, Alive) else 0.0,

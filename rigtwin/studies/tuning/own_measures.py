@@ -63,6 +63,10 @@ class FormulaFigure:
         return found if math.isfinite(found) else math.nan
 
 
+LONGEST = 100
+"""Letters of a title."""
+
+
 def list_channels(machine: Machine) -> dict[str, Channel]:
     """Name in a formula → channel: components with one, fields of channels, and time."""
     channels = [c.channel for c in machine.components.values() if c.channel is not None]
@@ -102,7 +106,11 @@ def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> 
     for key, value in (("formula", text), *words.items()):
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
             raise RigtwinError(f"{where}.{key} = {value!r:.60}: expected text of one line")
-    if statistic not in STATISTICS:
+    if len(words["title"]) > LONGEST or "$" in words["title"]:
+        raise RigtwinError(
+            f"{where}.title = {words['title']!r:.60}: expected at most {LONGEST} letters, none a $"
+        )
+    if not isinstance(statistic, str) or statistic not in STATISTICS:
         raise RigtwinError(f"{where}.of = {statistic!r:.40}: expected {', '.join(STATISTICS)}")
     if not isinstance(more, bool):
         raise RigtwinError(f"{where}.more = {more!r:.40}: expected true or false")
