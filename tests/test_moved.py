@@ -162,7 +162,7 @@ MISTAKES = [
     (
         'moved_by = ["angle_1", "angle_2"]',
         'moved_by = ["angle_1", "angle_1"]',
-        "moved by two sensors",
+        "stands there twice",
     ),
     (
         'moved_by = ["angle_1", "angle_2"]',

@@ -248,7 +248,7 @@ def test_who_interrupts_a_campaign_fails_no_session(tmp_path, monkeypatch, capsy
         os.kill(os.getpid(), signal.SIGINT)
         return healthy(*given)
 
-    monkeypatch.setattr("rigtwin.hardware.session.record.update", interrupt)
+    monkeypatch.setattr("rigtwin.hardware.session.test.update", interrupt)
     page = tmp_path / "faults.md"
     assert main(["faults", "--each", "1", "--processes", "0", "--out", str(page)]) == 130
     out = capsys.readouterr().out
