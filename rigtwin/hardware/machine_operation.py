@@ -54,7 +54,8 @@ class MachineOperation:
         self._reach = [(s, *reach_of(configuration, s.name)) for s in signals.inputs]
         self._bounds = [(s, *reach_of(configuration, s.name)) for s in signals.outputs]
         self.watched = tuple(names)
-        self.rest: tuple[float, ...] = (0.0,) * len(self._channels)
+        nothing = [min(max(0.0, low), high) for _, low, high in self._bounds]
+        self.rest: tuple[float, ...] = (*nothing, *[0.0] * (len(self._channels) - len(nothing)))
         self.target = self.rest
         self._before: list[float] = [math.nan] * len(signals.inputs)
         self._repeats = [1] * len(signals.inputs)

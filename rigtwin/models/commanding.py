@@ -129,6 +129,8 @@ def command_by_formula(
     program = control.formula.with_settings(settings)
     operations = np.ascontiguousarray(program.operations)
     registers, memory = program.registers.copy(), control.formula.memory()
+    # Compiled before it is needed: a tick has no time for that.
+    _evaluate(operations, registers.copy(), memory.copy(), period)
     given = [
         None if channel in sensors else columns[channel[0]][channel[1]]
         for channel in control.channels
