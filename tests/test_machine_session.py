@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -258,7 +259,7 @@ def test_the_machine_itself_is_run_and_guarded(tmp_path: Path) -> None:
     ],
 )
 def test_a_controller_that_cannot_be_made_is_found_before_the_start(
-    tmp_path: Path, make: Callable[..., object], said: str
+    tmp_path: Path, make: Callable[..., Any], said: str
 ) -> None:
     out, card = tmp_path / "s.mcap", tmp_path / "card.toml"
     card.write_text(EMPS_CARD, encoding="utf-8")

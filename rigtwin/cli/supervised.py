@@ -139,7 +139,7 @@ def _tell_dry_run(parsed: argparse.Namespace, test: AnyTest, path: Path, found: 
             rows.append((peak.name, *values, f"{100 * peak.margin:.0f} %"))
         print(table(rows))
     for lacking in found.obstacles:
-        print(f"before the rig may be armed: {lacking}")
+        print(f"before it may be armed: {lacking}")
     if found.passed and not test.effects and ledger(parsed.card).exists():
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code

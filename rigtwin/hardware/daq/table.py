@@ -312,11 +312,10 @@ def require_reach(table: ChannelTable, limits: Mapping[str, tuple[str, float]]) 
             )
 
 
-def require_trust(table: ChannelTable, today: date) -> None:
-    """Raises RigtwinError unless somebody has calibrated this table and checked every sign.
-
-    Needed to move a real rig.
-    """
+def list_doubts(table: ChannelTable, today: date) -> list[str]:
+    """Why this table must not move a real machine, a line each: signs that nobody has checked, or
+    no word of when and by whom it was calibrated."""
+    found: list[str] = []
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
         how = (
@@ -324,22 +323,30 @@ def require_trust(table: ChannelTable, today: date) -> None:
             if table.signals is RIG
             else "move each a little, and say sign_checked = true once it goes the right way"
         )
-        raise RigtwinError(f"sign not checked: {', '.join(unchecked)}; {how}")
+        found.append(f"sign not checked: {', '.join(unchecked)}; {how}")
+    told = f"card.calibrated = {table.calibrated!r}"
     try:
         calibrated = date.fromisoformat(table.calibrated)
     except ValueError:
-        raise RigtwinError(
-            f"card.calibrated = {table.calibrated!r}: expected the date of calibration, 2026-01-31"
-        ) from None
-    if calibrated > today:
-        raise RigtwinError(f"card.calibrated = {table.calibrated}: that is after today, {today}")
-    if (today - calibrated).days > OLDEST:
-        raise RigtwinError(
-            f"card.calibrated = {table.calibrated}: that is more than {OLDEST // 365} years ago; "
-            "calibrate it anew"
-        )
+        found.append(f"{told}: expected the date of calibration, 2026-01-31")
+    else:
+        told = f"card.calibrated = {table.calibrated}"
+        if calibrated > today:
+            found.append(f"{told}: that is after today, {today}")
+        if (today - calibrated).days > OLDEST:
+            found.append(f"{told}: that is more than {OLDEST // 365} years ago; calibrate it anew")
     if not table.operator.strip():
-        raise RigtwinError("card.operator is missing: expected who calibrated it")
+        found.append("card.operator is missing: expected who calibrated it")
+    return found
+
+
+def require_trust(table: ChannelTable, today: date) -> None:
+    """Raises RigtwinError unless somebody has calibrated this table and checked every sign.
+
+    Needed to move a real machine.
+    """
+    for doubt in list_doubts(table, today):
+        raise RigtwinError(doubt)
 
 
 def to_toml(table: ChannelTable) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
-from rigtwin.hardware.daq.table import require_trust
+from rigtwin.hardware.daq.table import list_doubts, require_trust
 from rigtwin.hardware.session.dry_run import digest, has_passed
 from rigtwin.hardware.session.record import open_card
 from rigtwin.hardware.session.test import AnyTest
@@ -65,13 +65,9 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
 
 
 def list_obstacles(test: AnyTest) -> tuple[str, ...]:
-    """What would keep a test off the rig besides its dry run, a line each."""
-    lacking: list[str] = []
-    for look in (
-        lambda: require_trust(test.table, date.today()),
-        test.require_limits,
-        lambda: open_card(test),
-    ):
+    """What would keep a test off the machine besides its dry run, a line each."""
+    lacking = list_doubts(test.table, date.today())
+    for look in (test.require_limits, lambda: open_card(test)):
         try:
             look()
         except RigtwinError as error:
