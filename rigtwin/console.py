@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import sys
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from rigtwin.files import require_path, write_whole
 
 if TYPE_CHECKING:
     from rigtwin.description.configuration import Configuration
+    from rigtwin.recording import Recording
 
 
 def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
@@ -45,6 +47,12 @@ def writable(out: Path) -> None:
         raise RigtwinError(f"cannot write {out}: its folder does not exist")
     if not os.access(out if out.exists() else out.parent, os.W_OK):
         raise RigtwinError(f"cannot write {out}: permission denied")
+
+
+def tell_notes(recording: Recording) -> None:
+    """What is the matter with a recording, on standard error."""
+    for note in recording.notes:
+        print(f"note: {recording.path}: {note}", file=sys.stderr)
 
 
 def table(rows: list[tuple[str, ...]]) -> str:

@@ -21,6 +21,7 @@ from mcap.writer import Writer as OtherWriter
 from mcap_protobuf.decoder import DecoderFactory
 from scipy.io import loadmat
 
+from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Writer, load
 from rigtwin.recording.channels import CHANNELS, topic_fields
@@ -297,7 +298,7 @@ def test_export_csv_and_mat(tmp_path):
         export(recording, tmp_path / "r.xlsx")
 
 
-def test_gaps_and_repeats_are_noted(tmp_path):
+def test_gaps_and_repeats_are_noted(tmp_path, capsys):
     path = tmp_path / "g.mcap"
     with path.open("wb") as file:
         writer = OtherWriter(file)
@@ -312,6 +313,10 @@ def test_gaps_and_repeats_are_noted(tmp_path):
     notes = " ".join(load(path).notes)
     assert "1 messages on /sensor left out" in notes
     assert "1 gaps in time, the first of 0.041 s at 0.099 s" in notes
+    # Who makes a table or a picture of it is told, too.
+    assert main(["export", str(path), "-o", str(tmp_path / "e.csv")]) == 0
+    assert main(["plot", str(path), "-o", str(tmp_path / "e.png")]) == 0
+    assert capsys.readouterr().err.count("1 gaps in time") == 2
 
 
 def test_foxglove_layout_names_channels_that_exist():

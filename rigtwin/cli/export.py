@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from rigtwin.console import tell_notes
+
 SUMMARY = "write a recording as CSV or MAT for other programs"
 MORE = ""
 
@@ -18,5 +20,6 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording)
+    tell_notes(recording)
     print(f"written to {recording.export(parsed.out)}")
     return 0

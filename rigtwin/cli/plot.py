@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_stretch
+from rigtwin.console import tell_notes
 
 SUMMARY = "draw a recording: motions, force, wheel and voltage over time"
 MORE = """\
@@ -43,6 +44,7 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording)
+    tell_notes(recording)
     out = parsed.out or parsed.recording.with_suffix(".png")
     drawn = recording.plot(out, parsed.start, parsed.until, style=parsed.style, panels=parsed.panel)
     print(f"drawn in {drawn}")

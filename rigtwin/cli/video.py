@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from rigtwin.cli.options import add_machine, add_settings, add_stretch, settings_of
+from rigtwin.console import tell_notes
 from rigtwin.errors import RigtwinError
 
 SUMMARY = "film a recording: the machine moving, its signals drawn beneath"
@@ -50,6 +51,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if not parsed.ghost and (parsed.set or parsed.config):
         raise RigtwinError("--set and --config are of the twin that --ghost draws; add --ghost")
     recording = rigtwin.load(parsed.recording, parsed.machine)
+    tell_notes(recording)
     out = parsed.out or parsed.recording.with_suffix(".mp4")
     with tqdm(unit="frame", disable=None, desc="filming", leave=False) as bar:
 
