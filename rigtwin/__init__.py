@@ -69,6 +69,7 @@ if TYPE_CHECKING:
         Reproduction,
         RigMargin,
         Stability,
+        TunedCompensator,
         TuningResult,
         blindcheck,
         blindcheck_machines,
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
         rths,
         stability,
         tune,
+        tune_compensator,
     )
     from rigtwin.api.watching import Alarm, Suspect, Watch, watch
 
@@ -106,6 +108,7 @@ __all__ = [
     "Stability",
     "Suspect",
     "TableCheck",
+    "TunedCompensator",
     "TuningResult",
     "Watch",
     "blindcheck",
@@ -140,6 +143,7 @@ __all__ = [
     "show_look",
     "stability",
     "tune",
+    "tune_compensator",
     "watch",
     "what_changed",
     "write_table",
@@ -200,6 +204,7 @@ _MODULES = {
         "RigMargin",
         "Reproduction",
         "Stability",
+        "TunedCompensator",
         "TuningResult",
         "blindcheck",
         "blindcheck_machines",
@@ -209,6 +214,7 @@ _MODULES = {
         "rig_margin",
         "stability",
         "tune",
+        "tune_compensator",
     ),
     "watching": ("Alarm", "Suspect", "Watch", "watch"),
 }

@@ -18,6 +18,7 @@ from experiments.rths.criteria import delay, judge
 from experiments.rths.ground_motion import QUAKES, ground_motion
 from experiments.rths.hybrid_test import BENCHMARK, ideal_test, run_test
 from experiments.rths.study import TABLE_3
+from experiments.rths.tuning import TUNABLE
 from rigtwin.cli import main
 
 SHORT = 6 * 4096
@@ -138,3 +139,38 @@ def test_the_command_prints_and_writes_the_criteria(tmp_path, capsys):
     written = json.loads(out.read_text())["plants"]
     assert len(written) == 2
     assert f"{written[1]['criteria']['j4']:.2f}" in printed[2].split()
+
+
+@pytest.mark.slow
+def test_a_compensator_is_tuned_on_some_plants_and_better_on_others(tmp_path, capsys):
+    out = tmp_path / "tuned.json"
+    line = ["rths", "--case", "4", "--compensator", "adaptive-model", "--tune", "--plants", "1"]
+    assert main([*line, "--evaluations", "6", "--json", str(out)]) == 0
+    assert "worst of the others" in capsys.readouterr().out
+    found = json.loads(out.read_text())
+    assert found["criterion"][1] < 0.5 * found["criterion"][0]
+    assert found["judged"][1] < 0.5 * found["judged"][0]
+    assert found["after"]["rate"] > found["before"]["rate"]
+
+
+@pytest.mark.parametrize("name", list(TUNABLE))
+def test_a_compensator_with_its_knobs_as_they_are_is_the_one_of_that_name(name):
+    of = TUNABLE[name]
+    ours, theirs = of.make(**{knob.name: knob.start for knob in of.knobs}), find_compensator(name)
+    assert repr(ours) == repr(theirs)
+    for knob in of.knobs:
+        assert knob.low < knob.start < knob.high
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"name": "lag"}, "expected one with knobs, adaptive-model"),
+        ({"plants": 0}, "plants = 0: expected a whole number from 1"),
+        ({"evaluations": 1.5}, "evaluations = 1.5"),
+        ({"case": 7}, "case"),
+    ],
+)
+def test_a_tuning_that_cannot_be_is_refused(given, said):
+    with pytest.raises(rigtwin.RigtwinError, match=said):
+        rigtwin.tune_compensator(**{"name": "adaptive-model", **given})

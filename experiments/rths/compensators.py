@@ -9,7 +9,7 @@ import numpy as np
 from controllers.adaptive_law import adaptive_model, adaptive_time_series
 from controllers.forward_prediction import forward_prediction
 from controllers.inverse_model import inverse_coefficients, inverse_model
-from controllers.kalman_inverse import Actuator, Weights, kalman_inverse
+from controllers.kalman_inverse import Actuator, Weights
 from controllers.lag_compensation import lag_compensation
 from controllers.linear_law import LinearLaw, pass_through
 from controllers.smith_predictor import smith_predictor
@@ -43,7 +43,8 @@ def _nominal_delay() -> float:
     return inverse_coefficients(below, above, 0.0, 1)[1]
 
 
-def _inverse(order: int) -> list[float]:
+def nominal_inverse(order: int) -> list[float]:
+    """Coefficients of the inverse of the nominal plant, s^order."""
     return inverse_coefficients(*transfer(Plant()), 0.0, order)
 
 
@@ -66,15 +67,18 @@ KALMAN = Weights(
 0.38 % on the worst of them and 0.02 points above the floor with noise; with 1e-6 it is 0.13 %, and
 0.26 points."""
 
+SMITH = (1.0, 1.0 / 48.0, 0.005, 2.0, 95.0)
+"""Gain, lag and delay of the plant, s, and the gains of the feedback."""
+
 COMPENSATORS: Mapping[str, Callable[[], Law]] = {
     "none": pass_through,
     "sample": sample_controller,
     "forward-prediction": lambda: forward_prediction(_nominal_delay(), PERIOD, interval=24),
     "lag": lambda: lag_compensation(_nominal_delay(), PERIOD),
-    "inverse": lambda: inverse_model(_inverse(4), PERIOD, proportional=1.0, integral=40.0),
-    "smith": lambda: smith_predictor(1.0, 1.0 / 48.0, 0.005, 2.0, 95.0, PERIOD),
-    "adaptive-time-series": lambda: adaptive_time_series(_inverse(2), PERIOD),
-    "adaptive-model": lambda: adaptive_model(_inverse(3), PERIOD),
+    "inverse": lambda: inverse_model(nominal_inverse(4), PERIOD, proportional=1.0, integral=40.0),
+    "smith": lambda: smith_predictor(*SMITH, PERIOD),
+    "adaptive-time-series": lambda: adaptive_time_series(nominal_inverse(2), PERIOD),
+    "adaptive-model": lambda: adaptive_model(nominal_inverse(3), PERIOD),
     "kalman-inverse": lambda: kalman_inverse(nominal_actuator(), PERIOD, KALMAN),
 }
 

@@ -12,6 +12,8 @@ from experiments.rths.compensators import find_compensator
 from experiments.rths.ground_motion import ground_motion
 from experiments.rths.hybrid_test import NONE, Noise, run_test
 from experiments.rths.hybrid_test import HybridTest as HybridTest
+from experiments.rths.tuning import TunedCompensator as TunedCompensator
+from experiments.rths.tuning import tune_compensator as tune_compensator
 from experiments.thesis.result import Reproduction
 from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 
 import rigtwin
 from rigtwin.console import table, writable, write_json
+from rigtwin.errors import RigtwinError
 
 SUMMARY = "run the benchmark of real-time hybrid simulation: a building whose first column is real"
 MORE = """\
 examples:
   rigtwin rths --case 1 --quake elcentro --compensator sample
   rigtwin rths --case 4 --plants 20                the compensator that follows best
-  rigtwin reproduce rths                           all of them, beside what is published"""
+  rigtwin rths --case 4 --compensator adaptive-model --tune
+  rigtwin reproduce rths                           all of them, beside what is published
+
+With --tune the compensator's gains, rates or weights are looked for on --plants actuators
+(default 8) and judged on as many others."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,13 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plants",
         type=int,
-        default=1,
-        help="actuators to try: the nominal one, then drawn ones (default 1)",
+        help="actuators to try: the nominal one, then drawn ones (default 1, with --tune 8)",
     )
     parser.add_argument(
         "--noise", action="store_true", help="with the noise of the benchmark's converters"
     )
     parser.add_argument("--seed", type=int, default=1, help="of plants and noise (default 1)")
+    parser.add_argument("--tune", action="store_true", help="tune the compensator first")
+    parser.add_argument(
+        "--evaluations", type=int, default=30, help="of the criterion, with --tune (default 30)"
+    )
     parser.add_argument(
         "--json", type=Path, metavar="F.json", help="also write the figures to a file"
     )
@@ -48,11 +57,13 @@ def execute(parsed: argparse.Namespace) -> int:
 
     if parsed.json is not None:
         writable(parsed.json)
+    if parsed.tune:
+        return _tune(parsed)
     tests = rigtwin.rths(
         parsed.case,
         quake=parsed.quake,
         compensator=parsed.compensator,
-        plants=parsed.plants,
+        plants=1 if parsed.plants is None else parsed.plants,
         noise=BENCHMARK if parsed.noise else NONE,
         seed=parsed.seed,
     )
@@ -73,6 +84,39 @@ def execute(parsed: argparse.Namespace) -> int:
     print(table(rows))
     if parsed.json is not None:
         write_json(parsed.json, {"case": parsed.case, "quake": parsed.quake, "plants": _all(tests)})
+    return 0
+
+
+def _tune(parsed: argparse.Namespace) -> int:
+    """Prints the knobs and the figures before and after."""
+    from tqdm import tqdm
+
+    if parsed.noise:
+        raise RigtwinError("--noise: a tuning looks at both, with noise and without")
+    plants = 8 if parsed.plants is None else parsed.plants
+    shown = {"unit": "evaluation", "desc": f"tuning {parsed.compensator}", "leave": False}
+    with tqdm(total=parsed.evaluations + 1, disable=None, **shown) as bar:
+        found = rigtwin.tune_compensator(
+            parsed.compensator,
+            parsed.case,
+            quake=parsed.quake,
+            plants=plants,
+            others=plants,
+            evaluations=parsed.evaluations,
+            seed=parsed.seed,
+            progress=bar.update,
+        )
+    rows: list[tuple[str, ...]] = [("", "before", "after")]
+    rows += [(k, f"{v:.4g}", f"{found.after[k]:.4g}") for k, v in found.before.items()]
+    for told, pair in (
+        ("criterion, on the plants it was tuned on, %", found.criterion),
+        ("J2 without noise, worst of the others, %", found.judged),
+        ("J2 with noise above its floor, points", found.noisy),
+    ):
+        rows.append((told, *(f"{value:.3f}" for value in pair)))
+    print(table(rows))
+    if parsed.json is not None:
+        write_json(parsed.json, asdict(found))
     return 0
 
 
