@@ -9,7 +9,7 @@ import numpy as np
 from controllers.adaptive_law import adaptive_model, adaptive_time_series
 from controllers.forward_prediction import forward_prediction
 from controllers.inverse_model import inverse_coefficients, inverse_model
-from controllers.kalman_inverse import Actuator, Weights
+from controllers.kalman_inverse import Actuator, Weights, kalman_inverse
 from controllers.lag_compensation import lag_compensation
 from controllers.linear_law import LinearLaw, pass_through
 from controllers.smith_predictor import smith_predictor
