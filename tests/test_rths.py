@@ -144,8 +144,8 @@ def test_the_command_prints_and_writes_the_criteria(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_compensator_is_tuned_on_some_plants_and_better_on_others(tmp_path, capsys):
     out = tmp_path / "tuned.json"
-    line = ["rths", "--case", "4", "--compensator", "adaptive-model", "--tune", "--plants", "1"]
-    assert main([*line, "--evaluations", "6", "--json", str(out)]) == 0
+    line = ["rths", "--case", "4", "--compensator", "adaptive-model", "--tune", "--plants", "2"]
+    assert main([*line, "--evaluations", "8", "--json", str(out)]) == 0
     assert "worst of the others" in capsys.readouterr().out
     found = json.loads(out.read_text())
     assert found["criterion"][1] < 0.5 * found["criterion"][0]
