@@ -23,12 +23,13 @@ def make_noise(
     plant: Plant, name: str, ticks: int, period: float, random: np.random.Generator
 ) -> Array:
     """What is added to a sensor's readings, shape (ticks,)."""
-    sensor = getattr(plant, name)
-    phase = random.uniform(0.0, 2.0 * np.pi)
-    hum = sensor.hum * np.sin(
-        2.0 * np.pi * plant.mains.frequency * period * np.arange(ticks) + phase
-    )
-    return sensor.white * random.standard_normal(ticks) + hum
+    hum = hum_of(plant, name, random.uniform(0.0, 2.0 * np.pi), period * np.arange(ticks))
+    return getattr(plant, name).white * random.standard_normal(ticks) + hum
+
+
+def hum_of(plant: Plant, name: str, phase: float, time: Array) -> Array:
+    """The mains' hum in a sensor's readings at some times, s."""
+    return getattr(plant, name).hum * np.sin(2.0 * np.pi * plant.mains.frequency * time + phase)
 
 
 def round_reading(plant: Plant, name: str, reading: Array) -> Array:

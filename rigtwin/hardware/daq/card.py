@@ -251,7 +251,8 @@ class Card:
         ]
 
     def power(self, on: bool) -> None:
-        with translate_errors(f"card {self._table.device}: pressure line {self._table.power}"):
+        table = self._table
+        with translate_errors(f"card {table.device}: {table.signals.power} line {table.power}"):
             self._power.write_one_sample_one_line(on)
 
     def stop(self) -> None:

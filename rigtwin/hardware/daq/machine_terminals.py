@@ -11,7 +11,7 @@ from rigtwin.hardware.daq.conversion import conversion, to_bits, to_values, to_v
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.models.coupled_twin import begin_live
 from rigtwin.models.demands import list_sensors
-from rigtwin.models.reading import make_noise, round_reading
+from rigtwin.models.reading import hum_of, round_reading
 from rigtwin.numerics.arrays import Array
 
 AHEAD = 1000
@@ -43,6 +43,7 @@ class MachineTerminals:
         self._states = [start_transducer(model) for model in self._models]
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         self._random, self._place = np.random.default_rng([seed, 3]), AHEAD
+        self._phases, self._drawn = self._random.uniform(0.0, 2.0 * np.pi, len(rows)), 0
         self._noise: list[Array] = []
         self._written = np.zeros(len(outputs))
         self._values, self.volts = np.zeros(len(rows)), np.zeros(len(rows))
@@ -59,11 +60,13 @@ class MachineTerminals:
 
     def _sample(self) -> None:
         if self._place == AHEAD:
+            time = self._period * (self._drawn + np.arange(AHEAD))
             self._noise = [
-                make_noise(self._plant, name, AHEAD, self._period, self._random)
-                for name in self._names
+                getattr(self._plant, name).white * self._random.standard_normal(AHEAD)
+                + hum_of(self._plant, name, phase, time)
+                for name, phase in zip(self._names, self._phases.tolist(), strict=True)
             ]
-            self._place = 0
+            self._place, self._drawn = 0, self._drawn + AHEAD
         true = self._stepped.sense()
         for number, name in enumerate(self._names):
             value = transduce(self._models[number], self._states[number], true[name])

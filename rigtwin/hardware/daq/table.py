@@ -210,7 +210,7 @@ def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTab
             )
         taken[line.line] = line.name
     texts = {key: card[key] for key in _FREE_TEXT if key in card}
-    plausible = Plausible if signals is RIG else Alive
+    plausible = Plausible if signals == RIG else Alive
     return ChannelTable(
         inputs,
         outputs,
@@ -320,7 +320,7 @@ def list_doubts(table: ChannelTable, today: date) -> list[str]:
     if unchecked:
         how = (
             "rigtwin card check moves each a little and looks"
-            if table.signals is RIG
+            if table.signals == RIG
             else "move each a little, and say sign_checked = true once it goes the right way"
         )
         found.append(f"sign not checked: {', '.join(unchecked)}; {how}")

@@ -60,7 +60,7 @@ def layout_of(signals: Signals, given: Sequence[Channel] = ()) -> Layout:
     first = len(session)
     session = (*session, *(s.name for s in inputs), "late", "missed")
     topics: dict[str, dict[str, int]] = {}
-    if signals is RIG:
+    if signals == RIG:
         told = [("/command", name) for name in Commands._fields]
     else:
         told = [*(s.channel for s in outputs), *given]
