@@ -15,14 +15,12 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 import rigtwin
-from controllers.compensated import Compensated
 from experiments import find
 from experiments.vehicles import TABLE_6_2, VEHICLES, find_vehicle
 from rigtwin.components import RigPlant
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.ideal import simulate_ideal
-from rigtwin.studies.stability.compensated import plate_compensator
 from rigtwin.studies.stability.tested import rig_as, set_for_compensation, sized
 
 TESTS = ("drop", "road1.6", "road10")
@@ -74,14 +72,10 @@ def configure(vehicle: str, test: str) -> Configuration:
 
 def run(configuration: Configuration, test: str, compensated: bool) -> Errors:
     """The errors of one test."""
-    controller = None
     if compensated:
         configuration = set_for_compensation(configuration)
-        period = configuration.timing.period
-        law = plate_compensator(configuration.plant.structure_cylinder, period)
-        controller = Compensated(configuration.controller, period, law)
     experiment = replace(find(test), configuration=configuration)
-    made = rigtwin.run("suspension-rig", experiment, seed=SEED, controller=controller)
+    made = rigtwin.run("suspension-rig", experiment, seed=SEED)
     period = configuration.timing.period
     ideal = simulate_ideal(configuration, low_pass(made["/sensor.ground_lvdt"], GROUND, period))
     position = np.std(made["/sensor.structure_lvdt"] - ideal.structure) / np.std(ideal.structure)

@@ -14,7 +14,15 @@ from controllers.mil import (
     unpacked,
     update,
 )
-from controllers.settings import Compensator, Mode, Settings, Skyhook, Structure, Travel
+from controllers.settings import (
+    Compensator,
+    Mode,
+    PlateCompensator,
+    Settings,
+    Skyhook,
+    Structure,
+    Travel,
+)
 from controllers.signals import Commands, Demand, Measurements
 
 __all__ = [
@@ -25,6 +33,7 @@ __all__ = [
     "Demand",
     "Measurements",
     "Mode",
+    "PlateCompensator",
     "Settings",
     "Skyhook",
     "State",

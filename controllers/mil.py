@@ -24,6 +24,7 @@ from controllers.friction import (
     stepped,
 )
 from controllers.gas_spring import gas_force
+from controllers.plate import Array, Plate, at_rest, compensate, plate
 from controllers.settings import Compensator, Mode, Settings, Structure, Travel
 from controllers.signals import Commands, Demand, Measurements
 from controllers.skyhook import skyhook_force
@@ -36,14 +37,15 @@ class Controller(NamedTuple):
 
     settings: Settings
     modes: Modes
+    plate: Plate
     period: float
 
 
 class State(NamedTuple):
-    """What the controller remembers from tick to tick, all floats. Positions m, velocities m/s,
-    forces N.
+    """What the controller remembers from tick to tick. Positions m, velocities m/s, forces N.
 
-    Numbers stand first, then tuples of numbers; the defaults give their lengths.
+    Numbers stand first, then tuples of numbers, whose lengths the defaults give; last what the
+    plate's compensator remembers, as many numbers as its law has.
     """
 
     sample: float = math.nan
@@ -60,20 +62,21 @@ class State(NamedTuple):
     compensation: Compensation = REST
     velocities: Velocities = NO_VELOCITIES
     errors: Errors = NO_ERRORS
+    plate: Array = at_rest(plate(Settings(), 1.0))
 
 
 def _lay_out(state: State) -> dict[str, slice]:
     """Field → where its numbers stand in a packed state."""
     places, first = {}, 0
-    for name, value in state._asdict().items():
+    for name, value in zip(state._fields[:-1], state[:-1], strict=True):
         last = first + (len(value) if isinstance(value, tuple) else 1)
         places[name], first = slice(first, last), last
     return places
 
 
 PLACES = _lay_out(State())
-SIZE = PLACES[State._fields[-1]].stop
-"""Numbers in a packed state."""
+SIZE = PLACES[State._fields[-2]].stop
+"""Numbers in a packed state, but for the plate's."""
 # Compiled code knows slices that are constants of the module, and no tables of them.
 _MODAL, _RATES, _COMPENSATION = PLACES["modal"], PLACES["modal_rates"], PLACES["compensation"]
 _VELOCITIES, _ERRORS = PLACES["velocities"], PLACES["errors"]
@@ -81,31 +84,36 @@ _NUMBERS = slice(0, _MODAL.start)
 
 
 def controller(settings: Settings, period: float) -> Controller:
-    """What `update` needs, from settings and the period of the ticks in s."""
-    return Controller(settings, modes(settings, period), period)
+    """What `update` needs, from settings and the period of the ticks in s. Raises ValueError if
+    there is no such compensator of the plate."""
+    return Controller(settings, modes(settings, period), plate(settings, period), period)
 
 
 def initial_state(controller: Controller) -> State:
     """The state before the first tick: the structure model at rest at `start`."""
     settings = controller.settings
-    return State(structure_position=settings.start, modal=at_start(settings, controller.modes))
+    return State(
+        structure_position=settings.start,
+        modal=at_start(settings, controller.modes),
+        plate=at_rest(controller.plate),
+    )
 
 
 @compilable
 def packed(state: State) -> tuple[float, ...]:
-    """The state as plain numbers."""
+    """The state as plain numbers, but for the plate's."""
     numbers: Any = state[_NUMBERS]
     memory = state.compensation[:] + state.velocities + state.errors
     return numbers + state.modal + state.modal_rates + memory
 
 
 @compilable
-def unpacked(values: tuple[float, ...]) -> State:
-    """The state of its plain numbers, SIZE of them."""
+def unpacked(values: tuple[float, ...], plate: Array) -> State:
+    """The state of its plain numbers, SIZE of them, and what the plate's compensator remembers."""
     numbers: Any = values[_NUMBERS]
     compensation = Compensation(*values[_COMPENSATION])
     tuples = (values[_MODAL], values[_RATES], compensation, values[_VELOCITIES], values[_ERRORS])
-    return State(*(numbers + tuples))
+    return State(*(numbers + tuples + (plate,)))
 
 
 @compilable
@@ -116,7 +124,7 @@ def update(
     demand: Demand,
 ) -> tuple[State, Commands]:
     """One tick: filters, suspension model and skyhook, friction compensation, force loop, structure
-    model."""
+    model, delay compensation of its plate."""
     settings, period = controller.settings, controller.period
     sample = measured.suspension_lvdt
     if settings.travel == Travel.GROUND:
@@ -135,9 +143,11 @@ def update(
         force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
 
     modal, modal_rates = state.modal, state.modal_rates
+    memory = state.plate
     if settings.mode == Mode.IMPOSED:
         demanded = demand.force
         position, structure_velocity = demand.structure, 0.0
+        asked = position
     else:
         skyhook = skyhook_force(settings, state.structure_velocity, velocity)
         demanded = suspension_force(settings, travel, velocity) - skyhook
@@ -155,6 +165,7 @@ def update(
             position, structure_velocity = point_mass(
                 settings, state.structure_position, state.structure_velocity, carried, period
             )
+        memory, asked = compensate(controller.plate, memory, position, measured.structure_lvdt)
     compensation, velocities, errors = state.compensation, state.velocities, state.errors
     if settings.compensator == Compensator.OBSERVER:
         compensation = observed(settings, compensation, measured.load_cell, period)
@@ -184,5 +195,6 @@ def update(
         compensation=compensation,
         velocities=velocities,
         errors=errors,
+        plate=memory,
     )
-    return after, Commands(demand.ground, position, demanded, voltage)
+    return after, Commands(demand.ground, asked, demanded, voltage)

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from controllers import closed_loop as loop
 from controllers.quantity import Choice, Quantity
 
 _CHOSEN = "the thesis does not give it; docs/friction.md"
+_COMPENSATION = "docs/compensation.md"
 _BEAM = "thesis Table 7.4"
 
 
@@ -46,6 +48,17 @@ class Compensator(Choice):
     FORCE_PROFILE = 3
     FORCE_THRESHOLD = 4
     OBSERVER = 5
+
+
+class PlateCompensator(Choice):
+    """The delay compensator between the structure model and its cylinder, made of what it is told
+    of the cylinder, the settings plate_b2 to plate_delay (docs/compensation.md). Imposed tests
+    have none."""
+
+    NONE = 0
+    FORWARD_PREDICTION = 1
+    LAG = 2
+    KALMAN_INVERSE = 3
 
 
 class Skyhook(Choice):
@@ -118,3 +131,23 @@ class Settings(NamedTuple):
         0.217
     )
     gas_exponent: Annotated[float, Quantity("1", 1.0, 1.7, "of its gas, thesis Eq. 3.3")] = 1.4
+    plate_compensator: PlateCompensator = PlateCompensator.NONE
+    plate_b2: loop.B2 = loop.NOMINAL.b2
+    plate_b1: loop.B1 = loop.NOMINAL.b1
+    plate_b0: loop.B0 = loop.NOMINAL.b0
+    plate_a3: loop.A3 = loop.NOMINAL.a3
+    plate_a2: loop.A2 = loop.NOMINAL.a2
+    plate_a1: loop.A1 = loop.NOMINAL.a1
+    plate_a0: loop.A0 = loop.NOMINAL.a0
+    plate_gain: loop.Gain = loop.NOMINAL.gain
+    plate_lag: loop.Lag = loop.NOMINAL.lag
+    plate_delay: loop.Delay = loop.NOMINAL.delay
+    plate_effort: Annotated[
+        float, Quantity("1", 1e-8, 1.0, f"of the command's deviation; {_COMPENSATION}")
+    ] = 1e-3
+    plate_roughness: Annotated[
+        float, Quantity("s^3", 1e-15, 1.0, f"noise of what is desired; {_COMPENSATION}")
+    ] = 1e-4
+    plate_noise: Annotated[
+        float, Quantity("m", 1e-9, 0.1, f"of the plate's sensor; {_COMPENSATION}")
+    ] = 1e-3

@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
-
-from controllers.linear_law import LinearLaw, step_linear
+from controllers.linear_law import LinearLaw
 from controllers.mil import controller, initial_state, update
-from controllers.settings import Settings
+from controllers.plate import at_rest, compensate, compensation, plate
+from controllers.settings import PlateCompensator, Settings
 from controllers.signals import Commands, Demand, Measurements
 
 
@@ -35,7 +34,7 @@ class Substructured:
     model
         The structure, or its `advance` alone.
     law
-        A delay compensator of the plate, if there is one.
+        A delay compensator of the plate, in place of the one that the settings ask for.
     """
 
     def __init__(
@@ -45,18 +44,19 @@ class Substructured:
         model: Model | Callable[[float, float], float],
         law: LinearLaw | None = None,
     ) -> None:
-        self._controller = controller(settings, period)
+        # The settings' own structure runs along unused, so its plate needs no compensation.
+        plain = settings._replace(plate_compensator=PlateCompensator.NONE)
+        self._controller = controller(plain, period)
+        self._plate = plate(settings, period) if law is None else compensation(law, period)
         self._state = initial_state(self._controller)
         self._advance: Callable[[float, float], float] = getattr(model, "advance", model)
-        self._period, self._start, self._law = period, settings.start, law
-        self._memory = np.zeros(0 if law is None else len(law.a))
+        self._period, self._memory = period, at_rest(self._plate)
 
     def tick(self, measured: Measurements, demand: Demand) -> Commands:
         """The commands of one tick, the plate's where the model has it."""
         self._state, commands = update(self._controller, self._state, measured, demand)
         position = float(self._advance(self._state.force, self._period))
-        if self._law is not None:
-            moved = measured.structure_lvdt - self._start
-            wanted = position - self._start
-            position = float(step_linear(self._law, self._memory, wanted, moved)) + self._start
-        return commands._replace(structure=position)
+        self._memory, asked = compensate(
+            self._plate, self._memory, position, measured.structure_lvdt
+        )
+        return commands._replace(structure=float(asked))

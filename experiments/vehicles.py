@@ -1,17 +1,22 @@
-"""The vehicles of thesis Table 6.1, dropped on the rig as it is. All are unstable with its delays
-(thesis §6.2); the heavy ones exceed the motor's force at once and trip."""
+"""The vehicles of thesis Table 6.1, dropped and on a road, plain and with the plate's delay
+compensated. Plain, all are unstable with the rig's delays (thesis §6.2); the heavy ones exceed the
+motor's force at once and trip either way."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 from controllers import Settings
-from experiments.experiment import flat_ground
+from experiments import quarter_car
+from experiments.experiment import flat_ground, road_ground
+from experiments.quarter_car import ROAD_10
 from rigtwin.components import Carriage, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
-from rigtwin.studies.stability.tested import rig_as
+from rigtwin.studies.stability.tested import rig_as, set_for_compensation
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 TABLE_6_2 = "quarter-car"
@@ -44,15 +49,48 @@ def configuration(vehicle: Vehicle) -> Configuration:
     return rig_as(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
 
 
-EXPERIMENTS = tuple(
-    Experiment(
-        name,
-        f"{name} dropped: unstable on this rig",
-        "thesis Table 6.1",
-        configuration(vehicle),
-        flat_ground,
+COMPENSATED = "-compensated"
+"""Ends the name of a test whose plate's delay is compensated."""
+
+
+def _tests() -> Iterator[Experiment]:
+    """Every vehicle dropped and on a road, then those of Table 6.2."""
+    for name, vehicle in VEHICLES.items():
+        dropped = configuration(vehicle)
+        yield Experiment(
+            name,
+            f"{name} dropped: unstable on this rig",
+            "thesis Table 6.1",
+            dropped,
+            flat_ground,
+        )
+        yield Experiment(
+            f"{name}-road10",
+            f"{name}, motorway at 15 km/h, 0.01-10 Hz: unstable on this rig",
+            "thesis Table 6.1, §6.3.3",
+            dropped._replace(road=ROAD_10, timing=dropped.timing._replace(duration=15.0)),
+            road_ground,
+        )
+    for experiment in quarter_car.EXPERIMENTS:
+        if experiment.name in ("drop", "road1.6", "road10"):
+            yield experiment
+
+
+def _compensated(plain: Experiment) -> Experiment:
+    summary = plain.summary.removesuffix(": unstable on this rig")
+    return replace(
+        plain,
+        name=plain.name + COMPENSATED,
+        summary=f"{summary}, the plate's delay compensated",
+        configuration=set_for_compensation(plain.configuration),
     )
-    for name, vehicle in VEHICLES.items()
+
+
+EXPERIMENTS = tuple(
+    test
+    for plain in _tests()
+    for test in (plain, _compensated(plain))
+    if test not in quarter_car.EXPERIMENTS
 )
 
 

@@ -9,33 +9,50 @@ import numpy as np
 import pytest
 
 import rigtwin
-from controllers.compensated import Compensated
-from controllers.linear_law import pass_through
+from controllers import (
+    Demand,
+    Measurements,
+    PlateCompensator,
+    controller,
+    initial_state,
+    update,
+)
+from controllers.closed_loop import ClosedLoop, transfer, with_lag
+from controllers.kalman_inverse import Actuator, sampled_actuator
+from controllers.linear_law import pass_through, response
+from controllers.plate import plate, told
 from experiments import find
 from experiments.vehicles import VEHICLES, configuration
-from rigtwin.components import Cylinder
-from rigtwin.components.cylinder import state_space
-from rigtwin.studies.stability.compensated import (
-    actuator_of,
-    plate_compensator,
-    with_cylinder_delay,
-    with_filters,
-)
+from rigtwin.components import Computer, Cylinder
+from rigtwin.components.cylinder import closed_loop
+from rigtwin.description.changes import from_toml, with_changes
+from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import RigControl
+from rigtwin.diagnosis.controller import ControllerReplay
+from rigtwin.errors import RigtwinError
+from rigtwin.simulation.loop import run, run_compiled
+from rigtwin.simulation.twin import Twin
+from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
 from rigtwin.studies.stability.sampled_loop import decay
 
 PERIOD, FAST, LATE = 1e-3, 2e-3, 8e-3
 
 
 def test_a_lag_of_the_cylinder_is_in_series():
-    plain, slow = actuator_of(Cylinder()), actuator_of(Cylinder(lag=0.01, gain=1.02))
+    plain, slow = (closed_loop(each) for each in (Cylinder(), Cylinder(lag=0.01, gain=1.02)))
     s = 2j * np.pi * 2.0
 
-    def at(actuator) -> complex:
-        size = len(actuator.a)
-        return complex(actuator.c @ np.linalg.solve(s * np.eye(size) - actuator.a, actuator.b))
+    def by_states(loop: ClosedLoop) -> complex:
+        a, b, c = with_lag(loop)
+        return complex(c @ np.linalg.solve(s * np.eye(len(a)) - a, b))
 
-    assert at(slow) == pytest.approx(1.02 * at(plain) / (1.0 + 0.01 * s), rel=1e-9)
-    assert len(state_space(Cylinder())[0]) == 4
+    def by_polynomials(loop: ClosedLoop) -> complex:
+        above, below = transfer(loop)
+        return complex(np.polyval(above, s) / np.polyval(below, s))
+
+    for at in (by_states, by_polynomials):
+        assert at(slow) == pytest.approx(1.02 * at(plain) / (1.0 + 0.01 * s), rel=1e-9)
+        assert at(plain) == pytest.approx(by_states(plain), rel=1e-9)
 
 
 def test_passing_the_command_through_changes_no_pole():
@@ -43,31 +60,146 @@ def test_passing_the_command_through_changes_no_pole():
     assert decay(nominal, pass_through()) == pytest.approx(decay(nominal), rel=1e-12)
 
 
+def compensated(test: Configuration, told_delay: float = 0.0) -> Configuration:
+    """By the Kalman inverse of the nominal cylinder with that delay."""
+    kind = PlateCompensator.KALMAN_INVERSE
+    settings = test.controller._replace(plate_compensator=kind, plate_delay=told_delay)
+    return test._replace(controller=settings)
+
+
 @pytest.mark.parametrize("name", VEHICLES)
 def test_every_vehicle_of_table_6_1_is_stable_with_its_plate_compensated_and_fast_filters(name):
     vehicle = configuration(VEHICLES[name])
     assert decay(vehicle) < 0.0
-    law = plate_compensator(vehicle.plant.structure_cylinder, PERIOD)
-    assert decay(with_filters(vehicle, FAST), law) > 0.0
+    assert decay(compensated(with_filters(vehicle, FAST))) > 0.0
 
 
 def test_a_late_cylinder_needs_a_compensator_that_knows_it():
     late = with_cylinder_delay(with_filters(configuration(VEHICLES["truck"]), FAST), LATE)
-    assert decay(late, plate_compensator(Cylinder(), PERIOD)) < 0.0
-    for told in (0.5 * LATE, LATE, 1.5 * LATE):
-        assert decay(late, plate_compensator(Cylinder(delay=told), PERIOD)) > 0.0
+    assert decay(compensated(late)) < 0.0
+    for share in (0.5, 1.0, 1.5):
+        assert decay(compensated(late, share * LATE)) > 0.0
+
+
+def test_what_a_controller_is_told_is_the_cylinder_as_it_is():
+    plant = configuration(VEHICLES["truck"]).plant
+    cylinder = plant.structure_cylinder._replace(gain=1.1, lag=0.002, delay=0.003, a3=170.0)
+    plant = plant._replace(structure_cylinder=cylinder, computer=Computer(delay=0.002))
+    found = told(tell_plate(Configuration(plant=plant)).controller)
+    assert found == closed_loop(cylinder)._replace(delay=0.005)
+
+
+@pytest.mark.parametrize("kind", [each for each in PlateCompensator if each.value])
+def test_every_compensator_takes_the_delay_out_of_slow_motions(kind: PlateCompensator):
+    """At 0.05 Hz, of a cylinder in steady state: the law's phase and the cylinder's cancel."""
+    loop = ClosedLoop(delay=0.004)
+    settings = compensated(Configuration(), loop.delay).controller._replace(plate_compensator=kind)
+    law = plate(settings, PERIOD).law
+    a, b, c = sampled_actuator(Actuator(*with_lag(loop), loop.delay), PERIOD)
+    z = np.exp(2j * np.pi * 0.05 * PERIOD)
+    cylinder = complex(c @ np.linalg.solve(z * np.eye(len(a)) - a, b))
+    ahead, back = response(law, 0.05, PERIOD)
+    plain = abs(np.angle(cylinder))
+    assert plain > 0.004
+    assert abs(np.angle(cylinder * ahead / (1.0 - cylinder * back))) < 0.1 * plain
+
+
+@pytest.mark.parametrize("kind", PlateCompensator)
+def test_compiled_and_in_python_it_commands_the_same(kind: PlateCompensator):
+    test = find("drop").configuration
+    settings = test.controller._replace(plate_compensator=kind, plate_delay=0.0025)
+    test = test._replace(controller=settings, timing=test.timing._replace(duration=0.6))
+    demands = find("drop").demands(test, 1)
+    slow, fast = (
+        np.concatenate([block.commands for block in blocks])
+        for blocks in (
+            run(Twin(test, 0.0, 1), test, demands),
+            run_compiled(Twin(test, 0.0, 1), test, demands),
+        )
+    )
+    assert len(fast) == 600
+    assert np.array_equal(slow, fast)
+
+
+def test_a_look_that_is_thrown_away_changes_nothing():
+    settings = compensated(Configuration()).controller
+    controlling = controller(settings, PERIOD)
+    state = initial_state(controlling)
+    sensed, demand = Measurements(0.0, -0.004, 0.0, 200.0), Demand(0.0, 0.0, 0.0)
+    once = update(controlling, state, sensed, demand)
+    again = update(controlling, state, sensed, demand)
+    assert once[1] == again[1]
+    assert np.array_equal(once[0].plate, again[0].plate)
+
+
+def test_an_imposed_test_has_no_model_whose_plate_could_be_late():
+    test = find("imposed").configuration
+    demands = find("imposed").demands(test, 1)[:400]
+    plain, other = (
+        next(run_compiled(Twin(each, 0.0, 1), each, demands, block=400)).commands
+        for each in (test, compensated(test))
+    )
+    assert np.array_equal(plain, other)
+
+
+def test_a_cylinder_without_an_inverse_is_named():
+    with pytest.raises(RigtwinError, match="plate_compensator = kalman-inverse: there is none"):
+        rigtwin.run(
+            "suspension-rig",
+            "drop-compensated",
+            settings={"controller": {"plate_lag": 3.6e-8, "plate_delay": 0.05}},
+        )
 
 
 def test_a_motorcycle_that_trips_without_compensation_comes_to_rest_with_it():
     rig, settings = rigtwin.machine("suspension-rig"), {"timing": {"duration": 2.5}}
     alone = rigtwin.run(rig, "motorcycle", seed=1, settings=settings)
     assert len(alone.time) < 2500
-    nominal = find("motorcycle").configuration
-    law = plate_compensator(nominal.plant.structure_cylinder, PERIOD)
-    controller = Compensated(nominal.controller, PERIOD, law)
-    tested = rigtwin.run(rig, "motorcycle", seed=1, settings=settings, controller=controller)
+    told_of = {"controller": {"plate_compensator": "kalman-inverse"}, **settings}
+    tested = rigtwin.run(rig, "motorcycle", seed=1, settings=told_of)
     assert len(tested.time) == 2500
     assert np.std(tested["/sensor.structure_lvdt"][-500:]) < 3e-4
+
+
+def test_what_was_told_wrong_of_the_delay_is_found_in_the_commands(tmp_path):
+    """The recording says 0, the controller had 4 ms."""
+    path = tmp_path / "told.mcap"
+    settings = {"timing": {"duration": 3.0}, "controller": {"plate_delay": 0.004}}
+    ran = rigtwin.run("suspension-rig", "drop-compensated", seed=2, settings=settings, path=path)
+    replay = ControllerReplay(
+        RigControl(),
+        ran,
+        with_changes(
+            Configuration(), {"controller": {**ran.controller, "plate_delay": 0.0}}
+        ).controller,
+    )
+    found = replay.deviation()
+    assert found is not None
+    assert (found.kind, found.name) == ("setting", "plate_delay")
+    assert found.used == pytest.approx(0.004, rel=1e-3)
+
+
+def test_a_corrected_twin_tells_the_controller(tmp_path):
+    late = rigtwin.run(
+        "suspension-rig",
+        "imposed",
+        seed=4,
+        settings={"timing": {"duration": 8.0}},
+        effects={"delay@structure_cylinder": LATE},
+        path=tmp_path / "late.mcap",
+    )
+    twin = tmp_path / "twin.toml"
+    rigtwin.diagnose(late).save_twin(twin)
+    found = from_toml(Configuration(), twin)
+    assert found.plant.structure_cylinder.delay == pytest.approx(LATE, rel=0.05)
+    assert found.controller.plate_delay == found.plant.structure_cylinder.delay
+
+
+def test_a_cylinder_that_is_not_stable_is_named():
+    with pytest.raises(RigtwinError, match="plate_a0 to plate_a3 describe a cylinder that is not"):
+        rigtwin.run(
+            "suspension-rig", "drop-compensated", settings={"controller": {"plate_a1": 0.0}}
+        )
 
 
 @pytest.mark.slow

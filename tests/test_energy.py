@@ -12,12 +12,11 @@ import pytest
 
 import rigtwin
 from controllers import Mode, Settings, Travel
-from controllers.compensated import Compensated
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.recording import Recording
 from rigtwin.simulation.energy import measure_energy
-from rigtwin.studies.stability.compensated import plate_compensator
+from rigtwin.simulation.loop import RigController
 
 PERIOD, AMPLITUDE, SPEED = 0.001, 0.01, 2.0 * math.pi * 2.0
 SETTINGS = Settings(preload=0.0, filter_force=0.0, sprung_mass=100.0)
@@ -173,13 +172,14 @@ def test_of_a_compensated_test_with_its_settings():
     settings = {"controller": times, "timing": {"duration": 6.0}}
     experiment = rigtwin.experiments(rig)["drop"]
     configuration = with_changes(experiment.configuration, settings)
-    cylinder, period = configuration.plant.structure_cylinder, configuration.timing.period
-    law = plate_compensator(cylinder, period)
     plain = rigtwin.run(rig, "drop", settings=settings)
-    controller = Compensated(configuration.controller, period, law)
-    test = rigtwin.run(rig, "drop", settings=settings, controller=controller)
-    assert rigtwin.energy_error(test) is None
-    before, after = rigtwin.energy_error(plain), rigtwin.energy_error(test, settings=settings)
+    told = {**times, "plate_compensator": "kalman-inverse"}
+    test = rigtwin.run(rig, "drop", settings={**settings, "controller": told})
+    own = with_changes(configuration, {"controller": told})
+    other = rigtwin.run(rig, "drop", settings=settings, controller=RigController(own))
+    assert rigtwin.energy_error(other) is None
+    before, after = rigtwin.energy_error(plain), rigtwin.energy_error(test)
+    assert rigtwin.energy_error(other, settings=settings) == after
     assert before is not None
     assert after is not None
     assert abs(after.structure) < 0.2 * before.structure

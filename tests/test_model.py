@@ -10,9 +10,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, dlsim
 
+from controllers.closed_loop import state_space
 from experiments import EXPERIMENTS
 from rigtwin.components import Carriage, Motor, Rail, RigPlant, Tyre
-from rigtwin.components.cylinder import state_space
+from rigtwin.components.cylinder import closed_loop
 from rigtwin.description.configuration import Configuration
 from rigtwin.diagnosis.component import replay_carriage
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
@@ -214,7 +215,7 @@ def imposed_inputs(seed: int) -> tuple[np.ndarray, np.ndarray]:
     force demanded."""
     experiment = EXPERIMENTS["imposed"]
     demands = experiment.demands(experiment.configuration, seed)
-    a, b, c = state_space(NOMINAL.ground_cylinder)
+    a, b, c = state_space(closed_loop(NOMINAL.ground_cylinder))
     discrete = StateSpace(a, b[:, None], c[None, :], np.zeros((1, 1))).to_discrete(1e-3)
     ground = dlsim(discrete, demands[:, 0])[1]
     return ground[:, 0], demands[:, 2]

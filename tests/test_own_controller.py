@@ -10,14 +10,12 @@ import pytest
 
 import rigtwin
 from controllers import Commands, Demand, Measurements
-from controllers.compensated import Compensated
 from controllers.mil import controller, initial_state, update
-from controllers.settings import Mode
+from controllers.settings import PlateCompensator
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.session.own_controller import own_controller
 from rigtwin.hardware.session.permission import key_of
-from rigtwin.studies.stability.compensated import plate_compensator
 
 SHORT = {"timing": {"duration": 2.0}, "safety": {"ramp": 0.3, "hold": 0.1}}
 
@@ -34,13 +32,11 @@ class Same:
         return commands
 
 
-def compensated(configuration: Configuration) -> Compensated | Same:
-    """With the plate's delay compensated, where a model is in the loop."""
-    if configuration.controller.mode == Mode.IMPOSED:
-        return Same(configuration)
-    period = configuration.timing.period
-    law = plate_compensator(configuration.plant.structure_cylinder, period)
-    return Compensated(configuration.controller, period, law)
+def compensated(configuration: Configuration) -> Same:
+    """With the plate's delay compensated."""
+    kind = PlateCompensator.KALMAN_INVERSE
+    settings = configuration.controller._replace(plate_compensator=kind)
+    return Same(configuration._replace(controller=settings))
 
 
 def on_twin(path: Path, **options: Any) -> rigtwin.Recording:

@@ -10,7 +10,7 @@ from benchmarks.vehicles import configure, run, silent, smooth_rail
 from experiments.vehicles import VEHICLES, configuration, find_vehicle
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.stability.compensated import plate_compensator, with_cylinder_delay
+from rigtwin.studies.stability.compensated import with_cylinder_delay
 from rigtwin.studies.stability.mapping import Axis, around, stability_map
 from rigtwin.studies.stability.sampled_loop import decay
 from rigtwin.studies.stability.tested import (
@@ -34,9 +34,8 @@ def test_every_vehicle_of_table_6_1_is_unstable_plain_and_stable_compensated(nam
 @pytest.mark.parametrize("told", [0.5, 1.5])
 def test_a_delay_of_5_ms_may_be_told_wrong_by_half(name: str, told: float) -> None:
     late = with_cylinder_delay(set_for_compensation(rig_as(find_vehicle(name))), 5e-3)
-    cylinder = late.plant.structure_cylinder
-    law = plate_compensator(cylinder._replace(delay=told * cylinder.delay), late.timing.period)
-    assert decay(late, law) > 0.0
+    controller = late.controller._replace(plate_delay=told * 5e-3)
+    assert decay(late._replace(controller=controller)) > 0.0
 
 
 def test_what_a_loop_bears_is_where_it_turns_unstable() -> None:

@@ -10,11 +10,10 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from controllers import closed_loop as loop
 from controllers.compiled import compilable
 from rigtwin.components.quantity import NONE, UNLIMITED, Quantity
 from rigtwin.numerics.arrays import Array
-
-H_OF_S = "identified closed loop H(s), thesis Eq. 6.2"
 
 
 class Cylinder(NamedTuple):
@@ -22,19 +21,19 @@ class Cylinder(NamedTuple):
     a0), scaled to unit static gain, then a limit of the speed, a play between piston and plate, and
     a plate that yields by compliance·load, `yield_lag` behind it."""
 
-    b2: Annotated[float, Quantity("1/s^2", -1e6, 1e6, H_OF_S)] = 1817.0
-    b1: Annotated[float, Quantity("1/s^3", -1e8, 1e8, H_OF_S)] = 7.719e4
-    b0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)] = 6.243e5
-    a3: Annotated[float, Quantity("1/s", 0.0, 1e5, H_OF_S)] = 165.9
-    a2: Annotated[float, Quantity("1/s^2", 0.0, 1e8, H_OF_S)] = 6674.0
-    a1: Annotated[float, Quantity("1/s^3", 0.0, 1e10, H_OF_S)] = 8.598e4
-    a0: Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)] = 6.281e5
+    b2: loop.B2 = loop.NOMINAL.b2
+    b1: loop.B1 = loop.NOMINAL.b1
+    b0: loop.B0 = loop.NOMINAL.b0
+    a3: loop.A3 = loop.NOMINAL.a3
+    a2: loop.A2 = loop.NOMINAL.a2
+    a1: loop.A1 = loop.NOMINAL.a1
+    a0: loop.A0 = loop.NOMINAL.a0
     speed_limit: Annotated[float, Quantity("m/s", 0.001, 10.0, "Vickers cylinder, thesis §3.2")] = (
         0.3
     )
-    gain: Annotated[float, Quantity("1", 0.1, 3.0, "1: follows its command at rest")] = 1.0
-    lag: Annotated[float, Quantity("s", 0.0, 0.5, NONE)] = 0.0
-    delay: Annotated[float, Quantity("s", 0.0, 0.05, NONE)] = 0.0
+    gain: loop.Gain = loop.NOMINAL.gain
+    lag: loop.Lag = loop.NOMINAL.lag
+    delay: loop.Delay = loop.NOMINAL.delay
     deadband: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
     saturation: Annotated[float, Quantity("m", 1e-4, UNLIMITED, NONE)] = UNLIMITED
     compliance: Annotated[
@@ -65,13 +64,17 @@ class CylinderState(NamedTuple):
     position: Array
 
 
-def state_space(cylinder: Cylinder) -> tuple[Array, Array, Array]:
-    """Controllable form (A, B, C) of H(s)/H(0); shapes (4, 4), (4,), (4,)."""
-    a = np.diag(np.ones(3), 1)
-    a[3] = [-cylinder.a0, -cylinder.a1, -cylinder.a2, -cylinder.a3]
-    b = np.array([0.0, 0.0, 0.0, 1.0])
-    c = np.array([cylinder.b0, cylinder.b1, cylinder.b2, 0.0]) * (cylinder.a0 / cylinder.b0)
-    return a, b, c
+def closed_loop(cylinder: Cylinder) -> loop.ClosedLoop:
+    """What of it a controller can be told: H(s), gain, lag and delay."""
+    return loop.ClosedLoop(*(getattr(cylinder, name) for name in loop.ClosedLoop._fields))
+
+
+def told_settings(cylinder: Cylinder, before: float = 0.0) -> dict[str, float]:
+    """What of it a controller can be told, as settings of one that compensates its delay. before:
+    s of delay between the controller and the cylinder, such as the computer's."""
+    found = closed_loop(cylinder)
+    late = min(found.delay + before, loop.LATE.high)
+    return {f"plate_{name}": value for name, value in found._replace(delay=late)._asdict().items()}
 
 
 @lru_cache(maxsize=64)
@@ -81,7 +84,7 @@ def discretise(cylinder: Cylinder, timestep: float) -> CylinderModel:
     Kept, because scipy's linear algebra leaves threads spinning for a while, which would slow down
     rigs that run beside.
     """
-    a, b, c = state_space(cylinder)
+    a, b, c = loop.state_space(closed_loop(cylinder))
     both = np.zeros((5, 5))
     both[:4, :4], both[:4, 4] = a, b
     step = expm(both * timestep)

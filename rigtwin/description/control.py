@@ -29,6 +29,7 @@ from controllers import (
 )
 from controllers.formula import Formula
 from rigtwin.description.settings import Nothing, settings_of
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
@@ -116,9 +117,14 @@ class FormulaControl:
 
 @kernel
 def _replay(
-    controlling: Controller, start: Array, sensors: Array, demands: Array, out: Array
+    controlling: Controller,
+    start: Array,
+    plate: Array,
+    sensors: Array,
+    demands: Array,
+    out: Array,
 ) -> None:
-    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(start, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(sensors)):
         measured = Measurements(
             sensors[tick, 0], sensors[tick, 1], sensors[tick, 2], sensors[tick, 3]
@@ -127,6 +133,27 @@ def _replay(
         state, commands = update(controlling, state, measured, demand)
         for column in range(4):
             out[tick, column] = commands[column]
+
+
+def set_up(settings: Settings, period: float) -> Controller:
+    """The rig's controller at some settings.
+
+    Parameters
+    ----------
+    settings
+        Of it.
+    period
+        s, of a tick.
+
+    Raises
+    ------
+    RigtwinError
+        If the settings ask for a compensator that cannot be made.
+    """
+    try:
+        return controller(settings, period)
+    except ValueError as error:
+        raise RigtwinError(str(error)) from error
 
 
 @dataclass(frozen=True)
@@ -154,13 +181,18 @@ class RigControl:
         return Commands._fields
 
     def replay(self, settings: Settings, inputs: Sequence[Array], period: float) -> Array:
-        controlling = controller(settings, period)
+        controlling = set_up(settings, period)
         table = np.ascontiguousarray(np.column_stack(inputs), np.float64)
         sensors, demands = np.hsplit(table, [len(Measurements._fields)])
         out = np.empty((len(table), len(Commands._fields)))
-        start = np.array(packed(initial_state(controlling)))
+        start = initial_state(controlling)
         _replay(
-            controlling, start, np.ascontiguousarray(sensors), np.ascontiguousarray(demands), out
+            controlling,
+            np.array(packed(start)),
+            start.plate,
+            np.ascontiguousarray(sensors),
+            np.ascontiguousarray(demands),
+            out,
         )
         return out.T
 

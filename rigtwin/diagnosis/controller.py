@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from rigtwin.components.quantity import Quantity, fields
 from rigtwin.description.control import Control
 from rigtwin.diagnosis.residual import rounding
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
@@ -151,7 +152,13 @@ class ControllerReplay:
                 continue
 
             def misfit(value: Any, name: str = name) -> float:
-                return self.misfit(self.commands(self._settings._replace(**{name: value})))
+                settings = self._settings._replace(**{name: value})
+                try:
+                    commands = self.commands(settings)
+                except RigtwinError:
+                    # Of such settings no controller can be made.
+                    return RAN_AWAY
+                return self.misfit(commands)
 
             if isinstance(meaning, Quantity):
                 best, value = _minimise(misfit, told, meaning)
@@ -183,10 +190,11 @@ def _minimise(
     size = max(abs(told), 0.01 * min(meaning.high, 1.0))
     # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.
     grid = np.unique(np.clip(told + size * AWAY, meaning.low, meaning.high))
-    values = [misfit(value) for value in grid]
-    if min(values) == max(values):
+    ends = misfit(grid[0]), misfit(grid[-1])
+    if len(grid) == 1 or ends[0] == ends[1] == misfit(grid[len(grid) // 2]):
         # It changes nothing: a part of the controller that is off.
-        return values[0], told
+        return ends[0], told
+    values = [ends[0], *(misfit(value) for value in grid[1:-1]), ends[1]]
     place = int(np.argmin(values))
     near = np.append(grid, told)
     low = near[near < grid[place]].max(initial=meaning.low)

@@ -11,12 +11,12 @@ from controllers import (
     Measurements,
     Mode,
     State,
-    controller,
     initial_state,
     update,
 )
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import set_up
 from rigtwin.hardware.daq.signals import RIG
 from rigtwin.hardware.operation import Course
 from rigtwin.hardware.supervisor import Cause
@@ -61,7 +61,7 @@ class RigOperation:
         self.period, self.ticks = configuration.timing.period, len(demands)
         self.course = Course(LOOKING, ARMED, self._limits.ramp, SETTLING, self._limits.hold)
         self.missed = self._limits.missed
-        self._controller = controller(configuration.controller, self.period)
+        self._controller = set_up(configuration.controller, self.period)
         self._state, self._memory = initial_state(self._controller), empty_memory()
         self.rest, self.target = NOTHING, _start_of(configuration, demands)
 

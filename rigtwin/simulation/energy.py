@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controllers import Mode, Settings, Skyhook, Travel
+from controllers import Mode, PlateCompensator, Settings, Skyhook, Travel
 from controllers.filters import low_pass
 from controllers.gas_spring import gas_force
 from controllers.skyhook import semi_active_damping, skyhook_force
@@ -82,8 +82,8 @@ def measure_energy(
         The settings of the test.
     own
         Whether a controller of one's own has the rig's models in it, at these settings, and
-        commands other than what they say, as `controllers.compensated` does. Where the models'
-        plate should be is worked out from what was sensed then.
+        commands other than what they say. Where the models' plate should be is worked out from
+        what was sensed then, as it is where the settings compensate the plate's delay.
 
     Returns
     -------
@@ -94,12 +94,13 @@ def measure_energy(
     settings = configuration.controller
     if settings.mode != Mode.MIL or settings.travel != Travel.WHEEL or recording.ticks < LEAST:
         return None
-    if own:
+    if not own and (not recording.controller or OWN in recording.controller):
+        return None
+    if own or settings.plate_compensator != PlateCompensator.NONE:
+        plain = settings._replace(plate_compensator=PlateCompensator.NONE)
         control = RigControl()
         inputs = [recording.column(*channel) for channel in control.channels]
-        wanted = control.replay(settings, inputs, recording.period)[1]
-    elif not recording.controller or OWN in recording.controller:
-        return None
+        wanted = control.replay(plain, inputs, recording.period)[1]
     else:
         wanted = recording.column("/command", "structure")
     truth = recording.columns.get("/truth", {})

@@ -22,13 +22,13 @@ from controllers import (
     Controller,
     Demand,
     Measurements,
-    controller,
     initial_state,
     packed,
     unpacked,
     update,
 )
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import set_up
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.interruptions import deferred
@@ -110,7 +110,7 @@ class RigController:
     """The controller of the rig, tick by tick in Python."""
 
     def __init__(self, configuration: Configuration) -> None:
-        self._controlling = controller(configuration.controller, configuration.timing.period)
+        self._controlling = set_up(configuration.controller, configuration.timing.period)
         self._state = initial_state(self._controlling)
 
     def tick(self, measured: Measurements, demand: Demand) -> Commands:
@@ -204,6 +204,7 @@ def _ticks(
     limit_memory: LimitMemory,
     sensing: Sensing,
     memory: Array,
+    plate_memory: Array,
     held: Commands,
     demands: Array,
     missed: NDArray[np.bool_],
@@ -215,7 +216,7 @@ def _ticks(
     """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only:
     making any other Python object can run into a pending Ctrl-C, which compiled code does not
     survive."""
-    state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(memory, SIZE), plate_memory)  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
         true = sense(plant)
@@ -237,6 +238,7 @@ def _ticks(
     numbers = packed(state)
     for number in range(SIZE):
         memory[number] = numbers[number]
+    plate_memory[:] = state.plate
     return done, trip, column
 
 
@@ -261,8 +263,9 @@ def run_compiled(
     Block
         Consecutive ticks; the last says why the test ended.
     """
-    controlling = controller(configuration.controller, configuration.timing.period)
-    memory, limit_memory = np.array(packed(initial_state(controlling))), empty_memory_arrays()
+    controlling = set_up(configuration.controller, configuration.timing.period)
+    start, limit_memory = initial_state(controlling), empty_memory_arrays()
+    memory, plate_memory = np.array(packed(start)), start.plate
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
@@ -275,6 +278,7 @@ def run_compiled(
                 limit_memory=limit_memory,
                 sensing=twin.sensing,
                 memory=memory,
+                plate_memory=plate_memory,
                 held=twin.held,
                 demands=asked,
                 missed=twin.misses(len(asked)),

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, simulate_ideal
+from rigtwin.simulation.structure_motion import models_output
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ def compute_tracking(
     target: Ideal, commands: Array, structure: Array, load_cell: Array
 ) -> Tracking:
     """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands:
-    shape (ticks, 3 or more); structure, load_cell: what was sensed, m and N."""
+    what the models asked for, shape (ticks, 3 or more); structure, load_cell: what was sensed, m
+    and N."""
     position, force = commands[:, 1], commands[:, 2]
     return Tracking(
         position_e1=rms(target.structure - position),
@@ -56,9 +59,11 @@ def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
         else recording.column("/sensor", "structure_lvdt")
     )
     load_cell = recording.column("/truth" if known else "/sensor", "load_cell")
-    commands = np.column_stack(
-        [recording.column("/command", name) for name in ("ground", "structure", "force")]
+    commands, sensed = (
+        np.column_stack([recording.column(topic, name) for name in names])
+        for topic, names in (("/command", Commands._fields), ("/sensor", Measurements._fields))
     )
+    asked = models_output(configuration, commands, sensed)
     return compute_tracking(
-        simulate_ideal(configuration, commands[:, 0]), commands, structure, load_cell
+        simulate_ideal(configuration, commands[:, 0]), asked, structure, load_cell
     )

@@ -7,12 +7,14 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers import (
     SIZE,
+    Commands,
     Controller,
     Demand,
     Measurements,
+    Mode,
+    PlateCompensator,
     Settings,
     Structure,
-    controller,
     initial_state,
     packed,
     unpacked,
@@ -21,6 +23,7 @@ from controllers import (
 from controllers.mil import PLACES
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import RigControl, set_up
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
@@ -28,9 +31,14 @@ from rigtwin.recording import Recording
 
 @kernel
 def _states(
-    controlling: Controller, start: Array, measured: Array, demands: Array, out: Array
+    controlling: Controller,
+    start: Array,
+    plate: Array,
+    measured: Array,
+    demands: Array,
+    out: Array,
 ) -> None:
-    state = unpacked(to_fixed_tuple(start, SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(start, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(measured)):
         sample = Measurements(
             measured[tick, 0], measured[tick, 1], measured[tick, 2], measured[tick, 3]
@@ -51,11 +59,34 @@ def states(settings: Settings, period: float, measured: Array, demands: Array) -
     controllers.Demand;
     period: s.
     """
-    controlling = controller(settings, period)
+    controlling = set_up(settings, period)
     out = np.empty((len(measured), SIZE))
-    start = np.array(packed(initial_state(controlling)))
-    _states(controlling, start, np.ascontiguousarray(measured), np.ascontiguousarray(demands), out)
+    start = initial_state(controlling)
+    _states(
+        controlling,
+        np.array(packed(start)),
+        start.plate,
+        np.ascontiguousarray(measured),
+        np.ascontiguousarray(demands),
+        out,
+    )
     return out
+
+
+def models_output(configuration: Configuration, commands: Array, measured: Array) -> Array:
+    """What the models of a test asked for, shape (ticks, 4), columns of controllers.Commands: its
+    commands, but for the plate's before a compensator of its delay.
+
+    commands: those of the test; measured: what its controller read, columns of
+    controllers.Measurements.
+    """
+    settings = configuration.controller
+    if settings.plate_compensator == PlateCompensator.NONE or settings.mode == Mode.IMPOSED:
+        return commands
+    plain = settings._replace(plate_compensator=PlateCompensator.NONE)
+    demands = [commands[:, Commands._fields.index(name)] for name in Demand._fields]
+    replayed = RigControl().replay(plain, [*measured.T, *demands], configuration.timing.period)
+    return replayed.T
 
 
 def wing(settings: Settings, period: float, packed_states: Array) -> Array:
@@ -64,7 +95,7 @@ def wing(settings: Settings, period: float, packed_states: Array) -> Array:
     Height over its centre at 0, 1, 2 and 3 beams from it, m, shape
     (ticks, 4).
     """
-    heights = packed_states[:, PLACES["modal"]] @ controller(settings, period).modes.wing
+    heights = packed_states[:, PLACES["modal"]] @ set_up(settings, period).modes.wing
     return heights - heights[:, :1]
 
 

@@ -30,9 +30,10 @@ import dm_env
 import numpy as np
 from dm_env import specs
 
-from controllers import Commands, Demand, Measurements, controller, initial_state
+from controllers import Commands, Demand, Measurements, initial_state
 from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip, empty_memory, judge_limits
@@ -155,7 +156,7 @@ class Environment(dm_env.Environment):
         self.trip = Trip.NONE
         self.task = _task(seed)
         self._demands, self._next_seed = demands, seed
-        self._controlling = controller(configuration.controller, configuration.timing.period)
+        self._controlling = set_up(configuration.controller, configuration.timing.period)
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
         self._sag = (configuration.controller.preload - self._static) / max(
             configuration.controller.suspension_stiffness, 1e-9

@@ -1,42 +1,17 @@
-"""The structure cylinder's delay compensator from what the cylinder is, and the vehicles that it
-makes testable.
-
-What a diagnosis or a calibration found of the cylinder's lag, gain and delay is in its parameters,
-so the corrected plant's cylinder gives the corrected compensator.
-"""
+"""What a controller that compensates the plate's delay is told of the rig, and rigs and filters
+that try it."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from controllers.kalman_inverse import Actuator, Weights, kalman_inverse
-from controllers.linear_law import LinearLaw
-from rigtwin.components import Cylinder
-from rigtwin.components.cylinder import state_space
+from rigtwin.components.cylinder import told_settings
 from rigtwin.description.configuration import Configuration
 
-WEIGHTS = Weights(effort=1e-3, derivatives=3, desired_noise=1e-4, sensor_noise=1e-3)
-"""The position's sensor has some 2e-4 m of hum, and the structure model is driven by a noisy load
-cell: the filter trusts its model, and does not differentiate what is desired exactly. With the
-position trusted ten times as much the hum trips a test at once."""
 
-
-def actuator_of(cylinder: Cylinder) -> Actuator:
-    """A cylinder from its command to the plate: its closed loop, after its own lag, gain and
-    delay."""
-    inner, entry, out = (np.asarray(part, dtype=np.float64) for part in state_space(cylinder))
-    if cylinder.lag <= 0.0:
-        return Actuator(inner, entry * cylinder.gain, out, cylinder.delay)
-    size = len(inner)
-    a, b = np.zeros((size + 1,) * 2), np.zeros(size + 1)
-    a[:size, :size], a[:size, size] = inner, entry
-    a[size, size], b[size] = -1.0 / cylinder.lag, cylinder.gain / cylinder.lag
-    return Actuator(a, b, np.append(out, 0.0), cylinder.delay)
-
-
-def plate_compensator(cylinder: Cylinder, period: float) -> LinearLaw:
-    """The Kalman-filtered inverse of a cylinder at the controller's period, s."""
-    return kalman_inverse(actuator_of(cylinder), period, WEIGHTS)
+def tell_plate(configuration: Configuration) -> Configuration:
+    """The test whose controller knows the structure cylinder as it is."""
+    plant, controller = configuration.plant, configuration.controller
+    told = told_settings(plant.structure_cylinder, plant.computer.delay)
+    return configuration._replace(controller=controller._replace(**told))
 
 
 def with_filters(configuration: Configuration, time: float) -> Configuration:

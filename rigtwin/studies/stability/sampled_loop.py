@@ -25,20 +25,22 @@ from controllers import (
     Compensator,
     Demand,
     Measurements,
+    PlateCompensator,
     Settings,
     Skyhook,
-    controller,
     initial_state,
     packed,
     unpacked,
     update,
 )
-from controllers.linear_law import LinearLaw, pass_through
+from controllers.closed_loop import state_space
+from controllers.linear_law import LinearLaw
 from rigtwin.components import RigPlant
-from rigtwin.components.cylinder import state_space
+from rigtwin.components.cylinder import closed_loop as loop_of
 from rigtwin.components.gas_spring import stiffness
 from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.control import set_up
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import initial_deflection
@@ -58,8 +60,9 @@ def decay(configuration: Configuration, plate: LinearLaw | None = None) -> float
     """How fast the slowest motion of the loop dies away, 1/s; below zero it grows, and only dry
     friction holds it.
 
-    plate: a delay compensator between the structure model and its cylinder. A semi-active damper
-    counts as its least damping, a compensator that makes steps as none.
+    plate: a delay compensator between the structure model and its cylinder, in place of the
+    settings'. A semi-active damper counts as its least damping, a friction compensator that makes
+    steps as none.
     """
     matrix = closed_loop(configuration, plate)
     reached = np.abs(matrix) > 0.0
@@ -92,7 +95,7 @@ def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) ->
     sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*part)) for part in parts)
     sensing_d = np.diag([each[3] for each in transducers])
 
-    law = plate or pass_through()
+    law = plate or set_up(configuration.controller, period).plate.law
     sizes = [len(a), sum(registers), len(sensing_a), SIZE, len(law.a)]
     starts = np.concatenate([[0], np.cumsum(sizes)])
     x, held, memory, state, own_law = (slice(int(starts[i]), int(starts[i + 1])) for i in range(5))
@@ -152,7 +155,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     velocity.
     """
     cylinder, motor = plant.structure_cylinder, plant.motor
-    inner, entry, out = state_space(cylinder)
+    inner, entry, out = state_space(loop_of(cylinder))
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
     for number, (lag, gain, place) in enumerate(
@@ -221,17 +224,18 @@ def linear_controller(
     """How the controller's next state and its two commands that act answer to its state and to
     plate, travel and load cell: ((SIZE, SIZE), (SIZE, 3)), ((2, SIZE), (2, 3))."""
     settings = _affine(configuration.controller)
-    controlling = controller(settings, configuration.timing.period)
+    controlling = set_up(settings, configuration.timing.period)
     demand = Demand(0.0, settings.start, settings.preload)
     # At rest the structure carries its weight, so that nothing moves.
     rest = np.array([0.0, settings.start, 0.0, settings.sprung_mass * settings.gravity])
-    state, _ = update(controlling, initial_state(controlling), Measurements(*rest.tolist()), demand)
+    start = initial_state(controlling)
+    state, _ = update(controlling, start, Measurements(*rest.tolist()), demand)
     numbers = np.array(packed(state), dtype=float)
 
     def tick(state: Array, measured: Array) -> Array:
         after, commands = update(
             controlling,
-            unpacked(tuple(state.tolist())),
+            unpacked(tuple(state.tolist()), start.plate),
             Measurements(*measured.tolist()),
             demand,
         )
@@ -262,4 +266,5 @@ def _affine(settings: Settings) -> Settings:
         settings = settings._replace(skyhook=Skyhook.NONE, suspension_damping=least)
     if settings.compensator not in (Compensator.NONE, Compensator.OBSERVER):
         settings = settings._replace(compensator=Compensator.NONE)
-    return settings._replace(voltage_limit=math.inf)
+    # The plate's compensator is a linear law itself, which the loop has beside the controller.
+    return settings._replace(voltage_limit=math.inf, plate_compensator=PlateCompensator.NONE)

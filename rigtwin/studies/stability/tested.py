@@ -7,16 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from controllers import Settings
-from controllers.settings import Compensator
+from controllers.settings import Compensator, PlateCompensator
 from rigtwin.components import Carriage, RigPlant, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.simulation.runner import without_limits
-from rigtwin.studies.stability.compensated import (
-    plate_compensator,
-    with_cylinder_delay,
-    with_filters,
-)
+from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
 from rigtwin.studies.stability.sampled_loop import decay
 from rigtwin.studies.stability.vehicle import QuarterCar
 
@@ -80,10 +76,16 @@ def sized(configuration: Configuration) -> Configuration:
 
 
 def set_for_compensation(configuration: Configuration) -> Configuration:
-    """The same with the settings of a compensated test: short filters, a firm force loop, and the
-    motor's friction observed and taken away, which a loop with the plate's delay does not bear."""
-    short = with_filters(configuration, FILTER)
-    controller = short.controller._replace(compensator=Compensator.OBSERVER, kp=KP, ki=KI)
+    """The same with the settings of a compensated test: the plate's delay taken away by the Kalman
+    inverse of the cylinder as it is, short filters, a firm force loop, and the motor's friction
+    observed and taken away, which a loop with the plate's delay does not bear."""
+    short = with_filters(tell_plate(configuration), FILTER)
+    controller = short.controller._replace(
+        compensator=Compensator.OBSERVER,
+        kp=KP,
+        ki=KI,
+        plate_compensator=PlateCompensator.KALMAN_INVERSE,
+    )
     return short._replace(controller=controller)
 
 
@@ -95,9 +97,7 @@ def decay_plain(car: QuarterCar) -> float:
 def decay_compensated(car: QuarterCar, untold: float = 0.0) -> float:
     """The same with the plate compensated. untold: s of delay of the cylinder that the compensator
     does not know."""
-    configuration = set_for_compensation(rig_as(car))
-    law = plate_compensator(configuration.plant.structure_cylinder, configuration.timing.period)
-    return decay(with_cylinder_delay(configuration, untold), law)
+    return decay(with_cylinder_delay(set_for_compensation(rig_as(car)), untold))
 
 
 AS_RUN: Mapping[str, Callable[[QuarterCar], float]] = {

@@ -20,6 +20,7 @@ from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
 from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.structure_motion import models_output
 from rigtwin.studies.tuning.measures import Measure, RigTrial, Trial
 
 LIMITS, TRIP = "limits", "trip"
@@ -94,15 +95,16 @@ def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
     found = {LIMITS: max(shares), TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:
         return found | _nothing(job)
-    trial = rig_trial(job.configuration, ran.commands, ran.truth, _first(job))
+    asked = models_output(job.configuration, ran.commands, ran.measurements)
+    trial = rig_trial(job.configuration, asked, ran.truth, _first(job))
     return found | _measure(job, trial)
 
 
 def rig_trial(
     configuration: Configuration, commands: Array, sensed: Array, first: int = 0
 ) -> RigTrial:
-    """A test of the suspension rig. commands, sensed: shape (ticks, 4), columns of
-    `controllers.Commands` and `.Measurements`."""
+    """A test of the suspension rig. commands: what its models asked for; sensed: both of shape
+    (ticks, 4), columns of `controllers.Commands` and `.Measurements`."""
     columns = {
         "/command": dict(zip(Commands._fields, commands.T, strict=True)),
         "/sensor": dict(zip(Measurements._fields, sensed.T, strict=True)),

@@ -1,0 +1,79 @@
+"""A hydraulic cylinder under position control as one transfer function: what the twin's cylinder is
+and what a delay compensator is told of it have these parameters in common.
+
+    H(s) = (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s + a0),   scaled to unit static gain
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.quantity import Quantity
+
+Array = NDArray[np.float64]
+
+H_OF_S = "identified closed loop H(s), thesis Eq. 6.2"
+NONE = "none in the nominal machine"
+B2 = Annotated[float, Quantity("1/s^2", -1e6, 1e6, H_OF_S)]
+B1 = Annotated[float, Quantity("1/s^3", -1e8, 1e8, H_OF_S)]
+B0 = Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)]
+A3 = Annotated[float, Quantity("1/s", 0.0, 1e5, H_OF_S)]
+A2 = Annotated[float, Quantity("1/s^2", 0.0, 1e8, H_OF_S)]
+A1 = Annotated[float, Quantity("1/s^3", 0.0, 1e10, H_OF_S)]
+A0 = Annotated[float, Quantity("1/s^4", 1.0, 1e10, H_OF_S)]
+Gain = Annotated[float, Quantity("1", 0.1, 3.0, "1: follows its command at rest")]
+Lag = Annotated[float, Quantity("s", 0.0, 0.5, NONE)]
+LATE = Quantity("s", 0.0, 0.05, NONE)
+Delay = Annotated[float, LATE]
+
+
+class ClosedLoop(NamedTuple):
+    """H(s) with what stands before it: a gain, a lag and a delay. Nominal is the rig's."""
+
+    b2: B2 = 1817.0
+    b1: B1 = 7.719e4
+    b0: B0 = 6.243e5
+    a3: A3 = 165.9
+    a2: A2 = 6674.0
+    a1: A1 = 8.598e4
+    a0: A0 = 6.281e5
+    gain: Gain = 1.0
+    lag: Lag = 0.0
+    delay: Delay = 0.0
+
+
+NOMINAL = ClosedLoop()
+
+
+def state_space(loop: ClosedLoop) -> tuple[Array, Array, Array]:
+    """Controllable form (A, B, C) of H(s)/H(0) alone; shapes (4, 4), (4,), (4,)."""
+    a = np.diag(np.ones(3), 1)
+    a[3] = [-loop.a0, -loop.a1, -loop.a2, -loop.a3]
+    b = np.array([0.0, 0.0, 0.0, 1.0])
+    c = np.array([loop.b0, loop.b1, loop.b2, 0.0]) * (loop.a0 / loop.b0)
+    return a, b, c
+
+
+def with_lag(loop: ClosedLoop) -> tuple[Array, Array, Array]:
+    """(A, B, C) of gain, lag and H(s); the delay is left out."""
+    inner, entry, out = state_space(loop)
+    if loop.lag <= 0.0:
+        return inner, entry * loop.gain, out
+    a, b = np.zeros((5, 5)), np.zeros(5)
+    a[:4, :4], a[:4, 4] = inner, entry
+    a[4, 4], b[4] = -1.0 / loop.lag, loop.gain / loop.lag
+    return a, b, np.append(out, 0.0)
+
+
+def transfer(loop: ClosedLoop) -> tuple[list[float], list[float]]:
+    """Numerator and denominator of gain, lag and H(s), from the highest power down; the delay is
+    left out."""
+    scale = loop.gain * loop.a0 / loop.b0
+    above = [scale * each for each in (loop.b2, loop.b1, loop.b0)]
+    below = [1.0, loop.a3, loop.a2, loop.a1, loop.a0]
+    if loop.lag > 0.0:
+        below = np.convolve([loop.lag, 1.0], below).tolist()
+    return above, below
