@@ -211,4 +211,4 @@ def test_what_tripped_is_diagnosed_and_runs_with_the_compensator_of_the_correcte
     assert "trip" in tripped
     assert why.startswith("The structure cylinder has a delay of ")
     assert " and " not in why
-    assert "completed, 10.0 s" in tested
+    assert "completed, 15.0 s" in tested

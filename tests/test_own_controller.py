@@ -91,11 +91,3 @@ def test_a_dry_run_holds_for_one_controller_alone() -> None:
     assert len(keys) == 3
     again = rigtwin.plan_test("drop", settings=SHORT, controller=Same)
     assert key_of(again) in keys
-
-
-@pytest.mark.slow
-def test_faults_are_stopped_with_a_compensator_as_without() -> None:
-    campaign = rigtwin.faults(seed=3, each=2, processes=0, controller=compensated)
-    assert not campaign.undone
-    assert len(campaign.results) == campaign.drawn
-    assert not campaign.failed

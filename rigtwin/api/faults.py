@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import find
+from rigtwin.api.machines import Settings
+from rigtwin.description.changes import with_changes
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import require_client
@@ -43,6 +45,7 @@ def faults(
     processes: int = 4,
     card: str | Path = CARD,
     controller: Making | None = None,
+    settings: Settings = (),
     progress: Callable[[str, int, int], object] = lambda *_: None,
 ) -> Campaign:
     """Puts faults into sessions on the virtual card, and sees whether each is stopped.
@@ -60,13 +63,15 @@ def faults(
     controller
         A function of a test's configuration that makes one of your own instead of the rig's, in the
         sessions that no process is killed in.
+    settings
+        Changes of every session's settings, such as a compensator of the plate.
     progress
         Called with the kind that begins, the faults done and how many there are.
 
     Raises
     ------
     RigtwinError
-        For a number that makes no sense, a mistake in the table, or a missing package.
+        For a number or a setting that makes no sense, a mistake in the table, or a missing package.
     """
     require_client()
     if seed < 0 or not 0 <= each <= MOST or not 0 <= processes <= MOST:
@@ -76,12 +81,16 @@ def faults(
     channels = load_table(Path(card))
     own = None if controller is None else own_controller(controller)
     todo = _draw(seed, each, processes)
+    tests = {
+        name: replace(found, configuration=with_changes(found.configuration, settings))
+        for name, found in ((fault.experiment, find(fault.experiment)) for fault in todo)
+    }
     results, undone, interrupted = list[FaultResult](), list[str](), False
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
         try:
             for number, fault in enumerate(todo):
                 progress(fault.kind.name, number, len(todo))
-                asked = fault, find(fault.experiment), channels, Path(folder)
+                asked = fault, tests[fault.experiment], channels, Path(folder)
                 try:
                     if fault.kind.place == "process":
                         results.append(try_process_fault(*asked))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import rigtwin
-from rigtwin.cli.options import counting_bar
+from rigtwin.cli.options import add_settings, counting_bar, settings_of
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
@@ -64,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CARD.toml",
         help="channel table (default the packaged one)",
     )
+    add_settings(parser)
     parser.add_argument("--out", "-o", type=Path, metavar="F.md", help="write the table there")
     parser.add_argument("--json", type=Path, metavar="J.json", help="write every outcome there")
 
@@ -88,6 +89,7 @@ def execute(parsed: argparse.Namespace) -> int:
             each=parsed.each,
             processes=parsed.processes,
             card=parsed.card,
+            settings=settings_of(parsed),
             progress=lambda _kind, done, total: show(done, total),
         )
     tried = {
