@@ -36,6 +36,7 @@ def _ticks(
     limits: Safety,
     watch: LimitMemory,
     memory: Array,
+    plate: Array,
     demands: Array,
     noise: Array,
     missed: Array,
@@ -45,7 +46,7 @@ def _ticks(
     truth_out: Array,
 ) -> tuple[int, int]:
     """Ticks done, and the number of a Trip."""
-    state = unpacked(to_fixed_tuple(memory, SIZE))  # type: ignore[call-arg]
+    state = unpacked(to_fixed_tuple(memory, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(demands)):
         values = true_values(body)
         sample(truth, body, tick, noise[tick], sensors_out[tick])
@@ -83,6 +84,7 @@ def drive(
     is not looked at."""
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)
+    start = initial_state(controlling)
     body = at_rest(truth, float(demands[0, 0]), settings.start, settings.preload)
     noise, missed = draw_noise(truth, ticks, np.random.default_rng([seed, 5]))
     commands, sensors, true = (np.empty((ticks, 4)) for _ in range(3))
@@ -93,7 +95,8 @@ def drive(
         controlling=controlling,
         limits=configuration.safety,
         watch=empty_memory_arrays(),
-        memory=np.array(packed(initial_state(controlling))),
+        memory=np.array(packed(start)),
+        plate=start.plate,
         demands=np.ascontiguousarray(demands),
         noise=noise,
         missed=missed,

@@ -9,8 +9,9 @@ import pytest
 from scipy.signal import lsim
 
 from controllers import Mode, Settings
+from controllers.closed_loop import state_space
 from rigtwin.components import Cylinder
-from rigtwin.components.cylinder import state_space
+from rigtwin.components.cylinder import closed_loop
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.component import replay_cylinder
@@ -41,7 +42,7 @@ def test_facts_of_the_thesis():
 
 @pytest.mark.parametrize("frequency", [0.1, 1.0, 7.0])
 def test_state_space_is_the_transfer_function(frequency):
-    a, b, c = state_space(NOMINAL)
+    a, b, c = state_space(closed_loop(NOMINAL))
     assert c @ np.linalg.solve(2j * math.pi * frequency * np.eye(4) - a, b) == pytest.approx(
         response(frequency), rel=1e-9
     )
@@ -52,7 +53,7 @@ def test_sampling_is_exact_for_held_commands():
     commands = 1e-3 * np.cumsum(np.random.default_rng(0).standard_normal(2000)) * 0.05
     commands[0] = 0.0
     ours = replay_cylinder(NOMINAL, configuration, commands, 0.0)
-    a, b, c = state_space(NOMINAL)
+    a, b, c = state_space(closed_loop(NOMINAL))
     time = np.arange(2000 * 20) * 5e-5
     _, fine, _ = lsim(
         (a, b[:, None], c[None, :], [[0.0]]), np.repeat(commands, 20), time, interp=False
