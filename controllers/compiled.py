@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import numba
 from numba.extending import register_jitable
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -15,3 +16,15 @@ def compilable(function: Function) -> Function:
     """Marks a plain function of numbers and NamedTuples as usable inside compiled code; returns it
     unchanged."""
     return register_jitable(function)
+
+
+def compiled(function: Function) -> Function:
+    """Compiles a plain function of numbers and arrays wherever it is called from: a loop over an
+    array, which Python is slow at. It must call nothing else of ours, or what is kept on disk would
+    not be made anew when that changes."""
+    try:
+        made: Any = numba.njit(cache=True, nogil=True)(function)
+    except RuntimeError:
+        # Nowhere to keep it.
+        made = numba.njit(nogil=True)(function)
+    return made

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, solve_discrete_lyapunov
 
-from controllers.compiled import compilable
+from controllers.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ def add_feedback(law: LinearLaw, proportional: float, integral: float, period: f
     return LinearLaw(a, b, np.append(law.c, integral), d)
 
 
-@compilable
+@compiled
 def step_linear(law: LinearLaw, state: Array, desired: float, measured: float) -> float:
     """One tick: returns the command. state: shape (n,), advanced in place."""
     size = len(state)

@@ -57,6 +57,9 @@ def plate(settings: Settings, period: float) -> Plate:
 def compensation(law: LinearLaw, period: float) -> Plate:
     """A compensator of one's own. period: s."""
     contiguous = LinearLaw(*(np.ascontiguousarray(part, dtype=np.float64) for part in law))
+    # Compiled here, not in the first tick.
+    if len(contiguous.a):
+        step_linear(contiguous, np.zeros(len(contiguous.a)), 0.0, 0.0)
     return Plate(contiguous, period / FADE)
 
 
