@@ -6,7 +6,8 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
+
+from rigtwin.system import no_interrupts
 
 
 @contextmanager
@@ -30,15 +31,6 @@ def deferred() -> Iterator[None]:
 def held_back() -> Iterator[None]:
     """Keeps interruptions back. A process that is started meanwhile never gets one, not even while
     it imports its packages; this one gets it behind."""
-    if not hasattr(signal, "pthread_sigmask"):
+    # What is kept back is a thread's own: another thread may take it, and the first one handles it.
+    with deferred(), no_interrupts():
         yield
-        return
-    # It is started with the first process, and lets interruptions through when it is.
-    resource_tracker.ensure_running()
-    # A mask is a thread's own: another thread may take the signal, and the first one handles it.
-    with deferred():
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            yield
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -34,7 +34,7 @@ from rigtwin.hardware.daq.calibration import (
 from rigtwin.hardware.daq.table import load_table, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
-from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, monotonic, sleep_until
+from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, sleep_until
 from rigtwin.hardware.session import permission
 from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger
 from rigtwin.hardware.session.plan import PlannedTest, parse_plan
@@ -42,6 +42,7 @@ from rigtwin.hardware.session.record import record_in_real_time
 from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
+from rigtwin.system import monotonic
 from tests.helpers.described import NOISY, described
 
 TABLE = load_table(CARD)

@@ -6,20 +6,26 @@ was.
 
 from __future__ import annotations
 
-import ctypes
-import ctypes.util
 import gc
 import json
-import os
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
 from rigtwin.numerics.arrays import Array
+from rigtwin.system import (
+    RESOLUTION,
+    count_cores,
+    lock_memory,
+    lower_priority,
+    monotonic,
+    raise_priority,
+    unlock_memory,
+)
+from rigtwin.system.grant import SCHEDULING, Grant
 
 SPIN = 200e-6
 """s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by
@@ -30,20 +36,14 @@ EDGES = tuple(
     for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
 )
 """Upper edges of the lateness histogram, s; the last class is what is beyond."""
-_MCL_CURRENT, _MCL_FUTURE = 1, 2
-
-
-def monotonic() -> float:
-    """s, of a clock that never steps."""
-    return time.monotonic()
 
 
 def sleep_until(deadline: float, spin: float = SPIN) -> None:
     """Returns at a time of `monotonic`, spinning over the last `spin` seconds."""
-    remaining = deadline - time.monotonic() - spin
+    remaining = deadline - monotonic() - spin
     if remaining > 0.0:
         time.sleep(remaining)
-    while time.monotonic() < deadline:
+    while monotonic() < deadline:
         pass
 
 
@@ -59,14 +59,14 @@ class Pacer:
 
     def wait(self) -> int:
         """Waits for the next deadline that is not past; returns how many were missed."""
-        now = time.monotonic()
+        now = monotonic()
         if self._next == 0.0:
             self._next = now
         behind = int((now - self._next) / self.period) if now > self._next else 0
         self._next += behind * self.period
         if behind == 0:
             sleep_until(self._next)
-        self.late = time.monotonic() - self._next
+        self.late = monotonic() - self._next
         self._next += self.period
         return behind
 
@@ -110,17 +110,6 @@ def _statistics(values: Array) -> dict[str, float]:
     }
 
 
-@dataclass(frozen=True)
-class Grant:
-    """One thing that a loop in real time wants of the system.
-
-    lacking: why it is not there and how to get it, or empty.
-    """
-
-    name: str
-    lacking: str = ""
-
-
 @contextmanager
 def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
     """Takes what the system permits for the time of the loop, and gives it back.
@@ -137,53 +126,25 @@ def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
     tuple of Grant
         What was granted and what not.
     """
-    grants = [_memory(), Grant("no garbage collection")]
+    grants = [lock_memory(), Grant("no garbage collection")]
     collecting, interval = gc.isenabled(), sys.getswitchinterval()
     gc.collect()
     gc.disable()
     gc.freeze()
     sys.setswitchinterval(1e-4)
-    before = _schedule() if fifo else Grant("FIFO scheduling", "not asked for")
+    before = raise_priority(PRIORITY) if fifo else Grant(SCHEDULING, "not asked for")
     grants.append(before)
     try:
         yield tuple(grants)
     finally:
         if fifo and not before.lacking:
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+            lower_priority()
         sys.setswitchinterval(interval)
         gc.unfreeze()
         if collecting:
             gc.enable()
         if not grants[0].lacking:
-            _libc().munlockall()
-
-
-def _libc() -> ctypes.CDLL:
-    return ctypes.CDLL(ctypes.util.find_library("c"), use_errno=True)
-
-
-def _memory() -> Grant:
-    if not sys.platform.startswith("linux"):
-        return Grant("locked memory", f"not known how on {sys.platform}")
-    if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        return Grant(
-            "locked memory",
-            f"{os.strerror(ctypes.get_errno())}; raise it with: ulimit -l unlimited",
-        )
-    return Grant("locked memory")
-
-
-def _schedule() -> Grant:
-    if not hasattr(os, "sched_setscheduler"):
-        return Grant("FIFO scheduling", f"not known how on {sys.platform}")
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-    except OSError as error:
-        return Grant(
-            "FIFO scheduling",
-            f"{error.strerror}; allow it with: ulimit -r {PRIORITY}, or CAP_SYS_NICE",
-        )
-    return Grant("FIFO scheduling")
+            unlock_memory()
 
 
 def list_shortcomings() -> list[str]:
@@ -191,16 +152,12 @@ def list_shortcomings() -> list[str]:
     lacks: list[str] = []
     with in_real_time() as grants:
         lacks += [f"{grant.name}: {grant.lacking}" for grant in grants if grant.lacking]
-    cores = (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    )
-    if cores < 2:
+    if count_cores() < 2:
         lacks.append(
             "a core of its own: this computer has one, the loop shares it with everything else"
         )
-    resolution = time.get_clock_info("monotonic").resolution
-    if resolution > 1e-6:
-        lacks.append(f"a fine clock: its resolution is {resolution:g} s; expected 1 us or better")
+    if RESOLUTION > 1e-6:
+        lacks.append(f"a fine clock: its resolution is {RESOLUTION:g} s; expected 1 us or better")
     return lacks
 
 

@@ -16,10 +16,11 @@ from typing import Protocol
 
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.operation import Commands, Operation, Sample
-from rigtwin.hardware.realtime import Lateness, monotonic
+from rigtwin.hardware.realtime import Lateness
 from rigtwin.hardware.supervisor import COMPLETED, Cause, Phase, Supervisor, Transition
 from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.rig import DrivenRig
+from rigtwin.system import monotonic
 
 OFTEN, MOST_MISSED = 0.005, 0.2
 """Share by which a tick enters the average of ticks missed, and what that may be: one in five,

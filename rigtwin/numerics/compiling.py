@@ -20,6 +20,7 @@ from numba import types
 
 import controllers
 from rigtwin.numerics.kept_code import KeptCode
+from rigtwin.system import cache_folder
 
 COMPILED = ("numerics", "components", "simulation", "models")
 """Folders whose compiled code calls each other's."""
@@ -44,9 +45,7 @@ def _digest() -> str:
 
 
 def _cache_folder() -> Path | None:
-    folder = (
-        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "rigtwin" / _digest()
-    )
+    folder = cache_folder() / "rigtwin" / _digest()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

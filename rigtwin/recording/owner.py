@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
-import sys
 from pathlib import Path
 from typing import BinaryIO
 
 from rigtwin.errors import RigtwinError
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _lock(handle: int) -> None:
-        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-else:
-    import fcntl
-
-    def _lock(handle: int) -> None:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+from rigtwin.system import lock_file
 
 
 def open_alone(path: Path) -> BinaryIO:
@@ -47,7 +36,7 @@ def open_alone(path: Path) -> BinaryIO:
     try:
         if stat.S_ISREG(os.fstat(handle).st_mode):
             try:
-                _lock(handle)
+                lock_file(handle)
             except OSError:
                 raise RigtwinError(
                     f"{path} is being written by another program; name another output"

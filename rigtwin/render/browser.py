@@ -11,6 +11,7 @@ from pathlib import Path
 
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
+from rigtwin.system import is_superuser
 
 VARIABLE = "RIGTWIN_BROWSER"
 """Of the environment: the browser to use, where it is not found by its name."""
@@ -141,7 +142,7 @@ def _browse(folder: Path, *options: str) -> str:
         f"--user-data-dir={folder / 'profile'}",
         f"--virtual-time-budget={SETTLING}",
     ]
-    if hasattr(os, "geteuid") and os.geteuid() == 0:
+    if is_superuser():
         command.append("--no-sandbox")  # Chrome refuses root otherwise; the page is our own
     try:
         done = subprocess.run(

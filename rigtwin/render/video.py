@@ -6,7 +6,6 @@ The rig in motion, and its force and travel drawn beneath with a line that marks
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from rigtwin.render.motions import joint_positions
 from rigtwin.render.plot import ASKED, SENSED, find_stretch
 from rigtwin.simulation.mechanics import SCENE
 from rigtwin.simulation.structure_motion import recorded_wing
+from rigtwin.system import RENDERER
 
 Image = NDArray[np.uint8]
 
@@ -199,9 +199,7 @@ def _context() -> Any:
 
     Of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere.
     """
-    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or (
-        "egl" if sys.platform == "linux" else "glfw"
-    )
+    kind = os.environ.get("MUJOCO_GL", "").strip().lower() or RENDERER
     try:
         context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
         context.make_current()

@@ -14,7 +14,8 @@ import numpy as np
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.conversion import conversion, rows
 from rigtwin.hardware.daq.table import ChannelTable
-from rigtwin.hardware.realtime import Pacer, monotonic
+from rigtwin.hardware.realtime import Pacer
+from rigtwin.system import monotonic
 
 if TYPE_CHECKING:
     import grpc

@@ -20,7 +20,8 @@ from google.protobuf.message import Message
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.wired import Wired
-from rigtwin.hardware.realtime import monotonic, sleep_until
+from rigtwin.hardware.realtime import sleep_until
+from rigtwin.system import monotonic
 
 NO_DEVICE, NO_CHANNEL, RESERVED, BAD_VALUE, OVERWRITTEN, TIMEOUT, NO_TASK, GONE = (
     -200220, -200170, -50103, -200077, -200279, -200284, -200088, -88705

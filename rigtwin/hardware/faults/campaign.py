@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import resource
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -30,6 +27,7 @@ from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
 from rigtwin.recording.reader import transitions
 from rigtwin.simulation.experiment import Experiment
+from rigtwin.system import STOP_SIGNALS, limit_files, raise_signal
 
 EXPERIMENTS = ("drop", "road1.6", "semi-active", "imposed", "imposed-fast")
 """Model in the loop and imposed tests alike."""
@@ -246,8 +244,7 @@ def try_fault(
                 return asked
             if virtual.tick >= fault.at:
                 if name == "operator's signal" and virtual.tick == fault.at:
-                    signals = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
-                    os.kill(os.getpid(), signals[fault.seed % len(signals)])
+                    raise_signal(STOP_SIGNALS[fault.seed % 3])
                 elif name == "operator's file":
                     stop_file.touch()
                 elif name == "full disk":
@@ -302,15 +299,8 @@ def _make_failing_update(fault: Fault, card: VirtualCard, healthy: Update) -> Up
 @contextmanager
 def _full_disk(path: Path) -> Iterator[Callable[[], None]]:
     """Gives a function after which the system lets no file grow any more."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-
-    def fill() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
-
-    try:
-        yield fill
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with limit_files() as limit:
+        yield lambda: limit(path.stat().st_size)
 
 
 def judge(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:

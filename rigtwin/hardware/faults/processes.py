@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -33,12 +32,13 @@ from rigtwin.hardware.faults.campaign import (
     last_words,
     plan_test,
 )
-from rigtwin.hardware.realtime import in_real_time, monotonic
+from rigtwin.hardware.realtime import in_real_time
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.record import guardian_settings
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervision import supervise
 from rigtwin.simulation.experiment import Experiment
+from rigtwin.system import freeze_process, kill_process, monotonic
 
 DILATION = 8.0
 """By how much the card's clock is slowed: a call through a socket takes most of a millisecond, a
@@ -141,8 +141,8 @@ def _strike(
     if controller.exitcode is not None:
         raise Stray
     assert controller.pid is not None
-    deadly = {"process killed": signal.SIGKILL, "process frozen": signal.SIGSTOP}
-    os.kill(controller.pid, deadly[fault.kind.name])
+    deadly = {"process killed": kill_process, "process frozen": freeze_process}
+    deadly[fault.kind.name](controller.pid)
     return monotonic()
 
 

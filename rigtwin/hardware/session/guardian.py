@@ -12,7 +12,6 @@ import time
 from collections.abc import Sequence
 
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.realtime import monotonic
 from rigtwin.hardware.session.guardian_process import guard
 from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
@@ -29,6 +28,7 @@ from rigtwin.hardware.session.guardian_settings import (
 )
 from rigtwin.hardware.supervisor import Transition
 from rigtwin.interruptions import held_back
+from rigtwin.system import monotonic
 
 STARTED = 30.0
 """s within which the guardian must be there."""

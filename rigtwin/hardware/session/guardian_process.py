@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import select
-import signal
 import sys
 import threading
 import time
@@ -14,7 +11,7 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.realtime import PRIORITY, monotonic
+from rigtwin.hardware.realtime import PRIORITY
 from rigtwin.hardware.session.guardian_settings import (
     ALIVE,
     BEAT,
@@ -33,6 +30,7 @@ from rigtwin.hardware.supervisor import Cause, Phase, Transition
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 from rigtwin.simulation.loop import BLOCK
+from rigtwin.system import kill_process, leave_terminal, monotonic, raise_priority, watch_process
 
 if TYPE_CHECKING:
     from rigtwin.hardware.daq.failsafe import LastResort
@@ -59,12 +57,8 @@ def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, ow
     owner : int
         The loop's process.
     """
-    # What a terminal sends to a whole group is the loop's to answer: Ctrl-C, Ctrl-Z, hanging up.
-    with suppress(OSError, AttributeError):
-        os.setsid()
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    # What a terminal sends to a whole group is the loop's to answer.
+    leave_terminal()
     shared, ring = split_memory(memory, settings.layout)
     try:
         writer = settings.open_writer()
@@ -80,9 +74,8 @@ def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, ow
     shared[ALIVE] = monotonic()
     thread = threading.Thread(target=keeper.work, daemon=True)
     thread.start()
-    with suppress(OSError, AttributeError):
-        # Of this thread alone: writing the recording must never be in the loop's way.
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 5))
+    # Of this thread alone: writing the recording must never be in the loop's way.
+    raise_priority(PRIORITY + 5)
     pipe.send("ready")
     died = _guard_loop(owner, shared, settings, keeper)
     if died is not None:
@@ -103,32 +96,22 @@ def _guard_loop(
     owner: int, shared: Array, settings: GuardianSettings, keeper: _GuardianKeeper
 ) -> Cause | None:
     """Waits until the recording is finished (None), or until the loop is dead or silent (why)."""
-    handle = os.pidfd_open(owner) if hasattr(os, "pidfd_open") else None
-    try:
+    with watch_process(owner) as ended:
         while not keeper.done.is_set():
             shared[ALIVE] = monotonic()
-            if handle is not None:
-                dead = bool(select.select([handle], [], [], LOOK)[0])
-            else:
-                time.sleep(LOOK)
-                dead = os.getppid() != owner
-            if dead:
+            if ended(LOOK):
                 return Cause("process", "the controller process died") if shared[GUARDED] else None
             silent = monotonic() - shared[BEAT] > settings.patience
             if settings.table is not None and shared[GUARDED] and silent:
-                with suppress(ProcessLookupError):
-                    os.kill(owner, signal.SIGKILL)
-                if handle is not None and not settings.table.address:
+                kill_process(owner)
+                if not settings.table.address:
                     # A driver on this computer keeps the lines until the process is gone
                     # altogether.
-                    select.select([handle], [], [], GONE)
+                    ended(GONE)
                 waited = f"{1e3 * settings.patience:.3g} ms"
                 reason = f"the controller process died or hung: no tick for {waited}; it was killed"
                 return Cause("process", reason)
-        return None
-    finally:
-        if handle is not None:
-            os.close(handle)
+    return None
 
 
 class _GuardianKeeper:

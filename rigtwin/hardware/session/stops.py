@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import os
-import select
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-_SIGNALS = [
-    getattr(signal, name)
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-    if hasattr(signal, name)
-]
+from rigtwin.system import STOP_SIGNALS, read_keys
 
 
 @contextmanager
@@ -30,18 +24,17 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
     def on_signal(number: int, _: FrameType | None) -> None:
         said.append(f"stopped by the operator: {signal.Signals(number).name}")
 
-    before = {number: signal.signal(number, on_signal) for number in _SIGNALS}
+    before = {number: signal.signal(number, on_signal) for number in STOP_SIGNALS}
     path = None if file is None else os.fspath(file)
     try:
-        with _single_keys() as keys:
+        with read_keys() as key_pressed:
 
             def find_request() -> str | None:
                 if said:
                     return said[0]
                 if path is not None and os.path.exists(path):  # noqa: PTH110 - 1 us instead of 3, every tick
                     return f"stopped by the operator: file {path}"
-                if keys and select.select([sys.stdin], [], [], 0.0)[0]:
-                    sys.stdin.read(1)
+                if key_pressed is not None and key_pressed():
                     return "stopped by the operator: key"
                 return None
 
@@ -49,26 +42,3 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def _single_keys() -> Iterator[bool]:
-    """Whether there is a terminal whose keys can be read one by one.
-
-    For the time of the context they are.
-    """
-    try:
-        import termios
-        import tty
-    except ImportError:
-        yield False
-        return
-    if not (sys.stdin and sys.stdin.isatty() and os.getpgrp() == os.tcgetpgrp(sys.stdin.fileno())):
-        yield False
-        return
-    before = termios.tcgetattr(sys.stdin)
-    tty.setcbreak(sys.stdin)
-    try:
-        yield True
-    finally:
-        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
