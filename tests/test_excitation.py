@@ -7,7 +7,14 @@ import pytest
 
 from rigtwin.description.settings import Road
 from rigtwin.errors import RigtwinError
-from rigtwin.signals.excitation import fade_in, multisine, road_profile, road_spectrum, schroeder
+from rigtwin.signals.excitation import (
+    fade_in,
+    multisine,
+    road_profile,
+    road_spectrum,
+    schroeder,
+    sum_of_sines,
+)
 
 TIME = np.arange(45_000) * 1e-3
 
@@ -49,3 +56,15 @@ def test_schroeder_phases_keep_the_peak_low():
 
 def test_fade_in():
     assert fade_in(np.array([0.0, 0.5, 1.0, 2.0])) == pytest.approx([0.0, 0.5, 1.0, 1.0])
+
+
+def test_a_long_sum_of_sines_is_the_sum_term_by_term():
+    """To the last digit, on however many cores: recordings are made of it."""
+    random = np.random.default_rng(5)
+    time = 1e-3 * np.arange(30_011)
+    frequencies, amplitudes = random.uniform(0.01, 20.0, 17), random.standard_normal(17)
+    phases = random.uniform(0.0, 2.0 * np.pi, 17)
+    expected = np.zeros_like(time)
+    for frequency, amplitude, phase in zip(frequencies, amplitudes, phases, strict=True):
+        expected += amplitude * np.sin(2 * np.pi * frequency * time + phase)
+    assert np.array_equal(sum_of_sines(time, frequencies, amplitudes, phases), expected)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import detrend
 
 from rigtwin.components.sensors import Sensor, remove_drift
 from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
@@ -41,6 +40,8 @@ def guess_place(velocity: Array, period: float) -> tuple[float, float]:
     tuple
         The place, and the swing's standard deviation.
     """
+    from scipy.signal import detrend  # Late: it takes a second.
+
     swing = np.cumsum(detrend(velocity)) * period
     return float(swing[0] - np.mean(swing)), float(np.std(swing))
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_opening
 
 from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, measures
 from rigtwin.components.body import list_surplus
@@ -302,6 +301,8 @@ class MovedModel:
     def undetermined(self) -> NDArray[np.bool_]:
         """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both
         ends, accelerations are not known."""
+        from scipy.ndimage import binary_opening  # Late: it takes its time.
+
         speeds = self._moved(self._machine.plant)[0][1]
         found = np.zeros((len(self.rows), speeds.shape[1]), bool)
         end = round(ENDS / self._apart)

@@ -26,7 +26,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
-from rigtwin.recording.records import Lost, read_records, unseal
+from rigtwin.recording.records import Lost, Messages, read_records, unseal
 from rigtwin.recording.schema import (
     END_RECORD,
     FIELD,
@@ -206,10 +206,14 @@ class Gathered:
         ]
         return 1e-9 * min(last, default=0)
 
-    def add(self, record: McapRecord | Lost) -> None:
+    def add(self, record: McapRecord | Messages | Lost) -> None:
         """Takes one record, in the order of the file."""
         if isinstance(record, Lost):
             self._lost.append(record)
+        elif isinstance(record, Messages):
+            times, data = self._raw.setdefault(record.channel_id, ([], []))
+            times += record.times
+            data += record.data
         elif isinstance(record, Message):
             times, data = self._raw.setdefault(record.channel_id, ([], []))
             times.append(record.log_time)

@@ -17,9 +17,13 @@ from rigtwin.description.machine import OWN
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.simulation.loop import Tick, run, run_compiled
+from rigtwin.simulation.loop import BLOCK, Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explain_trip
 from rigtwin.simulation.twin import Twin
+
+AT_ONCE = 10 * BLOCK
+"""Ticks of a twin's test that compiled code does at once: to be called costs it as much as a
+hundred ticks."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +148,7 @@ def record(
     twin = Twin(configuration if later else actual, float(demands[0, 0]), seed)
     settings = flatten(configuration)
     told: dict[str, object] = dict(settings["controller"])
-    blocks = run_compiled(twin, actual, demands)
+    blocks = run_compiled(twin, actual, demands, BLOCK if later else AT_ONCE)
     if controller is not None:
         told = {OWN: True, **{name: told[name] for name in ("start", "preload")}}
         blocks = run(twin, actual, demands, controller)
@@ -152,7 +156,13 @@ def record(
     with Writer(path, experiment, configuration.timing.period, told, machine) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__, effects_from)
         for block in blocks:
-            writer.append(command=block.commands, sensor=block.measurements, truth=block.truth)
+            for first in range(0, len(block.commands), BLOCK):
+                part = slice(first, first + BLOCK)
+                writer.append(
+                    command=block.commands[part],
+                    sensor=block.measurements[part],
+                    truth=None if block.truth is None else block.truth[part],
+                )
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
             if later and ticks * configuration.timing.period >= effects_from - 1e-9:
                 twin.change(actual)
