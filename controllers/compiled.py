@@ -20,8 +20,8 @@ def compilable(function: Function) -> Function:
 
 def compiled(function: Function) -> Function:
     """Compiles a plain function of numbers and arrays wherever it is called from: a loop over an
-    array, which Python is slow at. It must call nothing else of ours, or what is kept on disk would
-    not be made anew when that changes."""
+    array, which Python is slow at. It must call nothing of ours in another file, or what is kept on
+    disk would not be made anew when that changes."""
     try:
         made: Any = numba.njit(cache=True, nogil=True)(function)
     except RuntimeError:

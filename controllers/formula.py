@@ -12,11 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.compiled import compilable
+from controllers.compiled import compilable, compiled
 
 LONGEST = 4096
 """Ticks that a block remembers at most."""
@@ -296,7 +295,7 @@ def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> 
     return total / length
 
 
-@numba.njit(nogil=True)
+@compiled
 def _replayed(
     program: Program,
     registers: np.ndarray,
