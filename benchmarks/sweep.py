@@ -3,6 +3,7 @@ and its memory."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import multiprocessing
 import os
@@ -11,9 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from rigtwin.studies.sweep import Store, Workers, open_workers, run_jobs
 from rigtwin.studies.tuning.measures import MEASURES
 from rigtwin.studies.tuning.run import Run, run
 
+Process = subprocess.Popen[Any]
 ROUNDS = 5
 RUNS = 48
 """Of a round, 6 s of test each."""
@@ -101,7 +104,7 @@ def overhead(folder: Path) -> None:
             run_jobs(store, workers, nothing, asked(6.0, TRIVIAL))
             rows.append((str(count), f"{1e3 * (time.perf_counter() - begin) / TRIVIAL:.2f}"))
     with (
-        cluster(folder) as address,
+        cluster(folder) as (address, _, _),
         open_workers(None, address) as workers,
         Store(folder / "overhead-cluster.sqlite") as store,
     ):
@@ -118,27 +121,24 @@ def overhead(folder: Path) -> None:
 
 
 @contextmanager
-def cluster(folder: Path) -> Iterator[str]:
-    """The address of a scheduler with two workers, a process each, on this computer."""
+def cluster(folder: Path) -> Iterator[tuple[str, Callable[[], Process], list[Process]]]:
+    """A scheduler with two workers, a process each, on this computer: its address, what begins
+    another worker, and the processes, the scheduler's first."""
     file = folder / "scheduler.json"
     common = ["--scheduler-file", str(file), "--no-dashboard", "--host", "127.0.0.1"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     begin = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", *common]
     processes = [subprocess.Popen(begin, env=environment, **quiet)]
-    begin = [
-        sys.executable,
-        "-m",
-        "distributed.cli.dask_worker",
-        "--nthreads",
-        "1",
-        "--no-nanny",
-        *common,
-    ]
-    processes += [subprocess.Popen(begin, env=environment, **quiet) for _ in range(2)]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny"]
+
+    def start() -> Process:
+        return subprocess.Popen([*worker, *common], env=environment, **quiet)
+
+    processes += [start(), start()]
     try:
         time.sleep(10.0)
-        yield json.loads(file.read_text())["address"]
+        yield json.loads(file.read_text())["address"], start, processes
     finally:
         for process in processes:
             process.kill()
@@ -170,9 +170,48 @@ def memory(folder: Path) -> None:
     print(table(rows))
 
 
+def campaign(folder: Path) -> None:
+    """10 000 runs on a cluster of two workers, one of which is killed after three thousand runs and
+    another begun after five thousand; whether each result is that of a run here."""
+    kill, begin = 3000, 5000
+    rows = [("runs", "s", "workers", "program, MB", "largest worker, MB")]
+    with (
+        cluster(folder) as (address, start, processes),
+        open_workers(None, address) as workers,
+        Store(folder / "campaign.sqlite") as store,
+    ):
+        began, done = time.perf_counter(), 0
+
+        def count(_: int) -> None:
+            nonlocal done
+            done += 1
+            if done == kill:
+                processes[1].kill()
+                processes[1].wait()
+            elif done == begin:
+                processes.append(start())
+            if done % 1000 == 0:
+                alive = [each for each in processes[1:] if each.poll() is None]
+                seconds, largest = time.perf_counter() - began, max(resident(p.pid) for p in alive)
+                sizes = f"{resident(os.getpid()):.1f}", f"{largest:.1f}"
+                rows.append((str(done), f"{seconds:.0f}", str(len(alive)), *sizes))
+
+        run_jobs(store, workers, run, asked(0.05, MANY), count)
+        wrong = sum(store[key] != run(job) for key, job in asked(0.05, MANY))
+        print(table(rows))
+        print(f"{len(store)} results of {MANY} runs, {wrong} of them other than here")
+
+
 def main() -> None:
+    """Prints all, or the campaign alone."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--campaign", action="store_true", help="a worker killed, another begun")
+    parsed = parser.parse_args()
     np.seterr(all="raise")
     with tempfile.TemporaryDirectory() as name:
+        if parsed.campaign:
+            campaign(Path(name))
+            return
         scaling(Path(name))
         overhead(Path(name))
         memory(Path(name))

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
         serve_card,
         write_table,
     )
+    from rigtwin.api.each import Answered, diagnose_each
     from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
     from rigtwin.api.look import look, show_live, show_look
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Alarm",
+    "Answered",
     "Campaign",
     "Changes",
     "Comparison",
@@ -118,6 +120,7 @@ __all__ = [
     "compare",
     "compare_recordings",
     "diagnose",
+    "diagnose_each",
     "dry_run",
     "effects",
     "energy_error",
@@ -177,6 +180,7 @@ _MODULES = {
         "diagnose",
         "what_changed",
     ),
+    "each": ("Answered", "diagnose_each"),
     "card": (
         "ServedCard",
         "TableCheck",

@@ -7,7 +7,14 @@ import sys
 import time
 from pathlib import Path
 
-from rigtwin.cli.options import add_json, add_machine, add_settings, settings_of
+from rigtwin.cli.options import (
+    add_json,
+    add_machine,
+    add_settings,
+    add_workers,
+    counting_bar,
+    settings_of,
+)
 from rigtwin.console import writable, write_json
 
 SUMMARY = "say why recordings of one machine and the twin disagree"
@@ -20,6 +27,7 @@ examples:
   rigtwin diagnose rig.mcap --html report.html --save-twin calibrated.toml
   rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap
   rigtwin diagnose monday.mcap friday.mcap --changed
+  rigtwin diagnose tests/*.mcap --each answers
   rigtwin compare rig.mcap --config calibrated.toml"""
 
 
@@ -29,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="recording",
-        help="of one rig, explained together",
+        help="of one rig, explained together unless --each",
     )
     add_json(parser, "the answer for other programs")
     parser.add_argument(
@@ -72,6 +80,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="say instead what is not the same in all recordings, given in the order of time",
     )
+    parser.add_argument(
+        "--each",
+        type=Path,
+        metavar="FOLDER",
+        help="diagnose each recording by itself, and keep all answers in this folder; a second "
+        "call goes on where the first was stopped",
+    )
+    add_workers(parser)
     add_machine(parser)
     add_settings(parser)
 
@@ -83,6 +99,10 @@ def execute(parsed: argparse.Namespace) -> int:
     from rigtwin.errors import RigtwinError
     from rigtwin.render.browser import find_browser
 
+    if parsed.each is not None:
+        return _diagnose_each(parsed)
+    if parsed.workers is not None or parsed.cluster is not None:
+        raise RigtwinError("--workers and --cluster: of --each; one diagnosis uses all cores")
     begun = time.perf_counter()
     reports = [each for each in (parsed.html, parsed.pdf, parsed.png) if each is not None]
     outputs = (parsed.json, parsed.save_twin, parsed.save_mjcf, *reports)
@@ -150,3 +170,35 @@ def execute(parsed: argparse.Namespace) -> int:
         said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
     print("\n".join(said))
     return 1 if diagnosis.verdict == "unusable" else 0
+
+
+def _diagnose_each(parsed: argparse.Namespace) -> int:
+    """1 if one of them has no answer, else 0."""
+    import rigtwin
+    from rigtwin.api.each import TABLE
+    from rigtwin.errors import RigtwinError
+
+    alone = (parsed.json, parsed.html, parsed.pdf, parsed.png, parsed.save_twin, parsed.save_mjcf)
+    if parsed.changed or parsed.held_out or any(alone):
+        raise RigtwinError(
+            "--each keeps its answers in its folder; leave out --held-out, --changed, --json, "
+            "--html, --pdf, --png, --save-twin and --save-mjcf"
+        )
+    with counting_bar("recording", "diagnose") as progress:
+        answers = rigtwin.diagnose_each(
+            parsed.recordings,
+            parsed.each,
+            machine=parsed.machine,
+            settings=settings_of(parsed),
+            without=parsed.without,
+            workers=parsed.workers,
+            cluster=parsed.cluster,
+            progress=progress,
+        )
+    for answer in answers:
+        print(answer)
+    print(f"{len(answers)} recordings; answers in {parsed.each / TABLE}")
+    missing = [
+        each for each in answers if each.document is None or each.document["verdict"] == "unusable"
+    ]
+    return 1 if missing else 0

@@ -1,0 +1,185 @@
+"""Many recordings, each diagnosed by itself: as one list of jobs, on all cores or on a cluster."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from rigtwin.api.answers import diagnose
+from rigtwin.api.machines import Settings, machine_of, machines, the_machine
+from rigtwin.api.recordings import the_recording
+from rigtwin.console import finite
+from rigtwin.description.changes import read_toml, values_of
+from rigtwin.description.machine import Machine
+from rigtwin.errors import RigtwinError
+from rigtwin.files import write_whole
+from rigtwin.studies.sweep import Store, open_workers, run_jobs
+
+KEPT, TABLE = "answers.sqlite", "answers.json"
+"""In the folder: what is done, and all answers together."""
+
+
+@dataclass(frozen=True)
+class Answered:
+    """path: of a recording; document: its answer, as `Diagnosis.document` has it, or None; error:
+    why there is none, in a line."""
+
+    path: Path
+    document: Mapping[str, Any] | None
+    error: str = ""
+
+    def __str__(self) -> str:
+        if self.document is None:
+            return f"{self.path}: {self.error}"
+        return f"{self.path}: {self.document['verdict']}: {self.document['sentence']}"
+
+
+@dataclass(frozen=True)
+class _Job:
+    """name, data: of the recording's file, which a worker elsewhere does not have; machine: its
+    description's path, or the name of one that comes along."""
+
+    name: str
+    data: bytes
+    machine: str
+    settings: tuple[Mapping[str, Any], ...]
+    without: tuple[str, ...]
+
+
+def _answer(job: _Job) -> dict[str, Any]:
+    with TemporaryDirectory(prefix="rigtwin-") as folder:
+        path = Path(folder) / job.name
+        path.write_bytes(job.data)
+        try:
+            found = diagnose(
+                path, machine=job.machine, settings=job.settings, without=job.without
+            ).document()
+        except RigtwinError as error:
+            return {"error": str(error).replace(str(path), job.name)}
+    found["recordings"] = [job.name]
+    return {"answer": json.dumps(finite(found), allow_nan=False)}
+
+
+def diagnose_each(
+    recordings: Sequence[str | Path],
+    folder: str | Path,
+    *,
+    machine: Machine | str | Path | None = None,
+    settings: Settings = (),
+    without: Sequence[str] = (),
+    workers: int | None = None,
+    cluster: str | None = None,
+    progress: Callable[[int, int], object] = lambda _done, _all: None,
+) -> tuple[Answered, ...]:
+    """Diagnoses many recordings, each by itself.
+
+    What is done is kept in the folder, so that a second call goes on where the first was stopped.
+    A recording that cannot be diagnosed says why, and does not keep the others from it.
+
+    Parameters
+    ----------
+    recordings
+        Their paths.
+    folder
+        Of the answers: `answers.json` has all of them by path.
+    machine
+        That they are of; by default the one that each names. Workers of a cluster must have its
+        description, if it is none that comes along, at the same path.
+    settings, without
+        As of `diagnose`.
+    workers, cluster
+        Processes on this computer, one a core by default; or the address of a dask cluster.
+    progress
+        Called with the recordings done and with how many there are.
+
+    Returns
+    -------
+    tuple of Answered
+        In the order of the recordings.
+
+    Raises
+    ------
+    RigtwinError
+        If there is no recording, one is named twice, settings or a machine make no sense, or the
+        folder cannot be used.
+    """
+    paths, out = [Path(path) for path in recordings], Path(folder)
+    if not paths:
+        raise RigtwinError("no recording to diagnose")
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise RigtwinError("a recording is named twice; each is diagnosed once")
+    given = tuple(_tables(settings))
+    on = None if machine is None else the_machine(machine)
+    told = json.dumps([given, sorted(without)], sort_keys=True, default=str)
+    refused: dict[Path, str] = {}
+    keys: dict[Path, str] = {}
+
+    def jobs() -> Iterator[tuple[str, _Job]]:
+        for path in paths:
+            try:
+                data = path.read_bytes()
+                described = machine_of(the_recording(path)) if on is None else on
+            except OSError as error:
+                refused[path] = f"cannot read {path}: {error.strerror}"
+            except RigtwinError as error:
+                refused[path] = str(error)
+            else:
+                keys[path] = _digest(data, told.encode(), *map(Path.read_bytes, described.files))
+                yield (
+                    keys[path],
+                    _Job(path.name, data, _name(described), given, tuple(without)),
+                )
+
+    done = 0
+
+    def count(more: int) -> None:
+        nonlocal done
+        done += more
+        progress(done + len(refused), len(paths))
+
+    with Store(out / KEPT) as store, open_workers(workers, cluster) as several:
+        run_jobs(store, several, _answer, jobs(), count)
+        answers = tuple(
+            Answered(path, None, refused[path]) if path in refused else _read(path, store[key])
+            for path, key in ((path, keys.get(path, "")) for path in paths)
+        )
+    table = {
+        str(each.path): {"error": each.error} if each.document is None else each.document
+        for each in answers
+    }
+    write_whole(out / TABLE, json.dumps(table, indent=1, allow_nan=False) + "\n")
+    return answers
+
+
+def _read(path: Path, result: Mapping[str, str]) -> Answered:
+    if "error" in result:
+        return Answered(path, None, result["error"])
+    return Answered(path, json.loads(result["answer"]))
+
+
+def _name(of: Machine) -> str:
+    """By which a worker elsewhere finds it too, if it comes along."""
+    return of.name if machines().get(of.name) == of.path else str(of.path)
+
+
+def _digest(*parts: bytes) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(len(part).to_bytes(8, "little") + part)
+    return digest.hexdigest()[:32]
+
+
+def _tables(settings: Settings) -> Iterator[Mapping[str, Any]]:
+    """Settings without the files that they may stand in."""
+    if isinstance(settings, str | Path):
+        yield read_toml(Path(settings), values_of)
+    elif isinstance(settings, Mapping):
+        yield settings
+    else:
+        for each in settings:
+            yield from _tables(each)

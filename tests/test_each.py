@@ -1,0 +1,106 @@
+"""Many recordings, each diagnosed by itself."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rigtwin
+from rigtwin.api import each
+from rigtwin.cli import main
+from rigtwin.errors import RigtwinError
+
+SHORT = {"timing": {"duration": 3.0}}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording without a gap, one with, and a file that is none."""
+    made = tmp_path_factory.mktemp("each")
+    rigtwin.run("emps", "positioning", seed=1, settings=SHORT, path=made / "plain.mcap")
+    rigtwin.run(
+        "emps",
+        "positioning",
+        seed=2,
+        settings=SHORT,
+        effects={"coulomb@guide": 25.0},
+        path=made / "rubs.mcap",
+    )
+    (made / "none.mcap").write_text("none")
+    return made
+
+
+def files(folder: Path) -> list[Path]:
+    return [folder / f"{name}.mcap" for name in ("plain", "none", "rubs")]
+
+
+def test_each_answer_is_that_of_a_diagnosis_alone(folder: Path, tmp_path: Path) -> None:
+    shown: list[tuple[int, int]] = []
+    answers = rigtwin.diagnose_each(
+        files(folder), tmp_path, workers=1, progress=lambda done, all_: shown.append((done, all_))
+    )
+    plain, none, rubs = answers
+    assert none.document is None
+    assert "is not an MCAP file" in none.error
+    assert shown[-1] == (3, 3)
+    for answer in (plain, rubs):
+        alone = rigtwin.diagnose(answer.path).document()
+        alone["recordings"] = [answer.path.name]
+        expected = json.loads(json.dumps(each.finite(alone)))
+        assert answer.document is not None
+        # How long it took is its own.
+        assert answer.document.keys() == expected.keys()
+        assert {**answer.document, "seconds": 0.0} == {**expected, "seconds": 0.0}
+    table = json.loads((tmp_path / each.TABLE).read_text())
+    assert table[str(rubs.path)] == rubs.document
+    assert table[str(none.path)] == {"error": none.error}
+
+
+def test_what_is_done_is_not_done_again(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called: list[Any] = []
+
+    def found(path: Path, **_: Any) -> Any:
+        called.append(path.name)
+        if len(called) == 2:
+            raise KeyboardInterrupt
+        return rigtwin.diagnose(path)
+
+    monkeypatch.setattr(each, "diagnose", found)
+    good = [files(folder)[0], files(folder)[2]]
+    with pytest.raises(KeyboardInterrupt):
+        rigtwin.diagnose_each(good, tmp_path, workers=1)
+    first = rigtwin.diagnose_each(good, tmp_path, workers=1)
+    assert called == ["plain.mcap", "rubs.mcap", "rubs.mcap"]
+    assert rigtwin.diagnose_each(good, tmp_path, workers=1) == first
+    assert len(called) == 3
+    # Other settings are another question.
+    rigtwin.diagnose_each(good[:1], tmp_path, workers=1, settings={"guide": {"coulomb": 3.0}})
+    assert len(called) == 4
+
+
+def test_the_command_says_a_line_each(folder: Path, tmp_path: Path, capsys: Any) -> None:
+    given = [str(path) for path in files(folder)]
+    assert main(["diagnose", *given, "--each", str(tmp_path), "--workers", "1"]) == 1
+    plain, none, rubs, told = capsys.readouterr().out.splitlines()
+    assert "no gap" in plain
+    assert "is not an MCAP file" in none
+    assert "Coulomb friction" in rubs
+    assert told == f"3 recordings; answers in {tmp_path / each.TABLE}"
+    assert main(["diagnose", given[0], "--each", str(tmp_path), "--html", "r.html"]) == 1
+    assert "leave out" in capsys.readouterr().err
+    assert main(["diagnose", given[0], "--workers", "2"]) == 1
+
+
+def test_bad_lists_are_refused(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(RigtwinError, match="named twice"):
+        rigtwin.diagnose_each([files(folder)[0]] * 2, tmp_path)
+    with pytest.raises(RigtwinError, match="no recording"):
+        rigtwin.diagnose_each([], tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RigtwinError, match="cannot make"):
+        rigtwin.diagnose_each(files(folder)[:1], tmp_path / "file" / "below")
