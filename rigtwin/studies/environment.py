@@ -171,8 +171,13 @@ class Environment(dm_env.Environment):
 
         It looks at the twin's own model and data, so a force written to `data.xfrc_applied` acts on
         the rig. Only the environment steps it. Each episode has its own, and frees the one before.
+
+        Raises RigtwinError where there is no dm_control, as on Python 3.13.
         """
-        from dm_control.mujoco import Physics, wrapper  # loads OpenGL, which only pictures need
+        try:
+            from dm_control.mujoco import Physics, wrapper  # loads OpenGL, which only pictures need
+        except ImportError as error:
+            raise RigtwinError(f"physics: needs dm_control, Python 3.11 or 3.12: {error}") from None
 
         twin = self._begin(self._next_seed) if self._twin is None else self._twin
         if self._physics is None:
