@@ -1,8 +1,10 @@
-"""`python -m benchmarks.realtime`: what a tick costs on the way to the card, and how late a loop in
-real time is here."""
+"""`python -m benchmarks.realtime [--seconds S] [--tests NAME ...]`: what a tick costs on the way to
+the card, beside a loop that adds up numbers for as long and does nothing else, which is what the
+computer itself does to a loop; and how late a loop in real time is here."""
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from pathlib import Path
 from time import perf_counter
@@ -19,7 +21,7 @@ from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import Response, VirtualCard
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
-from rigtwin.hardware.realtime import Pacer
+from rigtwin.hardware.realtime import Pacer, in_real_time
 from rigtwin.hardware.session.record import (
     open_virtual_card,
     record_at_leisure,
@@ -30,6 +32,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import load
 
 SECONDS = 20.0
+TESTS = ("road1.6", "semi-active", "beam-semi-active", "imposed")
 
 
 class _Taped:
@@ -90,21 +93,39 @@ class _Timed:
         self._card.stop()
 
 
-def _test(name: str) -> Test:
+def idle(work: float, period: float, seconds: float, paced: bool) -> Array:
+    """s of each tick of a loop that adds up numbers, about as many as take `work` s."""
+    numbers = [float(number) for number in range(50_000)]
+    begun = perf_counter()
+    for _ in range(200):
+        sum(numbers)
+    numbers = numbers[: max(1, round(len(numbers) * work / ((perf_counter() - begun) / 200.0)))]
+    pacer, times = Pacer(period), []
+    with in_real_time(fifo=paced):
+        for _ in range(round(seconds / period)):
+            if paced:
+                pacer.wait()
+            begun = perf_counter()
+            sum(numbers)
+            times.append(perf_counter() - begun)
+    return np.array(times[400:])
+
+
+def _test(name: str, seconds: float) -> Test:
     """Without the class a shared computer may keep a loop waiting for longer than a rig could bear;
     here nothing moves."""
     experiment = EXPERIMENTS[name]
     configuration = from_assignments(
-        experiment.configuration, [f"timing.duration={SECONDS}", "safety.missed=1e5"]
+        experiment.configuration, [f"timing.duration={seconds}", "safety.missed=1e5"]
     )
     return Test(name, configuration, experiment.demands(configuration, 0), 0, load_table(CARD))
 
 
-def compute(name: str, folder: Path, paced: bool) -> Array:
+def compute(name: str, folder: Path, paced: bool, seconds: float = SECONDS) -> Array:
     """s of each tick of a test on the virtual card: driver's client, conversion, limits,
     controller, recording; not the twin, not the card. paced: one tick a period, from a cold cache
     as on the rig, or one after the other."""
-    test = _test(name)
+    test = _test(name, seconds)
     tape = _Taped(test.terminals())
     card, _ = open_virtual_card(test, tape)
     record_at_leisure(card, test, folder / "tape.mcap")
@@ -119,27 +140,34 @@ def compute(name: str, folder: Path, paced: bool) -> Array:
 def late(fifo: bool, folder: Path) -> dict[str, str]:
     """Figures of a recording's lateness, of the twin in real time, with the scheduling class or
     without."""
-    test = _test("road1.6")
+    test = _test("road1.6", SECONDS)
     twin = InRealTime(WiredTwin(test.terminals(), test.table), test.configuration.timing.period)
     path = folder / f"{fifo}.mcap"
     record_in_real_time(twin, test, path, lambda: None, guarded=False, fifo=fifo)
     return dict(load(path).lateness)
 
 
+def _show(name: str, times: Array, paced: bool) -> None:
+    figures = 1e6 * np.array([*np.percentile(times, [50, 99, 99.9]), times.max()])
+    how = "one a ms" if paced else "without a pause"
+    print(f"{name:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures), flush=True)
+
+
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="of each loop")
+    parser.add_argument("--tests", nargs="+", default=TESTS, metavar="NAME")
+    parsed = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         print("work of a tick on the way to the card and back, us (period 1000 us)")
         print("test             ticks             median   99 %  99.9 %   most")
-        for test in ("road1.6", "semi-active", "beam-semi-active", "imposed"):
+        for test in parsed.tests:
             for paced in (True, False):
-                times = 1e6 * compute(test, folder, paced)
-                figures = (*np.percentile(times, [50, 99, 99.9]), times.max())
-                how = "one a ms" if paced else "without a pause"
-                print(
-                    f"{test:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures),
-                    flush=True,
-                )
+                times = compute(test, folder, paced, parsed.seconds)
+                _show(test, times, paced)
+                alone = idle(float(np.median(times)), 1e-3, parsed.seconds, paced)
+                _show("  nothing", alone, paced)
         print("\nlateness of the twin in real time, us")
         print("scheduling    median  99.9 %    most  missed of 20 000")
         for fifo in (True, False):

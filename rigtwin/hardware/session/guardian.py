@@ -67,7 +67,7 @@ class Guardian:
     def beat(self, outputs: Sequence[float]) -> None:
         """Tells that the loop is alive, and which outputs are safe; sees whether the guardian
         is."""
-        shared, now = self._shared, time.monotonic()
+        shared, now = self._shared, monotonic()
         shared[SAFE:], shared[BEAT] = outputs, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
@@ -96,7 +96,7 @@ class Guardian:
     def transition(self, transition: Transition) -> None:
         """Has a transition recorded; the loop is guarded from arming to rest."""
         if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
-            self._shared[BEAT] = time.monotonic()
+            self._shared[BEAT] = monotonic()
             self._shared[GUARDED] = 1.0
         self._send("transition", transition)
         if transition.after not in self._settings.phases:
