@@ -68,6 +68,17 @@ def test_the_command_counts_the_compensator_in(capsys) -> None:
     assert "unstable with that too" in capsys.readouterr().out
 
 
+def test_other_compensators_are_judged_too(capsys) -> None:
+    """What knows one delay alone does not carry a truck; docs/compensation.md has the table."""
+    for name in ("none", "forward-prediction", "lag"):
+        assert rigtwin.rig_margin("truck", compensator=name).compensated < 0.0
+    assert rigtwin.rig_margin("motorcycle", compensator="lag").compensated > 0.0
+    assert main(["stability", "--vehicle", "truck", "--compensator", "lag"]) == 0
+    assert "unstable with that too" in capsys.readouterr().out
+    with pytest.raises(RigtwinError, match="compensator 'smith' is not one of none, forward"):
+        rigtwin.rig_margin("truck", compensator="smith")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VEHICLES)
 def test_on_a_road_the_plate_is_where_the_ideal_vehicle_s_body_is(name: str) -> None:

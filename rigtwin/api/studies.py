@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
+from controllers import PlateCompensator
 from experiments.rths.actuator import draw_plants
 from experiments.rths.building import find_case
 from experiments.rths.compensators import find_compensator
@@ -181,20 +182,28 @@ def _car(vehicle: str | QuarterCar) -> QuarterCar:
     return car
 
 
-def rig_margin(vehicle: str | QuarterCar = "quarter-car") -> RigMargin:
+def rig_margin(
+    vehicle: str | QuarterCar = "quarter-car", *, compensator: str = "kalman-inverse"
+) -> RigMargin:
     """How stable a vehicle is on the rig as it runs, plain and with its plate's delay compensated.
 
     Parameters
     ----------
     vehicle
         By name, such as "truck", or its figures.
+    compensator
+        Of the plate's delay, as `controller.plate_compensator` takes it.
 
     Raises
     ------
     RigtwinError
         For an unknown name, or a figure that no pole can be worked out for.
     """
-    return judge_margin(believable(_car(vehicle)))
+    try:
+        by = PlateCompensator.parse(compensator)
+    except ValueError as error:
+        raise RigtwinError(f"compensator {error}") from None
+    return judge_margin(believable(_car(vehicle)), by)
 
 
 def reproduce(

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 RIG_LAG = 0.01
 """s, of the four filters (thesis §6.2)."""
 TABLE_6_2 = "quarter-car"
+COMPENSATOR = "kalman-inverse"
 DRAWN = "rig"
 """Model whose map is drawn, unless another is named."""
 SUMMARY = "say whether a vehicle is stable on the rig with its delays, and how much delay it bears"
@@ -44,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--delay",
         action="store_true",
         help="the rightmost pole with pure delays of tau instead of lags",
+    )
+    parser.add_argument(
+        "--compensator",
+        default=COMPENSATOR,
+        metavar="NAME",
+        help=f"of the plate's delay on the rig as it runs (default {COMPENSATOR})",
     )
     parser.add_argument(
         "--map",
@@ -112,7 +119,7 @@ def execute(parsed: argparse.Namespace) -> int:
         f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} "
         f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
     )
-    margin = rigtwin.rig_margin(car)
+    margin = rigtwin.rig_margin(car, compensator=parsed.compensator)
     print(f"the rig as it runs: {_margin(margin)}")
     if parsed.map:
         draw(stability_map(model, car, tau, axes[0], axes[1]), out)

@@ -75,16 +75,18 @@ def sized(configuration: Configuration) -> Configuration:
     )
 
 
-def set_for_compensation(configuration: Configuration) -> Configuration:
-    """The same with the settings of a compensated test: the plate's delay taken away by the Kalman
-    inverse of the cylinder as it is, short filters, a firm force loop, and the motor's friction
+def set_for_compensation(
+    configuration: Configuration, by: PlateCompensator = PlateCompensator.KALMAN_INVERSE
+) -> Configuration:
+    """The same with the settings of a compensated test: the plate's delay taken away by what is
+    told of the cylinder as it is, short filters, a firm force loop, and the motor's friction
     observed and taken away, which a loop with the plate's delay does not bear."""
     short = with_filters(tell_plate(configuration), FILTER)
     controller = short.controller._replace(
         compensator=Compensator.OBSERVER,
         kp=KP,
         ki=KI,
-        plate_compensator=PlateCompensator.KALMAN_INVERSE,
+        plate_compensator=by,
     )
     return short._replace(controller=controller)
 
@@ -94,10 +96,14 @@ def decay_plain(car: QuarterCar) -> float:
     return decay(rig_as(car))
 
 
-def decay_compensated(car: QuarterCar, untold: float = 0.0) -> float:
+def decay_compensated(
+    car: QuarterCar,
+    untold: float = 0.0,
+    by: PlateCompensator = PlateCompensator.KALMAN_INVERSE,
+) -> float:
     """The same with the plate compensated. untold: s of delay of the cylinder that the compensator
     does not know."""
-    return decay(with_cylinder_delay(set_for_compensation(rig_as(car)), untold))
+    return decay(with_cylinder_delay(set_for_compensation(rig_as(car), by), untold))
 
 
 AS_RUN: Mapping[str, Callable[[QuarterCar], float]] = {
@@ -107,26 +113,30 @@ AS_RUN: Mapping[str, Callable[[QuarterCar], float]] = {
 """Name of a model of the whole sampled loop → its decay."""
 
 
-def judge_margin(car: QuarterCar) -> RigMargin:
+def judge_margin(
+    car: QuarterCar, by: PlateCompensator = PlateCompensator.KALMAN_INVERSE
+) -> RigMargin:
     """A vehicle on the rig as it runs.
 
     Parameters
     ----------
     car
         The vehicle.
+    by
+        The compensator of the plate's delay.
 
     Returns
     -------
     RigMargin
         Plain and compensated.
     """
-    plain, compensated = decay_plain(car), decay_compensated(car)
+    plain, compensated = decay_plain(car), decay_compensated(car, by=by)
     if compensated <= 0.0:
         return RigMargin(plain, compensated, None)
     low, high = 0.0, LONGEST
     while high - low > CLOSE:
         middle = 0.5 * (low + high)
-        if decay_compensated(car, middle) > 0.0:
+        if decay_compensated(car, middle, by) > 0.0:
             low = middle
         else:
             high = middle
