@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from rigtwin.components.quantity import Quantity, fields
 from rigtwin.description.control import Control
@@ -187,6 +186,8 @@ def _minimise(
 ) -> tuple[float, float]:
     """Smallest misfit over one setting, and where: a coarse look around the told value, then a
     bounded search."""
+    from scipy.optimize import minimize_scalar  # Late: it takes its time.
+
     size = max(abs(told), 0.01 * min(meaning.high, 1.0))
     # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.
     grid = np.unique(np.clip(told + size * AWAY, meaning.low, meaning.high))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from rigtwin.numerics.arrays import Array
 
@@ -44,7 +44,7 @@ def check_homogeneity(values: Array, widths: Array, freedom: float) -> Homogenei
     mean = float(weights @ values / weights.sum())
     statistic = float(weights @ (values - mean) ** 2)
     among = len(values) - 1
-    return Homogeneity(mean, statistic, float(f_distribution.sf(statistic / among, among, freedom)))
+    return Homogeneity(mean, statistic, float(fdtrc(among, freedom, statistic / among)))
 
 
 def correct(probabilities: Sequence[float]) -> list[float]:
@@ -114,9 +114,7 @@ def fit_trends(
         slope = float(weights @ (centred * values)) / power
         left = max(whole.statistic - slope**2 * power, 0.0)
         remaining = len(values) - 2
-        probability = (
-            float(f_distribution.sf(left / remaining, remaining, freedom)) if remaining else 1.0
-        )
+        probability = float(fdtrc(remaining, freedom, left / remaining)) if remaining else 1.0
         explains = 1.0 - left / max(whole.statistic, 1e-300)
         found.append(Trend(name, slope, explains, left, probability))
     return sorted(found, key=lambda each: each.left)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import csd, welch
 
 from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS, Motion
@@ -246,6 +245,8 @@ def _loop(view: View) -> Picture:
 def _phase(view: View) -> Picture:
     """Phase of what was measured, and of the prediction with the effect, behind the prediction
     without it."""
+    from scipy.signal import csd, welch  # Late: they are of the report, and take their time.
+
     length = min(len(view.before), max(64, round(2.0 / view.period)))
     there = view.counts > COUNTS
     signals = {
@@ -311,6 +312,8 @@ def _line(view: View) -> Picture:
 
 def _spectrum(view: View) -> Picture:
     """Amplitude spectra of what the predictions leave of the sensor as it was recorded."""
+    from scipy.signal import welch
+
     there = view.counts > COUNTS
     left = (view.raw - view.after)[there]
     length = min(len(left), max(64, round(2.0 / view.period)))

@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import differential_evolution
 
 from controllers import Compensator, Settings
 from controllers.filters import low_pass
@@ -185,6 +183,8 @@ def _without_hum(signal: Array, time: Array) -> Array:
 def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
     """Ticks at which the motor reverses, well apart from each other, and the direction after each;
     ticks of the others, which come too soon after one another to be measured."""
+    from scipy.ndimage import gaussian_filter1d  # Late: it takes its time.
+
     travel = _without_hum(recording.column("/sensor", "suspension_lvdt"), recording.time)
     velocity = np.gradient(
         gaussian_filter1d(travel, SMOOTHING / recording.period),
@@ -205,6 +205,8 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     Raises RigtwinError if it was made with compensation, has values that are no numbers or too few
     reversals, or its force does not jump at them.
     """
+    from scipy.optimize import differential_evolution  # Late: it takes its time.
+
     if settings.compensator != Compensator.NONE:
         told = f"recorded with compensator {settings.compensator.label!r}; expected 'none'"
         raise RigtwinError(f"{recording.path}: {told}")
