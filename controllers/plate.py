@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 FADE = 0.01
 """s over which the compensation sets in: a plate that is read with hum is not where the law starts,
 and would be answered by a jump of the command."""
+LONGEST = 0.5
+"""s of delay that is taken away by one number."""
 DERIVATIVES = 3
 """Of the desired motion that the Kalman filter has as states."""
 NOTHING = LinearLaw(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros(0), np.array([1.0, 0.0]))
@@ -72,10 +74,16 @@ def total_delay(loop: ClosedLoop) -> float:
 def _law(
     kind: PlateCompensator, loop: ClosedLoop, weights: tuple[float, float, float], period: float
 ) -> LinearLaw:
-    if kind == PlateCompensator.FORWARD_PREDICTION:
-        return forward_prediction(max(total_delay(loop), 0.0), period)
-    if kind == PlateCompensator.LAG:
-        return lag_compensation(max(total_delay(loop), 0.0), period)
+    if kind in (PlateCompensator.FORWARD_PREDICTION, PlateCompensator.LAG):
+        late = total_delay(loop)
+        if not 0.0 < late <= LONGEST:
+            raise ValueError(
+                f"controller.plate_b2 to plate_delay describe a cylinder that is late by {late:g} "
+                f"s; {kind.label} takes away more than 0 and up to {LONGEST:g} s"
+            )
+        if kind == PlateCompensator.LAG:
+            return lag_compensation(late, period)
+        return forward_prediction(late, period)
     actuator = Actuator(*with_lag(loop), loop.delay)
     if np.max(np.linalg.eigvals(actuator.a).real) >= 0.0:
         raise ValueError(

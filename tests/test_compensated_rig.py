@@ -193,6 +193,34 @@ def test_a_corrected_twin_tells_the_controller(tmp_path):
     found = from_toml(Configuration(), twin)
     assert found.plant.structure_cylinder.delay == pytest.approx(LATE, rel=0.05)
     assert found.controller.plate_delay == found.plant.structure_cylinder.delay
+    # What the controller is told is of tests to come: the recording's own stays.
+    assert rigtwin.compare(late, settings=twin)
+    assert rigtwin.diagnose(late, settings=twin).verdict == "no gap"
+
+
+@pytest.mark.parametrize("name", ["forward-prediction", "lag"])
+@pytest.mark.parametrize("b1", [-1e7, 1e8])
+def test_a_delay_that_no_number_takes_away_is_named(name, b1):
+    settings = {"controller": {"plate_compensator": name, "plate_b1": b1}}
+    with pytest.raises(RigtwinError, match="describe a cylinder that is late by .* s; .* takes"):
+        rigtwin.run("suspension-rig", "drop", settings=settings)
+
+
+def test_a_test_that_is_refused_leaves_the_recording_that_was_there(tmp_path):
+    path = tmp_path / "kept.mcap"
+    settings = {"timing": {"duration": 0.5}}
+    rigtwin.run("suspension-rig", "drop", settings=settings, path=path)
+    before = path.read_bytes()
+    for kind in ("kalman-inverse", "forward-prediction"):
+        told = {"plate_compensator": kind, "plate_a3": 0.0, "plate_b1": 1e8}
+        wrong = {**settings, "controller": told}
+        with pytest.raises(RigtwinError, match="plate_"):
+            rigtwin.run("suspension-rig", "drop", settings=wrong, path=path)
+        with pytest.raises(RigtwinError, match="plate_"):
+            rigtwin.run_on_twin("drop", settings=wrong, path=path)
+        with pytest.raises(RigtwinError, match="plate_"):
+            rigtwin.faults(each=1, processes=0, settings={"controller": told})
+    assert path.read_bytes() == before
 
 
 def test_a_cylinder_that_is_not_stable_is_named():

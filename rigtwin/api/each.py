@@ -11,17 +11,19 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, the_machine
+from rigtwin.api.machines import Settings, machine_of, machines, the_machine, twin_of
 from rigtwin.api.recordings import the_recording
 from rigtwin.console import finite
 from rigtwin.description.changes import read_toml, values_of
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import printable, write_whole
 from rigtwin.studies.sweep import Store, open_workers, run_jobs
 
 KEPT, TABLE = "answers.sqlite", "answers.json"
 """In the folder: what is done, and all answers together."""
+_HERE = "the-recording-that-is-diagnosed"
+"""Stands in a kept answer for its recording, of which there may be copies of other names."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +37,17 @@ class Answered:
 
     def __str__(self) -> str:
         if self.document is None:
-            return f"{self.path}: {self.error}"
-        return f"{self.path}: {self.document['verdict']}: {self.document['sentence']}"
+            return f"{printable(str(self.path))}: {self.error}"
+        return (
+            f"{printable(str(self.path))}: {self.document['verdict']}: {self.document['sentence']}"
+        )
 
 
 @dataclass(frozen=True)
 class _Job:
-    """name, data: of the recording's file, which a worker elsewhere does not have; machine: its
+    """data: of the recording's file, which a worker elsewhere does not have; machine: its
     description's path, or the name of one that comes along."""
 
-    name: str
     data: bytes
     machine: str
     settings: tuple[Mapping[str, Any], ...]
@@ -53,16 +56,16 @@ class _Job:
 
 def _answer(job: _Job) -> dict[str, Any]:
     with TemporaryDirectory(prefix="rigtwin-") as folder:
-        path = Path(folder) / job.name
+        path = Path(folder) / _HERE
         path.write_bytes(job.data)
         try:
             found = diagnose(
                 path, machine=job.machine, settings=job.settings, without=job.without
             ).document()
         except RigtwinError as error:
-            return {"error": str(error).replace(str(path), job.name)}
-    found["recordings"] = [job.name]
-    return {"answer": json.dumps(finite(found), allow_nan=False)}
+            return {"error": str(error).replace(str(path), _HERE)}
+    told = json.dumps(finite(found), allow_nan=False)
+    return {"answer": told.replace(json.dumps(str(path))[1:-1], _HERE)}
 
 
 def diagnose_each(
@@ -108,14 +111,20 @@ def diagnose_each(
         If there is no recording, one is named twice, settings or a machine make no sense, or the
         folder cannot be used.
     """
-    paths, out = [Path(path) for path in recordings], Path(folder)
-    if not paths:
-        raise RigtwinError("no recording to diagnose")
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise RigtwinError("a recording is named twice; each is diagnosed once")
+    paths, out = _paths(recordings), Path(_checked("folder", folder, str | Path, "a path"))
+    if not str(folder):
+        raise RigtwinError("folder '': expected a folder for the answers")
+    _checked("workers", workers, int | None, "a whole number")
+    _checked("cluster", cluster, str | None, "an address, such as tcp://host:8786")
+    if isinstance(without, str) or not all(isinstance(each, str) for each in _list(without)):
+        raise RigtwinError(f"without {without!r:.60}: expected a list of effects' names")
     given = tuple(_tables(settings))
     on = None if machine is None else the_machine(machine)
-    told = json.dumps([given, sorted(without)], sort_keys=True, default=str)
+    try:
+        told = json.dumps([given, sorted(without)], sort_keys=True)
+    except (TypeError, ValueError):
+        raise RigtwinError(f"settings {settings!r:.60}: expected numbers and text") from None
+    sensible: set[Path] = set()
     refused: dict[Path, str] = {}
     keys: dict[Path, str] = {}
 
@@ -124,15 +133,20 @@ def diagnose_each(
             try:
                 data = path.read_bytes()
                 described = machine_of(the_recording(path)) if on is None else on
-            except OSError as error:
-                refused[path] = f"cannot read {path}: {error.strerror}"
+            except (OSError, ValueError) as error:
+                said = getattr(error, "strerror", None) or error
+                refused[path] = f"cannot read {printable(str(path))}: {said}"
             except RigtwinError as error:
                 refused[path] = str(error)
             else:
+                if described.path not in sensible:
+                    # What makes no sense of it makes none of all its recordings.
+                    twin_of(described, given, without)
+                    sensible.add(described.path)
                 keys[path] = _digest(data, told.encode(), *map(Path.read_bytes, described.files))
                 yield (
                     keys[path],
-                    _Job(path.name, data, _name(described), given, tuple(without)),
+                    _Job(data, _name(described), given, tuple(without)),
                 )
 
     done = 0
@@ -145,7 +159,9 @@ def diagnose_each(
     with Store(out / KEPT) as store, open_workers(workers, cluster) as several:
         run_jobs(store, several, _answer, jobs(), count)
         answers = tuple(
-            Answered(path, None, refused[path]) if path in refused else _read(path, store[key])
+            Answered(path, None, refused[path])
+            if path in refused
+            else _read(path, store[key], out / KEPT)
             for path, key in ((path, keys.get(path, "")) for path in paths)
         )
     table = {
@@ -156,10 +172,45 @@ def diagnose_each(
     return answers
 
 
-def _read(path: Path, result: Mapping[str, str]) -> Answered:
-    if "error" in result:
-        return Answered(path, None, result["error"])
-    return Answered(path, json.loads(result["answer"]))
+def _read(path: Path, result: Any, kept: Path) -> Answered:
+    try:
+        if "error" in result:
+            return Answered(path, None, result["error"].replace(_HERE, printable(str(path))))
+        own = json.dumps(printable(str(path)))[1:-1]
+        document = json.loads(result["answer"].replace(_HERE, own))
+        _ = document["verdict"], document["sentence"]
+    except (TypeError, ValueError, KeyError, AttributeError):
+        raise RigtwinError(
+            f"{kept} is not a file of answers, or damaged; remove it and run again"
+        ) from None
+    return Answered(path, document)
+
+
+def _checked(name: str, given: Any, kinds: Any, expected: str) -> Any:
+    if not isinstance(given, kinds) or isinstance(given, bool):
+        raise RigtwinError(f"{name} {given!r:.60}: expected {expected}")
+    return given
+
+
+def _list(given: Any) -> list[Any]:
+    return list(given) if isinstance(given, Sequence) else [None]
+
+
+def _paths(recordings: Any) -> list[Path]:
+    """Raises RigtwinError unless they are some, of which none is there twice."""
+    each = _list(recordings)
+    if isinstance(recordings, str) or not all(isinstance(one, str | Path) for one in each):
+        raise RigtwinError(f"recordings {recordings!r:.60}: expected a list of paths")
+    paths = [Path(one) for one in each]
+    if not paths:
+        raise RigtwinError("no recording to diagnose")
+    seen: set[Path] = set()
+    for path in paths:
+        whole = path.absolute() if "\0" in str(path) else path.resolve()
+        if whole in seen:
+            raise RigtwinError(f"{printable(str(path))} is named twice; each is diagnosed once")
+        seen.add(whole)
+    return paths
 
 
 def _name(of: Machine) -> str:
@@ -181,5 +232,9 @@ def _tables(settings: Settings) -> Iterator[Mapping[str, Any]]:
     elif isinstance(settings, Mapping):
         yield settings
     else:
-        for each in settings:
+        for each in _list(settings):
+            if not isinstance(each, str | Path | Mapping):
+                raise RigtwinError(
+                    f"settings {each!r:.60}: expected tables of settings, or the paths of files"
+                )
             yield from _tables(each)

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from experiments import find
 from rigtwin.api.machines import Settings
 from rigtwin.description.changes import with_changes
+from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import require_client
@@ -85,6 +86,8 @@ def faults(
         name: replace(found, configuration=with_changes(found.configuration, settings))
         for name, found in ((fault.experiment, find(fault.experiment)) for fault in todo)
     }
+    for test in tests.values():
+        set_up(test.configuration.controller, test.configuration.timing.period)
     results, undone, interrupted = list[FaultResult](), list[str](), False
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
         try:

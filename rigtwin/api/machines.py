@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from rigtwin.components import Effect
+from rigtwin.components import Cylinder, Effect
+from rigtwin.components.cylinder import told_settings
 from rigtwin.description import catalogue
-from rigtwin.description.changes import Changes, with_changes
+from rigtwin.description.changes import Changes, read_toml, values_of, with_changes
 from rigtwin.description.configuration import Configuration, parameters
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.effects import without_effect as take_out
@@ -129,7 +130,7 @@ def twin_of(
     RigtwinError
         For any other setting, or an effect that is not there.
     """
-    base = with_changes(of.configuration, settings)
+    base = with_changes(of.configuration, list(_of_the_plant(settings)))
     for (key, value, _), (_, described, _) in zip(
         parameters(base), parameters(of.configuration), strict=True
     ):
@@ -145,3 +146,23 @@ def twin_of(
     for name in taken_out:
         base = take_out(base, name)
     return apply_effects(base, effects)
+
+
+def _of_the_plant(settings: Settings) -> Iterator[Changes]:
+    """Settings without what a calibrated twin's file tells the controller of the plant: that is of
+    tests to come, not of those that are recorded."""
+    if isinstance(settings, str | Path):
+        tables = read_toml(Path(settings), values_of)
+        told = told_settings(Cylinder())
+        kept = {
+            name: value
+            for name, value in dict(tables.get("controller", {})).items()
+            if name not in told
+        }
+        rest = {name: table for name, table in tables.items() if name != "controller"}
+        yield {**rest, "controller": kept} if kept else rest
+    elif isinstance(settings, Mapping):
+        yield settings
+    else:
+        for each in settings:
+            yield from _of_the_plant(each)

@@ -201,4 +201,9 @@ def _diagnose_each(parsed: argparse.Namespace) -> int:
     missing = [
         each for each in answers if each.document is None or each.document["verdict"] == "unusable"
     ]
+    if missing:
+        print(
+            f"rigtwin: {len(missing)} of {len(answers)} recordings have no answer, see above",
+            file=sys.stderr,
+        )
     return 1 if missing else 0

@@ -12,6 +12,7 @@ import numpy as np
 from machines import DEFAULT_MACHINE
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration, flatten
+from rigtwin.description.control import set_up
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import OWN
 from rigtwin.description.settings import Safety
@@ -146,6 +147,9 @@ def record(
     actual = apply_effects(configuration, list(effects))
     later = effects_from > 0.0
     twin = Twin(configuration if later else actual, float(demands[0, 0]), seed)
+    if controller is None:
+        # Refused before the recording takes the place of another.
+        set_up(actual.controller, actual.timing.period)
     settings = flatten(configuration)
     told: dict[str, object] = dict(settings["controller"])
     blocks = run_compiled(twin, actual, demands, BLOCK if later else AT_ONCE)

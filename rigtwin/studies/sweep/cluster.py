@@ -59,7 +59,7 @@ def _knock(address: str) -> None:
     try:
         with socket.create_connection((found["host"], int(found["port"])), ANSWERS):
             pass
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, UnicodeError) as error:
         said = getattr(error, "strerror", None) or error
         raise RigtwinError(f"no cluster at {address}: {said}; {expected}") from None
 
