@@ -196,6 +196,9 @@ def test_a_corrected_twin_tells_the_controller(tmp_path):
     # What the controller is told is of tests to come: the recording's own stays.
     assert rigtwin.compare(late, settings=twin)
     assert rigtwin.diagnose(late, settings=twin).verdict == "no gap"
+    one = rigtwin.diagnose_each([late.path], tmp_path / "each", settings=twin, workers=1)[0]
+    assert one.document is not None
+    assert one.document["verdict"] == "no gap"
 
 
 @pytest.mark.parametrize("name", ["forward-prediction", "lag"])

@@ -11,10 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, the_machine, twin_of
+from rigtwin.api.machines import Settings, machine_of, machines, tables_of, the_machine, twin_of
 from rigtwin.api.recordings import the_recording
 from rigtwin.console import finite
-from rigtwin.description.changes import read_toml, values_of
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable, write_whole
@@ -118,7 +117,7 @@ def diagnose_each(
     _checked("cluster", cluster, str | None, "an address, such as tcp://host:8786")
     if isinstance(without, str) or not all(isinstance(each, str) for each in _list(without)):
         raise RigtwinError(f"without {without!r:.60}: expected a list of effects' names")
-    given = tuple(_tables(settings))
+    given = tuple(tables_of(settings))
     on = None if machine is None else the_machine(machine)
     try:
         told = json.dumps([given, sorted(without)], sort_keys=True)
@@ -223,18 +222,3 @@ def _digest(*parts: bytes) -> str:
     for part in parts:
         digest.update(len(part).to_bytes(8, "little") + part)
     return digest.hexdigest()[:32]
-
-
-def _tables(settings: Settings) -> Iterator[Mapping[str, Any]]:
-    """Settings without the files that they may stand in."""
-    if isinstance(settings, str | Path):
-        yield read_toml(Path(settings), values_of)
-    elif isinstance(settings, Mapping):
-        yield settings
-    else:
-        for each in _list(settings):
-            if not isinstance(each, str | Path | Mapping):
-                raise RigtwinError(
-                    f"settings {each!r:.60}: expected tables of settings, or the paths of files"
-                )
-            yield from _tables(each)

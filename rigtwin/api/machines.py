@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rigtwin.components import Cylinder, Effect
 from rigtwin.components.cylinder import told_settings
 from rigtwin.description import catalogue
-from rigtwin.description.changes import Changes, read_toml, values_of, with_changes
+from rigtwin.description.changes import POSTERIOR, Changes, read_toml, values_of, with_changes
 from rigtwin.description.configuration import Configuration, parameters
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.effects import without_effect as take_out
@@ -130,7 +131,7 @@ def twin_of(
     RigtwinError
         For any other setting, or an effect that is not there.
     """
-    base = with_changes(of.configuration, list(_of_the_plant(settings)))
+    base = with_changes(of.configuration, list(tables_of(settings)))
     for (key, value, _), (_, described, _) in zip(
         parameters(base), parameters(of.configuration), strict=True
     ):
@@ -148,21 +149,34 @@ def twin_of(
     return apply_effects(base, effects)
 
 
-def _of_the_plant(settings: Settings) -> Iterator[Changes]:
-    """Settings without what a calibrated twin's file tells the controller of the plant: that is of
-    tests to come, not of those that are recorded."""
+def tables_of(settings: Settings) -> Iterator[Mapping[str, Any]]:
+    """Settings as tables, the files that they may stand in read.
+
+    What a calibrated twin's file tells the controller of the plant is left out: it is of tests to
+    come, not of those that are recorded.
+
+    Raises
+    ------
+    RigtwinError
+        For anything but tables and files of them.
+    """
     if isinstance(settings, str | Path):
-        tables = read_toml(Path(settings), values_of)
-        told = told_settings(Cylinder())
-        kept = {
-            name: value
-            for name, value in dict(tables.get("controller", {})).items()
-            if name not in told
-        }
-        rest = {name: table for name, table in tables.items() if name != "controller"}
-        yield {**rest, "controller": kept} if kept else rest
+        yield read_toml(Path(settings), _of_the_plant)
     elif isinstance(settings, Mapping):
         yield settings
-    else:
+    elif isinstance(settings, Sequence) and not isinstance(settings, bytes):
         for each in settings:
-            yield from _of_the_plant(each)
+            yield from tables_of(each)  # type: ignore[arg-type]
+    else:
+        raise RigtwinError(
+            f"settings {settings!r:.60}: expected tables of settings, or the paths of files"
+        )
+
+
+def _of_the_plant(tables: Mapping[str, Any]) -> Mapping[str, Any]:
+    values = values_of(tables)
+    if POSTERIOR in tables and isinstance(values.get("controller"), Mapping):
+        told = told_settings(Cylinder())
+        own = {name: value for name, value in values["controller"].items() if name not in told}
+        values = {**values, "controller": own}
+    return values

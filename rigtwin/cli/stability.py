@@ -109,6 +109,7 @@ def execute(parsed: argparse.Namespace) -> int:
             raise RigtwinError(
                 f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
             )
+    margin = rigtwin.rig_margin(car, compensator=parsed.compensator)
     points = SPARSE if model in AS_RUN else POINTS
     axes = [around(name, car, tau, points) for name in parsed.map or ()]
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
@@ -119,7 +120,6 @@ def execute(parsed: argparse.Namespace) -> int:
         f"the rig of thesis §6.2, four lags of {1e3 * RIG_LAG:g} "
         f"ms: rightmost pole {_pole(at_rig)} 1/s, {words}"
     )
-    margin = rigtwin.rig_margin(car, compensator=parsed.compensator)
     print(f"the rig as it runs: {_margin(margin)}")
     if parsed.map:
         draw(stability_map(model, car, tau, axes[0], axes[1]), out)
