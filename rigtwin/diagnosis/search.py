@@ -16,6 +16,9 @@ from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them."""
+OUTDONE = 3.0
+"""Times the χ² of an explanation that leaves no more than noise from which another is not fitted
+again: taking the tolerances at it has never halved it."""
 
 
 def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
@@ -64,9 +67,9 @@ class Search:
         )
         singles += [self.coarse.unfitted(each) for each in screened if each.promise < worth]
         singles.sort(key=self.cost)
-        nothing = self.fitter.refit_with_tolerances(self.fitter.nothing)
+        refit = self.fitter.refit_with_tolerances
         if self.coarse.nothing.misfit - singles[0].misfit < worth:
-            return nothing, singles
+            return refit(self.fitter.nothing), singles
         # Those far behind stay there, however the tolerances are taken.
         near = (
             singles[0].misfit
@@ -74,8 +77,22 @@ class Search:
             + 2.0 * self.least
         )
         close = [fit for fit in singles[:REFITTED] if fit.misfit <= near]
-        rough = self.fitter.evidence.machine.rough
-        settle = self.fitter.settle if rough else self.fitter.refit_with_tolerances
-        tried = self.threads.map(settle, close) + singles[len(close) :]
+        if self.fitter.evidence.machine.rough:
+            nothing, *tried = self.threads.map(
+                lambda fit: self.fitter.settle(fit) if fit.effects else refit(fit),
+                [self.fitter.nothing, *close],
+            )
+        else:
+            nothing, best = self.threads.map(refit, [self.fitter.nothing, close[0]])
+            others = [fit for fit in close[1:] if not self._outdoes(best, fit)]
+            tried = [best, *self.threads.map(refit, others)]
+        again = {fit.effects for fit in tried}
+        tried += [fit for fit in singles if fit.effects not in again]
         tried.sort(key=self.cost)
         return nothing, tried
+
+    def _outdoes(self, best: Fit, other: Fit) -> bool:
+        """Whether one explanation leaves no more than noise, and another leaves far more."""
+        noise = self.fitter.evidence.expected_misfit(best.plant)
+        enough = (1.0 + self.thresholds.unexplained) * noise
+        return best.misfit <= enough and other.misfit > OUTDONE * best.misfit

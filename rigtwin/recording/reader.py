@@ -9,14 +9,12 @@ import json
 import math
 import struct
 from bisect import bisect_left
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
-from google.protobuf.message import DecodeError
 from mcap.exceptions import InvalidMagic
 from mcap.records import Channel, McapRecord, Message, Metadata, Schema
 from numpy.typing import NDArray
@@ -25,18 +23,16 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording.channels import topic_fields
+from rigtwin.recording.columns import decode_columns
 from rigtwin.recording.records import Lost, Messages, read_records, unseal
 from rigtwin.recording.schema import (
     END_RECORD,
-    FIELD,
     LATENESS_RECORD,
     RECORD,
     TRANSITION_RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
     list_topics,
-    tags,
 )
 
 if TYPE_CHECKING:
@@ -313,7 +309,7 @@ class Gathered:
                     f"{path}: a message on {channel.topic} has time {max(times)} ns; "
                     "expected ns since the start"
                 )
-            values = _decode(path, channel, self._schemas.get(channel.schema_id), data)
+            values = decode_columns(path, channel, self._schemas.get(channel.schema_id), data)
             stamps = np.array(times, np.int64)
             _look_at_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
@@ -416,106 +412,6 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         printable(name): printable(value) if isinstance(value, str) else value
         for name, value in controller.items()
     }
-
-
-def _decode(
-    path: Path, channel: Channel, schema: Schema | None, data: list[bytes]
-) -> dict[str, Array]:
-    """The columns of a topic: every number in it, those that the channel table names first."""
-    names = topic_fields(channel.topic)
-    if channel.message_encoding == "json":
-        decode: Callable[[bytes], Mapping[str, Any]] = json.loads
-    elif channel.message_encoding == "protobuf":
-        if schema is None:
-            raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
-        present, numbers, decode = _protobuf(path, schema)
-        block = b"".join(data)
-        ours = [
-            *(name for name in names if name in present),
-            *(n for n in present if n not in names),
-        ]
-        if (
-            numbers == list(range(1, len(present) + 1))
-            and len(block) == len(data) * len(present) * FIELD.itemsize
-        ):
-            fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
-            if (fields["tag"] == tags(len(present))).all():
-                return {name: fields["value"][:, present.index(name)].copy() for name in ours}
-    else:
-        raise RigtwinError(
-            f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; "
-            "expected json or protobuf"
-        )
-    rows: list[Mapping[str, Any]] = []
-    for number, item in enumerate(data):
-        try:
-            row = decode(item)
-        except (ValueError, RecursionError, DecodeError):
-            row = None
-        if not isinstance(row, Mapping):
-            raise RigtwinError(
-                f"{path}: message {number} on {channel.topic} cannot be read; "
-                "expected an object of numbers"
-            )
-        rows.append(row)
-    ours = [name for name in names if any(name in row for row in rows)]
-    ours += [name for name in _numbers(rows) if name not in ours]
-    if not ours:
-        raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
-    return {
-        name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows])
-        for name in ours
-    }
-
-
-def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
-    """Fields that hold numbers throughout."""
-    return (
-        [
-            name
-            for name in rows[0]
-            if name.isprintable() and all(isinstance(row.get(name), int | float) for row in rows)
-        ]
-        if rows
-        else []
-    )
-
-
-def _column(path: Path, channel: str, values: list[Any]) -> Array:
-    """Numbers as they came; anything else is refused with its place."""
-    for number, value in enumerate(values):
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            shown = "missing" if value is None else f"{value!r:.40}"
-            raise RigtwinError(
-                f"{path}: {channel} of message {number} is {shown}; expected a number"
-            )
-    try:
-        return np.array(values, np.float64)
-    except OverflowError:
-        raise RigtwinError(f"{path}: {channel} holds a number too large to be read") from None
-
-
-def _protobuf(
-    path: Path, schema: Schema
-) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
-    """Field names and numbers of a message type, and a decoder that takes anything of that type."""
-    try:
-        files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
-        pool = descriptor_pool.DescriptorPool()
-        for file in files.file:
-            pool.Add(file)
-        found = pool.FindMessageTypeByName(schema.name)
-    except (KeyError, TypeError, DecodeError) as error:
-        raise RigtwinError(f"{path}: schema {schema.name!r} cannot be read: {error}") from None
-    names = [item.name for item in found.fields]
-    doubles = all(item.type == item.TYPE_DOUBLE for item in found.fields)
-    kind = message_factory.GetMessageClass(found)
-
-    def decode(item: bytes) -> Mapping[str, Any]:
-        message = kind.FromString(item)
-        return {name: getattr(message, name) for name in names}
-
-    return names, [item.number for item in found.fields] if doubles else [], decode
 
 
 def _look_at_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:

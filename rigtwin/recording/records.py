@@ -141,6 +141,7 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
     records: list[McapRecord | Messages] = []
     at = 0
     seen: dict[int, int] = {}
+    passed, wait = 0, 0
     while at < length:
         opcode, size = _PREFIX.unpack_from(data, at)
         begin = at + _PREFIX.size
@@ -152,12 +153,17 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
             first = begin - _PREFIX.size
             if channel in seen:
                 # A turn is over: as many like it as there are.
-                turns = _take_turns(data, first, first - seen[channel])
+                stride = first - seen[channel]
                 seen.clear()
-                if turns:
-                    records += turns
-                    at = first + len(turns[0].times) * sum(map(_length, turns))
-                    continue
+                passed += 1
+                if passed > wait:
+                    if turns := _take_turns(data, first, stride):
+                        passed, wait = 0, 0
+                        records += turns
+                        at = first + len(turns[0].times) * sum(map(_length, turns))
+                        continue
+                    # Numbers written out are of any length: looked for again, but ever less often.
+                    passed, wait = 0, 2 * wait + 1
             seen[channel] = first
             content = data[begin + _MESSAGE.size : at]
             records.append(Message(channel, logged, content, published, number))
