@@ -15,7 +15,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def compilable(function: Function) -> Function:
     """Marks a plain function of numbers and NamedTuples as usable inside compiled code; returns it
     unchanged."""
-    return register_jitable(function)
+    return register_jitable(error_model="numpy")(function)
 
 
 def compiled(function: Function) -> Function:
@@ -23,8 +23,8 @@ def compiled(function: Function) -> Function:
     array, which Python is slow at. It must call nothing of ours in another file, or what is kept on
     disk would not be made anew when that changes."""
     try:
-        made: Any = numba.njit(cache=True, nogil=True)(function)
+        made: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:
         # Nowhere to keep it.
-        made = numba.njit(nogil=True)(function)
+        made = numba.njit(nogil=True, error_model="numpy")(function)
     return made

@@ -221,8 +221,8 @@ class _Builder:
 @compilable
 def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
     """The formula's value at this tick. operations: of its program; registers: the program's, with
-    the inputs' values written into its first places; memory: what its blocks remember. Both are
-    changed."""
+    the inputs' values written into its first places; memory: what its blocks remember, of a mean or
+    a delay where its ring of samples stands, then the ring. Both are changed."""
     count = len(operations)
     first = len(registers) - count
     value = 0.0
@@ -270,29 +270,25 @@ def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
             value = before + period / (two + period) * (one - before)
             memory[at] = value
         else:
-            value = _remembered(code, one, int(two), memory, at)
+            # A ring of samples, one longer than what is remembered. Not in a function of its own:
+            # to hand on the arrays costs as much as the rest of a tick.
+            length, ring = int(two), at + 1
+            if math.isnan(memory[at]):
+                memory[at] = 0.0
+                for place in range(length + 1):
+                    memory[ring + place] = one
+            place = int(memory[at])
+            memory[ring + place] = one
+            memory[at] = place + 1 if place < length else 0
+            if code == LATE:
+                value = memory[ring + (place + 1 if place < length else 0)]
+            else:
+                value = 0.0
+                for back in range(length):
+                    value += memory[ring + place - back + (0 if place >= back else length + 1)]
+                value /= length
         registers[first + number] = value
     return value
-
-
-@compilable
-def _remembered(code: int, sample: float, length: int, memory: Any, at: int) -> float:
-    """The mean of the last `length` samples, or the one that many ago. memory: where the ring
-    stands, then the ring."""
-    size = length + 1
-    if math.isnan(memory[at]):
-        memory[at] = 0.0
-        memory[at + 1 : at + 1 + size] = sample
-    place, first = int(memory[at]), at + 1
-    memory[first + place] = sample
-    memory[at] = place + 1 if place < length else 0
-    if code == LATE:
-        # The ring is one longer than what it remembers: the next place holds the oldest.
-        return memory[first + (place + 1 if place < length else 0)]
-    total = 0.0
-    for back in range(length):
-        total += memory[first + (place - back if place >= back else place - back + size)]
-    return total / length
 
 
 @compiled

@@ -334,7 +334,8 @@ def integrate_pushed(
                 - (1.0 - share) * viscous
             )
             damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
-            ahead = max(0.5, 1.0 - inertia.mass / damped) if damped > 0.0 else 0.5
+            # Above ½ only there; a division that is not needed delays the step.
+            ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
             total = inertia.mass + ahead * damped
             rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
             forward, backward = dry_limits(dry_friction, v, pushed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -382,24 +383,29 @@ class JointModel:
         which = np.array(
             [names.index(channel) if channel in names else -1 for channel in channels], np.int64
         )
-        recorded = np.column_stack(
-            [
-                np.zeros(self._recording.ticks),
-                *(self._recording.column(*channel) for channel in channels),
-            ]
-        )
-        recorded = np.ascontiguousarray(recorded[:, 1:])
-        if noise is None:
-            noise = np.zeros_like(recorded)
         return Loop(
             closed=True,
             program=program,
             registers=program.registers.copy(),
             memory=control.formula.memory(),
-            recorded=recorded,
-            noise=noise,
+            recorded=self._recorded_inputs,
+            noise=self._no_noise if noise is None else noise,
             sensor=which,
         )
+
+    @cached_property
+    def _recorded_inputs(self) -> Array:
+        """What the controller read, as recorded, shape (ticks, inputs)."""
+        control = self._control
+        assert control is not None
+        found = np.zeros((self._recording.ticks, len(control.formula.inputs)))
+        for number, name in enumerate(control.formula.inputs):
+            found[:, number] = self._recording.column(*control.inputs[name])
+        return found
+
+    @cached_property
+    def _no_noise(self) -> Array:
+        return np.zeros_like(self._recorded_inputs)
 
     def predict_true(self, plant: Plant) -> Array:
         return self._rows(self.move(plant))

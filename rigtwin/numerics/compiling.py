@@ -78,7 +78,7 @@ def kernel(function: Function) -> Function:
 
     No Python objects inside, the interpreter lock released, cached on disk.
     """
-    compiled: Any = numba.njit(nogil=True)(function)
+    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
     if _CACHE is None:
         return cast(Function, compiled)
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
