@@ -344,3 +344,19 @@ def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
     with pytest.raises(rigtwin.RigtwinError, match="unknown study"):
         rigtwin.tune("nonsense", out=tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_setting_that_a_comparison_does_not_use_is_refused_at_its_default_too(tmp_path):
+    """It would be the recording's own, whatever is said; a file may hold all that there are."""
+    own = rigtwin.machine("suspension-rig").configuration.controller.preload
+    settings = {"timing": {"duration": 4.0}, "controller": {"preload": 1.2 * own}}
+    at = tmp_path / "r.mcap"
+    recording = rigtwin.run("suspension-rig", "imposed", path=at, settings=settings)
+    for several in (rigtwin.compare, rigtwin.diagnose):
+        with pytest.raises(rigtwin.RigtwinError, match=r"controller.preload: a comparison changes"):
+            several(recording, settings={"controller": {"preload": own}})
+    file = tmp_path / "all.toml"
+    file.write_text(f"[controller]\npreload = {own}\n[rail]\ncoulomb = 50.0\n")
+    rigtwin.compare(recording, settings=file)
+    kept = rigtwin.diagnose_each([recording.path], tmp_path / "each", settings=file, workers=1)
+    assert not kept[0].error

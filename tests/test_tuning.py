@@ -699,3 +699,16 @@ def test_settings_are_compared_with_those_of_the_study():
     own = study.configuration.controller
     assert study.baseline_settings == own._replace(skyhook=Settings().skyhook)
     assert values_at(study.parameters, np.array([0.5])) == (775.0,)
+
+
+@pytest.mark.parametrize(
+    ("assignments", "numbers", "said"),
+    [
+        ((), {"evaluations": 0}, r"^evaluations = 0: expected"),
+        (("controller.kp=x",), {}, r"^controller.kp = x: expected"),
+        (("controller.nonsense=1",), {}, r"^unknown setting controller.nonsense"),
+    ],
+)
+def test_what_was_said_beside_a_study_is_not_blamed_on_its_file(assignments, numbers, said):
+    with pytest.raises(RigtwinError, match=said):
+        find_study("skyhook", assignments, **numbers)

@@ -75,8 +75,11 @@ def faults(
         For a number or a setting that makes no sense, a mistake in the table, or a missing package.
     """
     require_client()
-    if seed < 0 or not 0 <= each <= MOST or not 0 <= processes <= MOST:
-        raise RigtwinError(f"seed: expected 0 or more; each and processes: 0 to {MOST}")
+    if seed < 0:
+        raise RigtwinError(f"seed {seed}: expected 0 or more")
+    for name, number in {"each": each, "processes": processes}.items():
+        if not 0 <= number <= MOST:
+            raise RigtwinError(f"{name} {number}: expected 0 to {MOST}")
     if each == processes == 0:
         raise RigtwinError("each 0, processes 0: no session to run; expected 1 or more of one")
     channels = load_table(Path(card))

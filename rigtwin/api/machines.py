@@ -132,6 +132,7 @@ def twin_of(
         For any other setting, or an effect that is not there.
     """
     base = with_changes(of.configuration, list(tables_of(settings)))
+    told = set(_told(settings))
     for (key, value, _), (_, described, _) in zip(
         parameters(base), parameters(of.configuration), strict=True
     ):
@@ -139,7 +140,8 @@ def twin_of(
         own = group in of.plant._fields or (
             group == "controller" and of.structure is not Structure.QUARTER_CAR
         )
-        if value != described and not own and (group, name) != ("timing", "timestep"):
+        other = key in told or value != described
+        if other and not own and (group, name) != ("timing", "timestep"):
             raise RigtwinError(
                 f"{key}: a comparison changes the plant and timing.timestep only; "
                 "all other settings are the recording's own"
@@ -147,6 +149,24 @@ def twin_of(
     for name in taken_out:
         base = take_out(base, name)
     return apply_effects(base, effects)
+
+
+class _Written(dict[str, Any]):
+    """Tables of a file, which may hold all settings that there are."""
+
+
+def _told(settings: Settings) -> Iterator[str]:
+    """The settings that are named one by one."""
+    if isinstance(settings, _Written):
+        return
+    if isinstance(settings, Mapping):
+        for group, values in settings.items():
+            yield from (
+                f"{group}.{name}" for name in (values if isinstance(values, Mapping) else ())
+            )
+    elif isinstance(settings, Sequence) and not isinstance(settings, str | bytes):
+        for each in settings:
+            yield from _told(each)  # type: ignore[arg-type]
 
 
 def tables_of(settings: Settings) -> Iterator[Mapping[str, Any]]:
@@ -161,7 +181,7 @@ def tables_of(settings: Settings) -> Iterator[Mapping[str, Any]]:
         For anything but tables and files of them.
     """
     if isinstance(settings, str | Path):
-        yield read_toml(Path(settings), _of_the_plant)
+        yield _Written(read_toml(Path(settings), _of_the_plant))
     elif isinstance(settings, Mapping):
         yield settings
     elif isinstance(settings, Sequence) and not isinstance(settings, bytes):

@@ -70,7 +70,7 @@ def read_study(
     Raises
     ------
     RigtwinError
-        Naming the file, the entry and what was expected.
+        Naming the entry and what was expected, and the file if it is wrong there.
     """
     given: dict[str, dict[str, object]] = {}
     for own in parse_assignments(assignments):
@@ -78,11 +78,13 @@ def read_study(
             given.setdefault(group, {}).update(values)
     other = {key: number for key, number in numbers.items() if number is not None}
 
-    def parse(tables: Mapping[str, Any]) -> Study:
+    def parse(tables: Mapping[str, Any]) -> tuple[Mapping[str, Any], Machine, Study]:
         of = _machine(path, tables) if machine is None else machine
-        return parse_study(path.stem, {**tables, **other}, of, given)
+        return tables, of, parse_study(path.stem, tables, of)
 
-    return read_toml(path, parse)
+    tables, of, own = read_toml(path, parse)
+    # What is wrong from here on is not wrong in the file.
+    return parse_study(path.stem, {**tables, **other}, of, given) if other or given else own
 
 
 def _machine(path: Path, tables: Mapping[str, Any]) -> Machine:
