@@ -18,6 +18,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable, write_whole
 from rigtwin.studies.sweep import Store, open_workers, run_jobs
+from rigtwin.system import return_memory
 
 KEPT, TABLE = "answers.sqlite", "answers.json"
 """In the folder: what is done, and all answers together."""
@@ -63,6 +64,9 @@ def _answer(job: _Job) -> dict[str, Any]:
             ).document()
         except RigtwinError as error:
             return {"error": str(error).replace(str(path), _HERE)}
+        finally:
+            # Or it grows by some MB a recording.
+            return_memory()
     told = json.dumps(finite(found), allow_nan=False)
     return {"answer": told.replace(json.dumps(str(path))[1:-1], _HERE)}
 

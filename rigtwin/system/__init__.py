@@ -31,6 +31,7 @@ raise_signal = _here.raise_signal
 limit_files = _here.limit_files
 lock_memory = _here.lock_memory
 unlock_memory = _here.unlock_memory
+return_memory = _here.return_memory
 raise_priority = _here.raise_priority
 lower_priority = _here.lower_priority
 count_cores = _here.count_cores

@@ -152,6 +152,13 @@ def unlock_memory() -> None:
     _libc().munlockall()
 
 
+def return_memory() -> None:
+    """Gives back what the program has freed, which the C library may keep for itself."""
+    trim = getattr(_libc(), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
 def raise_priority(priority: int) -> Grant:
     """Puts this thread before all others of the computer but those above it. priority: 1 to 99."""
     if not hasattr(os, "sched_setscheduler"):

@@ -171,6 +171,10 @@ def unlock_memory() -> None:
     """Nothing was locked."""
 
 
+def return_memory() -> None:
+    """Nothing: the heap gives back what is free by itself."""
+
+
 def raise_priority(priority: int) -> Grant:  # noqa: ARG001 - one class is all there is
     """Puts this thread before all others: SetPriorityClass, SetThreadPriority; timeBeginPeriod."""
     kernel, timers = _library("kernel32"), _library("winmm")
