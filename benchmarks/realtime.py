@@ -5,6 +5,7 @@ computer itself does to a loop; and how late a loop in real time is here."""
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from pathlib import Path
 from time import perf_counter
@@ -133,7 +134,11 @@ def compute(name: str, folder: Path, paced: bool, seconds: float = SECONDS) -> A
     card, device = open_virtual_card(test, tape)
     timed = _Timed(card, device, Pacer(test.configuration.timing.period) if paced else None)
     # Without a pause the kernel would stop a FIFO loop for 50 ms of each second.
-    record_in_real_time(timed, test, folder / "timed.mcap", lambda: None, guarded=False, fifo=paced)
+    ended = record_in_real_time(
+        timed, test, folder / "timed.mcap", lambda: None, guarded=False, fifo=paced
+    )
+    if ended.cause.name != "completed":
+        sys.exit(f"{name} ended after {ended.ticks} ticks: {ended.cause.reason}")
     return np.array(timed.times[400:])
 
 

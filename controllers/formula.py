@@ -152,6 +152,7 @@ class _Builder:
 
     def __init__(self, inputs: Sequence[str], settings: Mapping[str, float]) -> None:
         self._place = {name: number for number, name in enumerate([*inputs, *settings])}
+        self._settings = settings
         self.numbers: list[float] = []
         self.operations: list[tuple[int, int, int, int, int]] = []
         self.remembered = 0
@@ -188,6 +189,12 @@ class _Builder:
             f"* /, numbers, names, {', '.join(FUNCTIONS)}"
         )
 
+    def _value_of(self, node: ast.expr) -> float | None:
+        """Of a number or a setting; None of anything else."""
+        if isinstance(node, ast.Name):
+            return self._settings.get(node.id)
+        return _number_of(node)
+
     def _call(self, name: str, given: list[ast.expr]) -> int:
         if name not in FUNCTIONS:
             raise ValueError(f"unknown function {name!r}; there are {', '.join(FUNCTIONS)}")
@@ -206,7 +213,7 @@ class _Builder:
                     f"1 to {LONGEST}, not {ast.unparse(last)}"
                 )
             memory = whole + 2
-        numbers = [_number_of(each) for each in given]
+        numbers = [self._value_of(each) for each in given]
         if name == "low_pass" and numbers[1] is not None and not numbers[1] > 0.0:
             raise ValueError(f"low_pass: expected a time constant above 0 s, not {numbers[1]:g}")
         if name == "limit" and None not in numbers[1:] and not numbers[1] <= numbers[2]:  # type: ignore[operator]

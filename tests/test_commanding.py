@@ -212,6 +212,24 @@ def test_limits_the_wrong_way_round_are_said(tmp_path: Path) -> None:
         rigtwin.run(machine(tmp_path, LIMITS), step, controller=lqr, settings=wrong)
 
 
+FILTERED = """
+[controller]
+output = "force"
+formula = "low_pass(reference - place, tau)"
+[controller.settings]
+tau = 0.01
+"""
+
+
+def test_a_setting_that_a_filter_cannot_work_with_is_said(tmp_path: Path) -> None:
+    of = machine(tmp_path, FILTERED)
+    wrong = {"controller": {"tau": -0.01}}
+    with pytest.raises(rigtwin.RigtwinError, match="of force: low_pass: expected a time constant"):
+        rigtwin.run(of, "step", settings=wrong)
+    with pytest.raises(rigtwin.RigtwinError, match="low_pass: expected a time constant"):
+        machine(tmp_path, FILTERED.replace("tau = 0.01", "tau = 0.0"))
+
+
 def test_limits_go_to_other_processes(tmp_path: Path) -> None:
     safety = machine(tmp_path, LIMITS).configuration.safety
     assert pickle.loads(pickle.dumps(safety)) == safety

@@ -110,6 +110,19 @@ def test_a_mistake_is_said(text, said):
         formula(text, {})
 
 
+@pytest.mark.parametrize(
+    ("text", "settings", "said"),
+    [
+        ("low_pass(x, tau)", {"tau": -0.1}, "a time constant above 0 s, not -0.1"),
+        ("limit(x, low, high)", {"low": 1.0, "high": -1.0}, "not 1 and -1"),
+        ("limit(x, low, 2)", {"low": 3.0}, "not 3 and 2"),
+    ],
+)
+def test_what_settings_make_of_a_block_is_looked_at_too(text, settings, said):
+    with pytest.raises(ValueError, match=said):
+        formula(text, settings)
+
+
 def test_a_formula_without_inputs_is_constant():
     """The signal that says how many ticks there are is none of its numbers."""
     assert formula("0.5 * 2 - 3", {}).replayed({}, [TIME], PERIOD).tolist() == [-2.0] * TICKS

@@ -27,7 +27,7 @@ from controllers import (
     unpacked,
     update,
 )
-from controllers.formula import Formula
+from controllers.formula import Formula, Program, formula
 from rigtwin.description.settings import Nothing, settings_of
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -110,6 +110,26 @@ class FormulaControl:
     @property
     def outputs(self) -> tuple[str, ...]:
         return (self.output,)
+
+    def program(self, settings: Mapping[str, float]) -> Program:
+        """The formula as it runs with some values of its settings.
+
+        Parameters
+        ----------
+        settings
+            Name → value.
+
+        Raises
+        ------
+        RigtwinError
+            If a block cannot work with them, such as a low-pass filter with a negative time.
+        """
+        try:
+            own = self.formula.settings
+            formula(self.formula.text, {name: settings.get(name, own[name]) for name in own})
+        except ValueError as error:
+            raise RigtwinError(f"controller of {self.output}: {error}") from None
+        return self.formula.with_settings(settings)
 
     def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
         return self.formula.replayed(settings._asdict(), inputs, period)[None]

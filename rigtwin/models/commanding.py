@@ -126,7 +126,7 @@ def command_by_formula(
     period
         s, of a tick.
     """
-    program = control.formula.with_settings(settings)
+    program = control.program(settings)
     operations = np.ascontiguousarray(program.operations)
     registers, memory = program.registers.copy(), control.formula.memory()
     # Compiled before it is needed: a tick has no time for that.

@@ -104,7 +104,6 @@ class JointModel:
         )
         self.every = every
         self._configuration = configuration
-        self._settings = dict(configuration.controller._asdict())
         self._period = recording.period
         self.rows: tuple[Row, ...] = replay.rows
         self._mover = machine.components[replay.moved_by[0]]
@@ -125,7 +124,9 @@ class JointModel:
         elif not closed:
             self._command = recording.column(topic, name)
         self._inputs = {}
+        self._program = NO_COMMAND.program
         if control is not None:
+            self._program = control.program(configuration.controller._asdict())
             self._inputs = {name: channel for name, channel in control.inputs.items()}
             for channel in self._inputs.values():
                 recording.column(*channel)
@@ -366,8 +367,8 @@ class JointModel:
 
     def _loop(self, noise: Array | None) -> Loop:
         control = self._control
+        program = self._program
         if control is None:
-            program = NO_COMMAND.program
             return Loop(
                 closed=False,
                 program=program,
@@ -377,7 +378,6 @@ class JointModel:
                 noise=np.zeros((1, 1)),
                 sensor=np.zeros(0, np.int64),
             )
-        program = control.formula.with_settings(self._settings)
         names = [self._machine.components[name].channel for name in self._sensors]
         channels = [control.inputs[name] for name in control.formula.inputs]
         which = np.array(
