@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import welch
 
-from rigtwin.signals.noise import band, estimate_motion, remove_mains, rms, spectrum, white_noise
+from rigtwin.signals.noise import band, estimate_motion, remove_mains, rms, white_noise
 
 TIME = np.arange(20_000) * 1e-3
 
@@ -61,12 +60,3 @@ def test_motion_trusts_the_model_where_it_is_right_and_the_data_where_it_is_not(
     assert rms(wrong.position - truth) < 1.5e-5
     actual = np.std(np.gradient(wrong.position - truth, 1e-3)[1000:-1000])
     assert 0.5 < wrong.velocity_error / actual < 4.0
-
-
-@pytest.mark.parametrize("count", [1, 2, 777, 4096, 4097, 20_000])
-def test_the_spectrum_is_welch_s(count: int) -> None:
-    signal = 3.0 + noise(1.0)[:count]
-    length = min(4096, count)
-    theirs = welch(signal, 1e3, nperseg=length, noverlap=length // 2, detrend=False)  # type: ignore[arg-type]
-    for own, other in zip(spectrum(signal, 1e-3), theirs, strict=True):
-        assert own == pytest.approx(other, rel=1e-9, abs=1e-15)

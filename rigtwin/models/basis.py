@@ -13,7 +13,6 @@ import numpy as np
 
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import kernel
 
 WAVES = (0.005, 0.008, 0.012, 0.018, 0.028)
 """m; wave lengths of the rail's friction along the way."""
@@ -61,17 +60,12 @@ def low_pass(signal: Array, time_constant: float, period: float) -> Array:
     array
         Shape (ticks,).
     """
-    out = np.empty(len(signal))
-    _low_pass(np.ascontiguousarray(signal, np.float64), period / (time_constant + period), out)
-    return out
+    share = period / (time_constant + period)
+    start = [(1.0 - share) * signal[0]]
+    from scipy.signal import lfilter  # Late: it takes a second.
 
-
-@kernel
-def _low_pass(signal: Array, share: float, out: Array) -> None:
-    held = signal[0]
-    for tick in range(len(signal)):
-        held += share * (signal[tick] - held)
-        out[tick] = held
+    out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=start)
+    return np.asarray(out)
 
 
 def _past(signal: Array, seconds: Sequence[float], period: float) -> NamedSignals:

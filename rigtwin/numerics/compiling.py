@@ -76,7 +76,8 @@ integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
 def kernel(function: Function) -> Function:
     """Compiles a function for speed.
 
-    No Python objects inside, the interpreter lock released, cached on disk.
+    No Python objects inside, the interpreter lock released, cached on disk. A division by zero
+    gives what it gives in numpy, not an exception.
     """
     compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
     if _CACHE is None:

@@ -93,7 +93,7 @@ def remove_mains(signal: Array, period: float, frequency: float) -> Array:
     def power(candidate: float) -> float:
         return -abs(np.sum(window * centred * np.exp(-2j * math.pi * candidate * time)))
 
-    from scipy.optimize import minimize_scalar  # Late: so is scipy.ndimage below.
+    from scipy.optimize import minimize_scalar  # Late: so are scipy.signal and scipy.ndimage below.
 
     found = minimize_scalar(
         power,
@@ -116,16 +116,10 @@ def _remove_line(
 
 def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
     """One-sided power spectral density, mean included: frequencies in Hz, density in unit²/Hz."""
-    # As scipy.signal.welch, whose package takes as long to load as a tenth of a diagnosis.
-    length = min(4096, len(signal))
-    window = np.hanning(length + 1)[:-1] if length > 1 else np.ones(1)
-    parts = np.lib.stride_tricks.sliding_window_view(signal, length)[:: max(length // 2, 1)]
-    density = np.mean(np.abs(np.fft.rfft(window * parts, axis=1)) ** 2, axis=0)
-    density *= 2.0 * period / np.sum(window**2)
-    density[0] *= 0.5
-    if length % 2 == 0:
-        density[-1] *= 0.5
-    return np.fft.rfftfreq(length, period), density
+    # Loading it takes half a second, which most commands need not wait for.
+    from scipy.signal import welch
+
+    return welch(signal, 1.0 / period, nperseg=min(4096, len(signal)), detrend=False)  # type: ignore[arg-type]
 
 
 def band(signal: Array, period: float) -> tuple[float, float]:
