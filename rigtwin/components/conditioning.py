@@ -17,7 +17,7 @@ from rigtwin.components.actuators import ForceActuator, PositionActuator
 from rigtwin.components.computer import Computer
 from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.effect import Context, Guess, Kind, Starts, at_limits, fixed_starts
-from rigtwin.components.guide import late_starts
+from rigtwin.components.guide import late_or_early_starts, late_starts
 from rigtwin.components.motor import Motor
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.sensors import (
@@ -32,6 +32,8 @@ from rigtwin.components.servo import PUSHERS, Pusher, Servo
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring
+
+ACTS_LATE = "the force acts later than it is recorded, as that of an actuator behind its command"
 
 
 class Actuator(NamedTuple):
@@ -239,7 +241,9 @@ KINDS = (
         ("lag",),
         "a first-order lag more",
         _each(fixed_starts((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4), *RIG)
-        | _each(late_starts, *DESCRIBED),
+        | _each(late_starts, *DESCRIBED)
+        | {ForceSensor: late_or_early_starts},
+        ACTS_LATE,
     ),
     Kind(
         "delay",
@@ -247,7 +251,9 @@ KINDS = (
         ("delay",),
         "a delay more",
         _each(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG, Computer)
-        | _each(late_starts, *DESCRIBED),
+        | _each(late_starts, *DESCRIBED)
+        | {ForceSensor: late_or_early_starts},
+        ACTS_LATE,
     ),
     Kind(
         "saturation",

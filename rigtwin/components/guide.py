@@ -291,6 +291,13 @@ def late_starts(at: Context) -> Starts:
     return Starts.single(sorted(times), min(0.001 * scales.time, 0.25 * scales.period))
 
 
+def late_or_early_starts(at: Context) -> Starts:
+    """The same, and their negatives: a force that acts later than it is recorded."""
+    late = late_starts(at)
+    times = [time for (time,) in late.values]
+    return Starts.single([*(-time for time in times[:3]), *times], late.steps[0])
+
+
 def _drag(at: Context) -> Starts:
     unit, there = at.scales.force / at.scales.speed**2, at.nominal
     values = [there + share * unit for share in (0.02, 0.05, 0.15, 0.4)]

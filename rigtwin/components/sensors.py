@@ -78,13 +78,17 @@ class VelocitySensor(NamedTuple):
 
 
 class ForceSensor(NamedTuple):
-    """Force that moves the joint, positive where it moves it on, as the recording has it."""
+    """Force that moves the joint, positive where it moves it on, as the recording has it.
+
+    A negative lag or delay means that the force acts later than it is recorded: what is recorded is
+    the command of an actuator, which follows it late.
+    """
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("N", -1e7, 1e7, "0: calibrated")] = 0.0
     drift: Annotated[float, Quantity("N/s", -1e7, 1e7, NONE)] = 0.0
-    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
-    delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    lag: Annotated[float, Quantity("s", -1.0, 10.0, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", -1.0, 10.0, NONE)] = 0.0
     white: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
     hum: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
     resolution: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
@@ -132,8 +136,10 @@ def transducer(sensor: Sensor, period: float) -> Transducer:
     drift = sensor.drift * period
     own = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
     neutral = own == (1.0, 0.0, 0.0, 0.0, 0.0)
-    share = 1.0 if sensor.lag == 0.0 else 1.0 - math.exp(-period / sensor.lag)
-    return Transducer(neutral, sensor.gain, sensor.offset, drift, sensor.delay / period, share)
+    # A sensor that runs tick by tick cannot know what comes: see `apply_sensor` for a lead.
+    lag, delay = max(sensor.lag, 0.0), max(sensor.delay, 0.0)
+    share = 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
+    return Transducer(neutral, sensor.gain, sensor.offset, drift, delay / period, share)
 
 
 def start_transducer(sensor: Transducer) -> TransducerState:
@@ -174,27 +180,30 @@ def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
     model, out = transducer(sensor, period), np.empty(len(true))
     if model.neutral:
         return true.copy()
-    _transduce_all(model, start_transducer(model), np.ascontiguousarray(true), out)
+    ahead = _lead(-min(sensor.lag, 0.0), -min(sensor.delay, 0.0), true, period)
+    _transduce_all(model, start_transducer(model), np.ascontiguousarray(ahead), out)
     return out
+
+
+def _lead(lag: float, delay: float, signal: Array, period: float) -> Array:
+    """Undo a lag, s, and a delay, s, of a signal, shape (ticks,).
+
+    The lag's inverse is limited to 80 Hz, or it would make much of the noise.
+    """
+    ahead = signal
+    if lag > 0.0 and len(signal) > PADDED:
+        # Loading it takes a second, which most runs need not wait for.
+        from scipy.signal import butter, sosfiltfilt
+
+        low_pass = butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos")
+        ahead = signal + lag * np.gradient(sosfiltfilt(low_pass, signal), period)
+    if delay > 0.0:
+        ticks = np.arange(len(signal))
+        ahead = np.interp(ticks + delay / period, ticks, ahead)
+    return ahead
 
 
 def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
     """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay
-    undone, not its offset.
-
-    The lag's inverse is limited to 80 Hz, or it would make much of the noise.
-    """
-    lagged = signal
-    if sensor.lag > 0.0 and len(signal) > PADDED:
-        # Loading it takes a second, which most runs need not wait for.
-        from scipy.signal import butter, sosfiltfilt
-
-        smooth = sosfiltfilt(
-            butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos"), signal
-        )
-        lagged = signal + sensor.lag * np.gradient(smooth, period)
-    ticks = np.arange(len(signal))
-    early = (
-        np.interp(ticks + sensor.delay / period, ticks, lagged) if sensor.delay > 0.0 else lagged
-    )
-    return early / sensor.gain
+    undone, not its offset."""
+    return _lead(max(sensor.lag, 0.0), max(sensor.delay, 0.0), signal, period) / sensor.gain

@@ -19,13 +19,12 @@ from rigtwin.description.machine import Machine, Structure
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.overlooked import overlooked
+from rigtwin.description.prior import PRIORS
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments", "limits")
-NOMINAL = ("known", "rough")
-"""How well the nominal values are known."""
 
 
 def load(path: Path) -> Machine:
@@ -74,8 +73,8 @@ class _Reader:
         elif "name" in about and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             note("[machine] name", f"{name!r}: expected letters, digits, - and _")
         nominal = about.get("nominal", "rough")
-        if nominal not in NOMINAL:
-            note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(NOMINAL)}")
+        if nominal not in PRIORS:
+            note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(PRIORS)}")
         form = (
             self._mistakes.number("[machine] form", about["form"], 1e-6, 0.5)
             if "form" in about
@@ -121,7 +120,7 @@ class _Reader:
             tolerances=tuple(components.tolerances),
             replays=replays,
             control=control,
-            rough=nominal == "rough",
+            prior=PRIORS[nominal],
             form=form,
             sources=components.sources,
             told=components.told,

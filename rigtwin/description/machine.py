@@ -16,6 +16,7 @@ from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
 from rigtwin.description.model_checks import list_files
+from rigtwin.description.prior import ModelPrior
 from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
@@ -126,7 +127,7 @@ class Machine:
     """The whole description.
 
     plant: a NamedTuple of components with their nominal values; structure: what they make up;
-    rough: whether nominal values are only a start; form: share of a signal that no model is held
+    prior: belief in the nominal values; form: share of a signal that no model is held
     to, None for the usual one; told: `component.parameter` → setting of the recording's controller
     that says its value; experiments: Python module that has them, or tables of the description;
     limits: settings of what ends a test, a NamedTuple;
@@ -144,7 +145,7 @@ class Machine:
     tolerances: tuple[Tolerance, ...]
     replays: tuple[ReplayOf, ...]
     control: Control | None
-    rough: bool
+    prior: ModelPrior
     form: float | None
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
     told: Mapping[str, str] = field(default_factory=dict, repr=False)

@@ -14,7 +14,7 @@ from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 
-TICKS_LATE = 0.5
+TICKS_LATE, TICKS_LATE_TO_COMMAND = 0.5, 0.1
 """Ticks by which a sample may be early or late."""
 
 
@@ -238,23 +238,18 @@ class Replays:
         return None
 
     def tolerate_timing(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Nobody knows to less than half a tick when a sample was taken; expressed in ticks, since
-        the period is the recording's."""
+        """Declare how well the time of a sample is known, in ticks of the recording.
+
+        Forces that are compared with those that a measured motion takes may be held or averaged
+        over a tick. What answers to a command is late against that command, so that one tolerance
+        for each sensor is enough.
+        """
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
             # Of joints that move together only what is observed is timed: against all of them.
             structure = self.structure(replays)
-            alone = () if structure is Structure.MOVED else replay.moved_by[:1]
-            if structure is Structure.COUPLED:
-                types = self._components.types
-                alone = tuple(n for n in replay.moved_by if types[n] in MOVING)
-            names = [
-                *alone,
-                *(row.name for row in replay.rows if row.kind != "command"),
-            ]
-            for name in names:
+            width = TICKS_LATE if structure is Structure.MOVED else TICKS_LATE_TO_COMMAND
+            for name in (row.name for row in replay.rows if row.kind != "command"):
                 # What is in one loop with the controller was sampled with it.
                 if (name, "delay") not in declared and not replay.closed:
-                    self._components.tolerances.append(
-                        Tolerance(name, "delay", TICKS_LATE, ticks=True)
-                    )
+                    self._components.tolerances.append(Tolerance(name, "delay", width, ticks=True))

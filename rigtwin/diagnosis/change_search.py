@@ -132,7 +132,7 @@ class ChangeSearch:
                 candidates.append(number)
         changed: list[int] = []
         left = self._left(self._plants)
-        while len(changed) < self.thresholds.rough.most:
+        while len(changed) < self.thresholds.changes:
             tests = self._test([n for n in candidates if n not in changed], own)
             # One model for all that leaves a gap may be so far off each that no test there is sure.
             if (changed or self._settled) and not any(self._is_sure(each) for each in tests):
@@ -196,11 +196,11 @@ class ChangeSearch:
         return self._equations.estimate(None, common, own).left
 
     def _matters(self, each: _Tested) -> bool:
-        """Whether a change of a rough model's parameter lessens the error enough."""
-        if not self.machine.rough:
+        """Whether a change lessens the error enough, where more than noise is left."""
+        if self._settled:
             return True
         gain = 0.5 * float(np.log(each.without / max(each.estimate.left, 1e-300)))
-        return gain >= self.thresholds.selection.needed
+        return gain >= self.thresholds.changed_share
 
     def _is_sure(self, each: _Tested) -> bool:
         """Whether a parameter is not the same, and that is no trifle beside a model's error."""
@@ -211,7 +211,7 @@ class ChangeSearch:
         if each is best:
             return False
         share = each.left / max(best.left, 1e-300)
-        alike = self.thresholds.selection.alike if self.machine.rough else 0.0
+        alike = 0.0 if self._settled else self.thresholds.changed_share
         pieces = float(self._equations.pieces.sum())
         return 0.5 * np.log(share) <= alike or (share - 1.0) * pieces <= self.thresholds.instead
 

@@ -8,7 +8,6 @@ from itertools import permutations
 
 import numpy as np
 
-from rigtwin.components import PUSHERS
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
@@ -51,21 +50,15 @@ UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
 """SI unit → (how many of another make one, its name)."""
 
 
-@dataclass(frozen=True)
-class SimilarityLimits:
-    """How surely a signal goes with its prediction. sign: correlation below whose negative the sign
-    is wrong; unit: above which a scale is judged; far: scale, either way, that is no gain whatever
-    it is; close: how near a scale must be to a unit's."""
-
-    sign: float
-    unit: float
-    far: float
-    close: float
-
-
-KNOWN = SimilarityLimits(sign=0.7, unit=0.7, far=5.0, close=0.5)
-ROUGH = SimilarityLimits(sign=0.8, unit=0.8, far=np.inf, close=0.15)
-"""Of a machine whose nominal values are only a start."""
+CORRELATED = 0.75
+"""Correlation of a signal with its prediction from which its sign and its unit are judged."""
+SAME_UNIT, NEAR_UNIT = 0.15, 0.5
+"""Differences of the logarithms of a scale and of a unit's factor: below the first the unit is
+wrong, below the second a scale that is implausible anyway is said to look like that unit."""
+CONSTANT_FORCE = 0.01
+"""Swing of a predicted force, as a share of its mean, below which its mean says its scale."""
+EXCHANGED = 0.5
+"""Share of the signals that their best order may leave for an exchange to be believed."""
 
 
 @dataclass(frozen=True)
@@ -216,11 +209,7 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
             continue
         first, length = longest_run(signal, np.ones(len(signal), bool))
         if length == len(signal):
-            # A constant force is a test: what it acts on may be let go.
-            pushes = isinstance(getattr(machine.plant, name), PUSHERS)
-            if name not in still and (
-                component.element == "sensor" or (machine.rough and not pushes)
-            ):
+            if name not in still and component.element == "sensor":
                 yield Fault(
                     "dead",
                     where,
@@ -279,7 +268,7 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
             for n, row in enumerate(machine.rows)
             if row.unit == unit and row.kind != "command"
         ]
-        if machine.rough or not 1 < len(rows) <= MOST_SWAPPED:
+        if not 1 < len(rows) <= MOST_SWAPPED:
             continue
         names = [row.name for _, row in rows]
         left = {}
@@ -297,7 +286,9 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
 
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
-        if least < total(tuple(names)) / 3:
+        swings = [np.std(recording.column(*row.channel)) for _, row in rows]
+        size = float(np.linalg.norm(swings))
+        if least < min(total(tuple(names)) / 3, EXCHANGED * size):
             # Orders that fit about as well differ in what these data cannot tell; the fewest swaps
             # are the likeliest.
             likely = [order for order in orders if total(order) < 1.5 * least]
@@ -314,31 +305,32 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
 
 def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Signs and units, by how a signal goes with what the nominal machine would show."""
-    rule = ROUGH if machine.rough else KNOWN
+    far = machine.prior.implausible_scale
     odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
         signal, where = recording.column(*row.channel), ".".join(row.channel)
-        # Motions have a zero that may be displaced; a known force has its preload, which says its
-        # scale even at rest.
-        whole = row.kind == "force" and not machine.rough
-        a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
+        # The zero of a sensor may be displaced, so the means are left out, unless they are all
+        # that is there: a force at rest is its preload.
+        a, b = signal - signal.mean(), model - model.mean()
+        if row.kind == "force" and rms(b) < CONSTANT_FORCE * abs(float(model.mean())):
+            a, b = signal, model
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
         alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))
-        if alike < -rule.sign:
+        if alike < -CORRELATED:
             yield Fault(
                 "sign", where, f"{where} has the wrong sign: it goes against what is predicted"
             )
-        elif alike > rule.unit:
+        elif alike > CORRELATED:
             near = any(
-                abs(np.log(factor / slope)) < rule.close for factor, _ in UNITS.get(row.unit, ())
+                abs(np.log(factor / slope)) < SAME_UNIT for factor, _ in UNITS.get(row.unit, ())
             )
-            if not 1 / rule.far < slope < rule.far or (machine.rough and near):
+            if not 1 / far < slope < far or near:
                 odd[row] = slope
     for row, slope in _unexplained_scales(machine, recording, odd).items():
         known = UNITS.get(row.unit, ((1.0, ""),))
         factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
-        as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < KNOWN.close and guess else ""
+        as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < NEAR_UNIT and guess else ""
         where = ".".join(row.channel)
         yield Fault(
             "unit",

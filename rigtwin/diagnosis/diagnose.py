@@ -17,11 +17,11 @@ from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.description.parts import parts
-from rigtwin.diagnosis.attribute import Attribution, attribute, prefer_held_out
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.explain import Explanation, explain
 from rigtwin.diagnosis.finding import (
     Answer,
     Finding,
@@ -31,6 +31,7 @@ from rigtwin.diagnosis.finding import (
     Verdict,
 )
 from rigtwin.diagnosis.findings import (
+    choose_named,
     describe_attributed,
     describe_controller,
     describe_sensor,
@@ -38,6 +39,7 @@ from rigtwin.diagnosis.findings import (
     find_nearest,
     find_traces,
     list_unobservable,
+    supports,
 )
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit
@@ -172,46 +174,29 @@ def _diagnose(
     thresholds: Thresholds,
     started: float,
 ) -> Diagnosis:
-    def fitted(steps: int) -> None:
-        progress("fitting effects", steps)
-
-    found = attribute(evidence, fitted, thresholds, first_look)
-    if held_out is not None:
-        found = prefer_held_out(found, evidence, held_out, thresholds)
-    best = found.best.fit if found.best is not None else _nothing(found, evidence)
-    stops = [
-        *find_stops(evidence.machine, evidence.recordings),
-        *find_cut_commands(evidence.machine, evidence.recordings),
-    ]
-    notes = [*_notes(evidence.recordings), *_clipping_notes(evidence), *stops]
+    found = explain(
+        evidence, lambda steps: progress("fitting effects", steps), thresholds, first_look
+    )
+    support = supports(found, evidence, thresholds)
+    named = choose_named(found, support, thresholds)
     progress("judging on held-out data", 1)
-    validation = validate(evidence, best, held_out, thresholds)
-    if validation.fit is not None:
-        best = validation.fit
+    validation = validate(evidence, found.fit, named, found.posterior, held_out, thresholds)
+    kept = validation.kept
+    left = _leaves_something(found, kept)
+    notes = [*_notes(evidence.recordings), *_clipping_notes(evidence)]
+    notes += find_stops(evidence.machine, evidence.recordings)
+    notes += find_cut_commands(evidence.machine, evidence.recordings)
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
-    if validation.idle:
-        names = " and ".join(effect.name for effect in validation.idle)
-        notes.append(f"{names} not named: it closes nothing of the gap on held-out data")
-    plant = with_effects(evidence.plant, best, validation.kept)
+    if kept and left and validation.held_out.value < thresholds.removes:
+        names = " and ".join(effect.name for effect in kept)
+        closed = f"{100 * validation.held_out.value:.0f} %"
+        notes.append(f"{names} not named: it closes {closed} of the gap on held-out data")
+        kept = ()
+    plant = with_effects(evidence.plant, found.fit, kept)
     progress("looking where", 1)
-    disturbed = locate_disturbance(evidence, plant, validation.kept, follow=found.unknown)
-    most = (1.0 + thresholds.unexplained) * found.expected
-    something = (
-        found.unknown
-        # What was taken for a gap by chance, and is rejected, leaves none.
-        or (bool(validation.rejected) and found.nothing.misfit > most)
-        or disturbed[0].gained > thresholds.something * found.expected
-    )
-    if something and (instead := _find_instead(evidence, validation.kept, most)):
-        names = " and ".join(effect.name for effect in validation.kept)
-        notes.append(
-            f"{names} not named: something without a name at {instead[0].component} explains "
-            "these data without it"
-        )
-        best, plant, disturbed = _nothing(found, evidence), evidence.plant, instead
-        validation = validate(evidence, best, held_out, thresholds)
+    disturbed = locate_disturbance(evidence, plant, kept) if left else ()
     deviations = _deviations(evidence)
     slight = [
         each
@@ -223,8 +208,7 @@ def _diagnose(
     sampled = find_outstanding(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )
-    attributed = describe_attributed(found, validation, evidence, thresholds)
-    traces = find_traces(found, evidence, thresholds)
+    attributed = describe_attributed(found, kept, support, evidence, thresholds)
     effects = [
         *attributed,
         *(describe_sensor(each, evidence, thresholds.sure) for each in sampled),
@@ -235,12 +219,14 @@ def _diagnose(
         ),
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
+    rest = left or odd_controller
+    closes = not kept or validation.held_out.value >= thresholds.explained
     verdict: Verdict
     if effects:
-        verdict = "partly explained" if something or odd_controller else "explained"
+        verdict = "explained" if closes and not rest else "partly explained"
     else:
-        verdict = "unknown" if something or odd_controller else "no gap"
-    where = _places(evidence, found, plant, validation.kept, disturbed if something else (), best)
+        verdict = "unknown" if rest else "no gap"
+    where = _places(evidence, attributed, plant, kept, disturbed, found.fit)
     if odd_controller:
         where.append(
             Place(
@@ -254,9 +240,8 @@ def _diagnose(
     progress("replaying components", 1)
     gap = _gap(evidence, plant, validation, sampled)
     progress("choosing the next test", 1)
-    suggestion = _next_test(evidence.machine, found, effects, validation.kept, tests, thresholds)
+    suggestion = _next_test(evidence.machine, found, effects, kept, tests, thresholds)
     corrected = _correct(evidence.configurations[0], plant, sampled)
-    rough = evidence.machine.rough
     gone = verdict == "no gap"
     answer = Answer(
         verdict=verdict,
@@ -264,22 +249,18 @@ def _diagnose(
         effects=tuple(effects),
         where=tuple(where),
         gap=gap,
-        ranking=tuple(
-            (" + ".join(each.names) or "none", each.probability) for each in found.ranking[:8]
-        ),
+        ranking=tuple((each.scored.fit.name, each.weight) for each in found.posterior.ranking[:8]),
         next_test=suggestion,
         not_observable=list_unobservable(found, attributed),
         notes=tuple(notes),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
-        steps=steps(evidence, () if gone else found.chain, held_out or evidence) if rough else (),
+        steps=steps(evidence, () if gone else found.chain, held_out or evidence),
         units={row.name: row.unit for row in evidence.machine.rows},
-        leftovers=tuple(leftovers(evidence, plant, disturbed, thresholds))
-        if rough and not gone
-        else (),
-        traces=traces,
-        nearest=find_nearest(found) if verdict == "unknown" else None,
+        leftovers=tuple(leftovers(evidence, plant, disturbed, thresholds)) if disturbed else (),
+        traces=() if gone else find_traces(found, kept, evidence, thresholds),
+        nearest=find_nearest(found, evidence) if verdict == "unknown" else None,
         energy=_energy(evidence),
     )
     return Diagnosis(
@@ -287,38 +268,34 @@ def _diagnose(
         evidence.machine,
         evidence,
         corrected,
-        _alternatives(found, validation.kept, thresholds.possible),
+        _alternatives(found, kept, thresholds.possible),
         held_out,
     )
 
 
-def _nothing(found: Attribution, evidence: Evidence) -> Fit:
-    """That nothing is named."""
-    return Fit((), (), found.nothing.misfit, (), evidence.plant)
-
-
-def _find_instead(
-    evidence: Evidence, kept: Sequence[Effect], most: float
-) -> tuple[DisturbanceFit, ...] | None:
-    """What explains a known machine without the effects that would be named beside something else:
-    something at the component of one of them alone, up to a χ² of `most`. Then they only have a
-    part of its form, as an offset has of a drift. None if nothing does."""
-    if not kept or evidence.machine.rough:
-        return None
-    alone = locate_disturbance(evidence, evidence.plant)
-    at_one = alone[0].component in {effect.component for effect in kept}
-    return alone if at_one and alone[0].misfit < most else None
+def _leaves_something(found: Explanation, kept: Sequence[Effect]) -> bool:
+    """Whether more than noise and declared error is left once the kept effects are corrected."""
+    posterior = found.posterior
+    if set(kept) == set(posterior.best.fit.effects):
+        return posterior.unexplained > posterior.price_for_one()
+    known = [each.scored for each in posterior.ranking if set(each.scored.fit.effects) == set(kept)]
+    # What was fitted and is not named leaves what it explained.
+    scored = known[0] if known else posterior.empty
+    left = posterior.loss(scored) - posterior.loss(posterior.best) + posterior.unexplained
+    return left > posterior.price_for_one()
 
 
 def _alternatives(
-    found: Attribution, kept: Sequence[Effect], least: float
+    found: Explanation, kept: Sequence[Effect], least: float
 ) -> tuple[tuple[Fit, float], ...]:
-    """Explanations other than the one that is named, of that probability at least, the
-    likeliest first."""
-    others = [
-        each for each in found.ranking if each.fit.effects and set(each.fit.effects) != set(kept)
-    ]
-    return tuple((each.fit, each.probability) for each in others if each.probability >= least)
+    """Explanations other than the one that is named, of that weight at least, the best first."""
+    return tuple(
+        (each.scored.fit, each.weight)
+        for each in found.posterior.ranking
+        if each.scored.fit.effects
+        and set(each.scored.fit.effects) != set(kept)
+        and each.weight >= least
+    )
 
 
 def _clipping_notes(evidence: Evidence) -> list[str]:
@@ -349,23 +326,25 @@ def _deviations(evidence: Evidence) -> list[Deviation]:
 
 def _places(
     evidence: Evidence,
-    found: Attribution,
+    attributed: Sequence[Finding],
     plant: Plant,
     kept: tuple[Effect, ...],
     disturbed: tuple[DisturbanceFit, ...],
-    best: Fit,
+    fit: Fit,
 ) -> list[Place]:
+    """Where the named effects act, and where the rest lies."""
     places: dict[str, Place] = {}
     own = evidence.predict(plant)
-    for effect in kept:
-        without = with_effects(evidence.plant, best, [other for other in kept if other != effect])
+    for effect, finding in zip(
+        [each for each in fit.effects if each in kept], attributed, strict=True
+    ):
+        without = with_effects(evidence.plant, fit, [other for other in kept if other != effect])
         change: list[Array] = [a - b for a, b in zip(own, evidence.predict(without), strict=True)]
-        share = min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0)
-        place = locate(evidence, effect.component, share, change)
+        place = locate(evidence, effect.component, finding.share, change)
         places[effect.name] = replace(place, evidence=f"{effect.kind.title}: {place.evidence}")
     if disturbed:
         foremost = disturbed[0]
-        share = 1.0 - (found.explained if kept else 0.0)
+        share = max(1.0 - sum(finding.share for finding in attributed), 0.0)
         words = (
             "what is left goes with " + enumerate_words(foremost.forms)
             if foremost.forms
@@ -416,27 +395,22 @@ def _correct(
 
 def _next_test(
     machine: Machine,
-    found: Attribution,
+    found: Explanation,
     effects: Sequence[Finding],
     kept: tuple[Effect, ...],
     tests: Sequence[Experiment],
     thresholds: Thresholds,
 ) -> NextTest | None:
-    if not tests or found.best is None or not kept:
-        return None
+    ranking = found.posterior.ranking
     likely = [
-        each.fit
-        for each in found.ranking
-        if each.fit.effects and each.probability >= thresholds.member
+        each.scored.fit
+        for each in ranking
+        if each.scored.fit.effects and each.weight >= thresholds.member * ranking[0].weight
     ]
-    if (
-        all(
-            effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
-            for effect in effects
-        )
-        or len(likely) < 2
-    ):
-        return None
-    return propose_test(
-        machine, [found.best.fit, *(fit for fit in likely if fit is not found.best.fit)][:4], tests
+    sure = all(
+        effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
+        for effect in effects
     )
+    if not tests or not kept or sure or len(likely) < 2:
+        return None
+    return propose_test(machine, likely[:4], tests)

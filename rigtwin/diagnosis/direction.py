@@ -36,10 +36,10 @@ def runs_backwards(
     Returns
     -------
     bool
-        False also where it cannot be told: of nominal values that are only a start, and of joints
-        that act on each other, whose torques follow from their motion either way.
+        False also where it cannot be told: joints that act on each other and are moved as measured
+        need the same torques either way.
     """
-    if machine.rough or machine.structure is Structure.MOVED:
+    if machine.structure is Structure.MOVED:
         return False
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     forth = _misfits(measured, predicted)

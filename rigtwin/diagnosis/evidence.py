@@ -41,9 +41,11 @@ STARTED = 0.7
 """s, from which a test counts in full: by then the plates have left whatever they started from."""
 UNSEEN = 0.3
 """Share of that which does not count at all."""
-COARSER = 30.0
+COARSER = 4.0
 """How much more variance than rounding the prediction shows is put down to a coarse sensor's
 bits."""
+NOISELESS = 1e-6
+"""Share of a signal's standard deviation that its noise has at least."""
 COARSE_BIT = 2.0
 """Bits of this many times the noise, which they themselves then are, are seen in the signal."""
 JUMPS = ("force", "command")
@@ -54,6 +56,8 @@ COARSE = 4.0
 """How much more variance than a halved step shows is put down to the integration."""
 SEARCHED = 2.5e-3
 """s, between ticks in a search."""
+FINEST = 0.8e-3
+"""s, of an integration step that is short enough for every machine."""
 FEWEST_STEPS = 2
 """Of integration a tick, of a rough model: half of them for a search."""
 STEPPED = 0.05
@@ -121,6 +125,8 @@ def lines(
     noise = np.array([white_noise(row) for row in whole])
     resolution = np.array([smallest_step(row) for row in whole])
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
+    # A signal without visible noise, such as a relay's, is still not known exactly.
+    floor = np.maximum(floor, NOISELESS * np.std(whole, axis=1))
     fade = np.stack(
         [
             (_fade(len(row), recording.period) * counted * ~find_cut_off(row))[:: model.every]
@@ -141,16 +147,17 @@ def lines(
         folded = 1.0 / model.every if limited else 1.0
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * folded * floor[row] ** 2
         if carried is not None:
-            spread[row] += 0.5 * _smooth(
-                np.abs(rfft(fade[row] * carried[row], length)[kept]) ** 2, WIDELY
-            )
-        if machine.rough:
-            # A rough model does not know how what it lacks is spread over the lines.
-            variance = spread[row] + 0.5 * form**2 * float(np.mean(power)) + 1e-300
-        else:
-            variance = spread[row] + 0.5 * form**2 * _smooth(power) + 1e-300
-            # What a signal's swing is held to says nothing of its mean.
-            variance[0] = spread[row, 0] + 1e-300
+            height = SPIKE * float(floor[row]) if machine.rows[row].kind in JUMPS else 0.0
+            spread[row] += _spectrum_of_noise(carried[row], fade[row], length, height)[
+                : int(kept.sum())
+            ]
+        # The declared model error follows the signal's spectrum where the model is known, and is
+        # spread evenly where nobody can say how what the model lacks is distributed.
+        even = machine.prior.even
+        error = 0.5 * form**2 * (even * float(np.mean(power)) + (1.0 - even) * _smooth(power))
+        # The error of a signal's swing says nothing of its mean.
+        error[0] *= even
+        variance = spread[row] + error + 1e-300
         weight[row] = off_mains / np.sqrt(variance)
     if limited:
         # Of white noise only what lies in the band is left, and no bits.
@@ -195,6 +202,17 @@ def _model_with_enough_steps(
             break
         model, predicted, steps = finer, following, 2 * steps
     return model
+
+
+def _spectrum_of_noise(noise: Array, fade: Array, length: int, height: float) -> Array:
+    """Half the power of a draw of noise in each line, averaged widely, as it is one draw.
+
+    height: above which spikes are taken out, as they are of the residual; 0 for none.
+    """
+    if height > 0.0:
+        noise = noise.copy()
+        despike(noise, height)
+    return 0.5 * _smooth(np.abs(rfft(fade * noise, length)) ** 2, WIDELY)
 
 
 def _smooth(power: Array, lines: int = SMOOTHED) -> Array:
@@ -265,9 +283,7 @@ class Evidence:
         self.names = [row.name for row in machine.rows]
         self.plant: Plant = self.configurations[0].plant
         self.models = [
-            _model_with_enough_steps(machine, r, c, steps)
-            if machine.rough
-            else model_of(machine, r, c, steps)
+            _model_with_enough_steps(machine, r, c, max(steps, round(r.period / FINEST)))
             for r, c in zip(recordings, configurations, strict=True)
         ]
         self._transform()
@@ -287,39 +303,50 @@ class Evidence:
                 row -= (row - expected) - remove_mains(
                     row - expected, each.period, self.plant.mains.frequency
                 )
-        if not machine.rough:
-            self._loosen()
+        self._loosen()
         self._round()
-        self.expected = sum(
-            float(np.sum(2.0 * each.spread * each.weight**2)) for each in self.lines
-        )
-        if machine.rough:
-            # What such a model is not held to is no gap either.
-            self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
+        # Noise and the declared model error together are no gap.
+        self.expected = sum(float(2 * np.count_nonzero(each.weight)) for each in self.lines)
 
-    def expected_misfit(self, plant: Plant) -> float:
-        """χ² of noise alone about a plant: what drives the model may carry more noise there.
+    def excess_noise(self, plant: Plant) -> list[Array | None]:
+        """Noise that the motions which drive a model carry at a plant beyond that at the nominal.
+
+        Dry friction reverses where a noisy motion does, so that a plant with friction has more.
 
         Parameters
         ----------
         plant
-            Whose predictions are meant.
+            Plant whose predictions are meant.
 
         Returns
         -------
-        float
-            `expected` at least.
+        list
+            Variance in units of what the weights assume, shape (rows, lines) for each recording;
+            None where nothing noisy drives the model.
         """
-        if not self.machine.rough:
-            return self.expected
-        more = 0.0
-        for recording, model, each, part in zip(
-            self.recordings, self.models, self.lines, self._counted, strict=True
-        ):
-            there = lines(self.machine, recording, model, plant, part)
-            more += float(
-                np.sum(2.0 * np.maximum(there.spread - each.spread, 0.0) * each.weight**2)
+        found: list[Array | None] = []
+        for model, each in zip(self.models, self.lines, strict=True):
+            carried = model.propagated_noise(plant)
+            if carried is None:
+                found.append(None)
+                continue
+            count = len(each.frequency)
+            heights = [
+                SPIKE * float(noise) if row.kind in JUMPS else 0.0
+                for noise, row in zip(each.noise, self.machine.rows, strict=True)
+            ]
+            spread = np.stack(
+                [
+                    _spectrum_of_noise(row, fade, each.length, height)[:count]
+                    for row, fade, height in zip(carried, each.fade, heights, strict=True)
+                ]
             )
+            found.append(np.maximum(spread - each.spread, 0.0) * each.weight**2)
+        return found
+
+    def expected_misfit(self, plant: Plant) -> float:
+        """Chi-square of noise and declared error about a plant; `expected` at least."""
+        more = sum(float(2.0 * e.sum()) for e in self.excess_noise(plant) if e is not None)
         return self.expected + more
 
     def halve_steps(self) -> Evidence:

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
+from rigtwin.diagnosis.support import Support
 from rigtwin.simulation.energy import EnergyError
 
 Verdict = Literal["no gap", "explained", "partly explained", "unknown", "unusable"]
@@ -35,23 +36,48 @@ class Name:
 
 
 @dataclass(frozen=True)
-class Support:
-    """What speaks for an effect of a rough model. margin: by how much the best explanation without
-    it does worse on held-out data, as a difference of the logarithms of the errors, with a price on
-    parameters; steadiness: standard errors by which its magnitude is off nominal; left: error of
-    what is held out, in units of the signals' own."""
+class Rival:
+    """An effect that the data cannot tell from a named one.
 
-    margin: float
-    steadiness: float
-    left: float
+    Parameters
+    ----------
+    name
+        Kind and component.
+    parameters
+        Values that it has in the place of the named effect.
+    probability
+        Weight of all hypotheses with it.
+    """
+
+    name: Name
+    parameters: dict[str, Estimate]
+    probability: float
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One effect. confidence: probability that it is this one; alternatives: the effects that these
-    data cannot tell from it, itself first (`class` in JSON); share: of the gap, what would come
-    back without it; for an effect read off a sensor or the controller alone, of that one's own gap;
-    title: its kind in a sentence; support: of a rough model, what speaks for it."""
+    """An effect that is named.
+
+    Parameters
+    ----------
+    name
+        Kind and component.
+    parameters
+        Values with their intervals.
+    confidence
+        Probability that it is this effect.
+    alternatives
+        Effects that the data cannot tell from it, itself first (`class` in JSON).
+    share
+        Share of the gap that would come back without it. Of an effect that is read off a sensor or
+        the controller alone, share of that one's own gap.
+    title
+        Its kind in a sentence.
+    support
+        What the confidence rests on; None where the effect is read off a signal.
+    rivals
+        The alternatives with the values that they would have.
+    """
 
     name: Name
     parameters: dict[str, Estimate]
@@ -60,6 +86,7 @@ class Finding:
     share: float
     title: str = ""
     support: Support | None = None
+    rivals: tuple[Rival, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -132,13 +159,19 @@ class Unobservable:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The explanation that comes nearest where none is good enough to be named. left: what it
-    leaves, and without it, in units of the noise, or of the signals of a rough model (`of`)."""
+    """The explanation that comes nearest where none is good enough to be named.
+
+    Parameters
+    ----------
+    names
+        Its effects.
+    left, without
+        Residual with and without it, in units of the signals' standard deviation.
+    """
 
     names: tuple[Name, ...]
     left: float
     without: float
-    of: Literal["noise", "signals"]
 
 
 @dataclass(frozen=True)
@@ -222,4 +255,13 @@ def _finding(effect: Finding) -> dict[str, Any]:
         "class": [asdict(name) for name in effect.alternatives],
         "share": effect.share,
         "support": None if effect.support is None else asdict(effect.support),
+        "rivals": [
+            {
+                "component": rival.name.component,
+                "kind": rival.name.kind,
+                "parameters": {name: asdict(value) for name, value in rival.parameters.items()},
+                "probability": rival.probability,
+            }
+            for rival in effect.rivals
+        ],
     }

@@ -3,162 +3,233 @@ from them."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from rigtwin.components import Effect, find, title
-from rigtwin.diagnosis.attribute import Attribution, Explanation
+from rigtwin.components.plant import Plant
+from rigtwin.diagnosis.confidence import support_of
 from rigtwin.diagnosis.controller import Deviation
-from rigtwin.diagnosis.cross_validation import Validation
-from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Unobservable
+from rigtwin.diagnosis.cross_validation import with_effects
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
+from rigtwin.diagnosis.explain import Explanation
+from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, Unobservable
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.sampling import SensorProperty
+from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import tell_apart
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-SHOWN = 0.01
-"""Share of what is left that traces must gain to be mentioned."""
+SHOWN = 1e-3
+"""Weight from which a hypothesis with one more effect makes that effect a trace."""
 
 
-def describe_attributed(
-    found: Attribution, outcome: Validation, evidence: Evidence, thresholds: Thresholds
-) -> list[Finding]:
-    """The effects of the explanation that is named.
-
-    Parameters
-    ----------
-    found
-        What was tried, and the explanation to be named.
-    outcome
-        What data held out of its fit say of it.
-    evidence
-        That it was fitted to.
-    thresholds
-        What figures are held against.
-
-    Returns
-    -------
-    list of Finding
-        Those that stay, none if nothing is named.
-    """
-    if found.best is None:
-        return []
-    fit = outcome.fit or found.best.fit
-    widths = [
-        tuple(
-            # A rough model's error is no noise: how far it leads astray shows between one half of
-            # the data and the other.
-            max(width, abs(one - other) / thresholds.wider) if evidence.machine.rough else width
-            for width, one, other in zip(
-                own, *(half.values[number] for half in outcome.halves), strict=True
-            )
-        )
-        if len(outcome.halves) == 2
-        else own
-        for number, own in enumerate(fit.widths)
-    ]
-    if (selection := found.selection) is not None:
-        widths = [
-            tuple(
-                max(width, half / thresholds.wider)
-                for width, half in zip(own, selection.half_widths(effect), strict=True)
-            )
-            for effect, own in zip(fit.effects, widths, strict=True)
-        ]
-    surest = (
-        thresholds.sure if len(fit.effects) == 1 and not found.unknown else thresholds.less_sure
-    )
-    supports = (
-        {} if selection is None else {effect: selection.support(effect) for effect in fit.effects}
-    )
-
-    def confidence(effect: Effect) -> float:
-        if effect in supports:
-            support = supports[effect]
-            return thresholds.selection.confidence(support.margin, support.left)
-        return min(surest, _probability(found.ranking, effect))
-
-    return [
-        Finding(
-            name=Name(effect.component, effect.kind.name),
-            parameters=estimates(effect, values, spread, evidence, thresholds.wider),
-            confidence=confidence(effect),
-            alternatives=_equivalence_class(found.ranking, found.best, effect, thresholds.member),
-            share=min(max(found.shares.get(effect.name, found.explained), 0.0), 1.0),
-            title=effect.kind.title,
-            support=supports.get(effect),
-        )
-        for effect, values, spread in zip(fit.effects, fit.values, widths, strict=True)
-        if effect in outcome.kept
-    ]
-
-
-def find_traces(
-    found: Attribution, evidence: Evidence, thresholds: Thresholds
-) -> tuple[Finding, ...]:
-    """Of a rough model, the effects that the best explanation of all has beside those that are
-    named: what it gains by them is too little to claim them."""
-    if found.selection is None or found.best is None:
-        return ()
-    chosen, best = found.selection.chosen, found.selection.pool[0]
-    gained = max(1.0 - math.exp(2.0 * (best.score - chosen.score)), 0.0)
-    more = [
-        effect
-        for effect, values in zip(best.fit.effects, best.fit.values, strict=True)
-        if effect not in chosen.fit.effects
-        and values[0] != effect.nominal(evidence.plant)[effect.kind.parameters[0]]
-    ]
-    if gained < SHOWN:
-        return ()
-    return tuple(
-        Finding(
-            Name(effect.component, effect.kind.name),
-            estimates(effect, values, widths, evidence, thresholds.wider),
-            0.0,
-            (Name(effect.component, effect.kind.name),),
-            gained / len(more),
-            effect.kind.title,
-        )
-        for effect, values, widths in zip(
-            best.fit.effects, best.fit.values, best.fit.widths, strict=True
-        )
-        if effect in more
-    )
-
-
-def find_nearest(found: Attribution) -> Nearest | None:
-    """What comes nearest to something that has no name.
+def supports(
+    found: Explanation, evidence: Evidence, thresholds: Thresholds
+) -> dict[Effect, Support]:
+    """What speaks for each effect of the best hypothesis.
 
     Parameters
     ----------
     found
         Everything that was tried.
+    evidence
+        The recordings.
+    thresholds
+        Numbers that it goes by.
+
+    Returns
+    -------
+    dict
+        Effect → its support.
+    """
+    return {
+        effect: support_of(effect, found.posterior, evidence, thresholds)
+        for effect in found.fit.effects
+    }
+
+
+def choose_named(
+    found: Explanation, support: dict[Effect, Support], thresholds: Thresholds
+) -> tuple[Effect, ...]:
+    """Choose the effects of the best hypothesis that are named.
+
+    An effect is named where it, or one that the data cannot tell from it, is more likely there than
+    not. All of its rivals take its place together.
+    """
+    posterior = found.posterior
+    named = []
+    for effect in found.fit.effects:
+        family = sum(posterior.inclusion(each) for each in (effect, *posterior.rivals(effect)))
+        chance = min(family, 1.0) * (1.0 - support[effect].mimic)
+        if chance >= thresholds.nameable:
+            named.append(effect)
+    return tuple(named)
+
+
+def describe_attributed(
+    found: Explanation,
+    kept: Sequence[Effect],
+    support: dict[Effect, Support],
+    evidence: Evidence,
+    thresholds: Thresholds,
+) -> list[Finding]:
+    """Describe the effects that are named.
+
+    Parameters
+    ----------
+    found
+        Everything that was tried.
+    kept
+        Effects that are named.
+    support
+        What speaks for each of them.
+    evidence
+        The recordings.
+    thresholds
+        Numbers that it goes by.
+
+    Returns
+    -------
+    list of Finding
+        In the order of the fit.
+    """
+    posterior, fit = found.posterior, found.fit
+    shares = _shares(fit, kept, evidence, posterior)
+    findings = []
+    for effect, values, widths in zip(fit.effects, fit.values, _widths(found), strict=True):
+        if effect not in kept:
+            continue
+        rivals = posterior.rivals(effect)
+        findings.append(
+            Finding(
+                name=_name(effect),
+                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
+                confidence=min(support[effect].confidence, thresholds.sure),
+                alternatives=tuple(_name(each) for each in (effect, *rivals)),
+                share=shares[effect],
+                title=effect.kind.title,
+                support=support[effect],
+                rivals=tuple(_describe_rival(each, effect, found, evidence) for each in rivals),
+            )
+        )
+    return findings
+
+
+def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence: Evidence) -> Rival:
+    """A rival with the values that it has in the effect's place."""
+    rest = set(found.fit.effects) - {effect}
+    for each in found.posterior.ranking:
+        fit = each.scored.fit
+        if rival in fit.effects and rest <= set(fit.effects):
+            number = fit.effects.index(rival)
+            widths = each.scored.widths[number]
+            values = estimates(rival, fit.values[number], widths, evidence)
+            return Rival(_name(rival), values, found.posterior.inclusion(rival))
+    return Rival(_name(rival), {}, found.posterior.inclusion(rival))
+
+
+def _widths(found: Explanation) -> list[tuple[float, ...]]:
+    """Standard errors, by the cross-validation and by the final fit, whichever is larger."""
+    scored = found.posterior.best.widths
+    return [
+        tuple(max(pair) for pair in zip(one, other, strict=True))
+        for one, other in zip(scored, found.fit.widths, strict=True)
+    ]
+
+
+def _shares(
+    fit: Fit, kept: Sequence[Effect], evidence: Evidence, posterior: Posterior
+) -> dict[Effect, float]:
+    """Share of the gap of each effect: what would come back without it, of what would for all."""
+    explained = min(max(1.0 - (1.0 - posterior.closes(posterior.best)) ** 2, 0.0), 1.0)
+    if len(kept) <= 1:
+        return dict.fromkeys(kept, explained)
+
+    def misfit(effects: Sequence[Effect]) -> float:
+        plant: Plant = with_effects(evidence.plant, fit, effects)
+        return float((evidence.residual(plant) ** 2).sum())
+
+    whole = misfit(kept)
+    lost = [
+        max(misfit([other for other in kept if other != effect]) - whole, 0.0) for effect in kept
+    ]
+    total = max(sum(lost), 1e-9)
+    return {effect: explained * one / total for effect, one in zip(kept, lost, strict=True)}
+
+
+def find_traces(
+    found: Explanation, kept: Sequence[Effect], evidence: Evidence, thresholds: Thresholds
+) -> tuple[Finding, ...]:
+    """Effects that may be there beside those that are named, but are not sure enough to be named.
+
+    Parameters
+    ----------
+    found
+        Everything that was tried.
+    kept
+        Effects that are named.
+    evidence
+        The recordings.
+    thresholds
+        Numbers that it goes by.
+
+    Returns
+    -------
+    tuple of Finding
+        Effects of the likeliest larger hypothesis, none if there is none.
+    """
+    named = set(kept)
+    for each in found.posterior.ranking:
+        scored, effects = each.scored, set(each.scored.fit.effects)
+        if each.weight < SHOWN or not named < effects:
+            continue
+        more = [effect for effect in scored.fit.effects if effect not in named]
+        gained = found.posterior.closes(scored) - found.posterior.closes(found.posterior.best)
+        return tuple(
+            Finding(
+                name=_name(effect),
+                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
+                confidence=found.posterior.inclusion(effect),
+                alternatives=(_name(effect),),
+                share=max(gained, 0.0) / len(more),
+                title=effect.kind.title,
+            )
+            for effect, values, widths in zip(
+                scored.fit.effects, scored.fit.values, scored.widths, strict=True
+            )
+            if effect in more
+        )
+    return ()
+
+
+def find_nearest(found: Explanation, evidence: Evidence) -> Nearest | None:
+    """Find the explanation that comes nearest to something that has no name.
+
+    Parameters
+    ----------
+    found
+        Everything that was tried.
+    evidence
+        The recordings.
 
     Returns
     -------
     Nearest or None
-        The best explanation, with what it leaves; None if none was tried.
+        The best hypothesis with any effect, and what it leaves; None if none was tried.
     """
-    if found.selection is not None:
-        empty = next(each for each in found.selection.pool if not each.fit.effects)
-        tried = [each for each in found.selection.pool if each.fit.effects and not each.bounded]
-        if not tried:
-            return None
-        price = found.selection.price
-        best = min(tried, key=lambda each: each.score + price * each.size)
-        return Nearest(_names(best.fit), math.exp(best.score), math.exp(empty.score), "signals")
-    explained = [each.fit for each in found.ranking if each.fit.effects]
-    if not explained:
+    tried = [each.scored.fit for each in found.posterior.ranking if each.scored.fit.effects]
+    if not tried:
         return None
     left, without = (
-        math.sqrt(fit.misfit / found.expected) for fit in (explained[0], found.nothing)
+        float((relative_errors(evidence, plant) ** 2).mean() ** 0.5)
+        for plant in (tried[0].plant, evidence.plant)
     )
-    return Nearest(_names(explained[0]), left, without, "noise")
+    return Nearest(tuple(_name(effect) for effect in tried[0].effects), left, without)
 
 
-def _names(fit: Fit) -> tuple[Name, ...]:
-    return tuple(Name(effect.component, effect.kind.name) for effect in fit.effects)
+def _name(effect: Effect) -> Name:
+    return Name(effect.component, effect.kind.name)
 
 
 def estimates(
@@ -206,29 +277,6 @@ def estimates(
     }
 
 
-def _probability(ranking: Sequence[Explanation], effect: Effect) -> float:
-    return float(sum(each.probability for each in ranking if effect in each.fit.effects))
-
-
-def _equivalence_class(
-    ranking: Sequence[Explanation], best: Explanation, effect: Effect, least: float
-) -> tuple[Name, ...]:
-    """Effects that stand in this one's place in other likely explanations."""
-    names = [Name(effect.component, effect.kind.name)]
-    rest = [other for other in best.fit.effects if other != effect]
-    for each in ranking:
-        if (
-            each.probability < least
-            or len(each.fit.effects) != len(best.fit.effects)
-            or effect in each.fit.effects
-        ):
-            continue
-        for other in each.fit.effects:
-            if other not in rest and len([e for e in each.fit.effects if e in rest]) == len(rest):
-                names.append(Name(other.component, other.kind.name))
-    return tuple(dict.fromkeys(names))
-
-
 def describe_sensor(each: SensorProperty, evidence: Evidence, sure: float) -> Finding:
     """A property that was read off a sensor's own signal."""
     effect = find(f"{each.kind}@{each.component}", evidence.plant)
@@ -260,9 +308,9 @@ def describe_slight(each: Deviation) -> str:
     )
 
 
-def list_unobservable(found: Attribution, effects: Sequence[Finding]) -> tuple[Unobservable, ...]:
-    """Effects that these data could not show, whatever their size."""
+def list_unobservable(found: Explanation, effects: Sequence[Finding]) -> tuple[Unobservable, ...]:
+    """List the effects that these data could not show, whatever their size."""
     why = "no size tried changes these data by more than their noise"
     named = {(effect.name.component, effect.name.kind) for effect in effects}
-    unseen = [Unobservable(effect.component, effect.kind.name, why) for effect in found.silent]
+    unseen = [Unobservable(each.component, each.kind.name, why) for each in found.unobservable]
     return tuple(each for each in unseen if (each.component, each.kind) not in named)

@@ -16,13 +16,16 @@ Values = tuple[tuple[float, ...], ...]
 @dataclass(frozen=True)
 class Fit:
     """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their
-    prior; widths: standard deviation of each value; plant: with them."""
+    prior; widths: standard deviation of each value; plant: with them; base: the nominal plant that
+    uses its mechanical tolerances by `used` half widths, None where they were not taken."""
 
     effects: tuple[Effect, ...]
     values: Values
     misfit: float
     widths: Values
     plant: Plant = field(repr=False)
+    base: Plant | None = field(default=None, repr=False, compare=False)
+    used: tuple[float, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def name(self) -> str:

@@ -4,7 +4,7 @@ prior beside them."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
@@ -15,14 +15,8 @@ from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
-from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values, without_each
-from rigtwin.diagnosis.gauss_newton import (
-    CLOSELY,
-    DAMPING,
-    ROUGHLY,
-    minimise,
-    take_derivatives,
-)
+from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
+from rigtwin.diagnosis.gauss_newton import DAMPING, minimise, take_derivatives
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -45,6 +39,8 @@ KEPT = 64
 """Responses beside a fit that are kept."""
 SMALL = 0.05
 """Share of the smallest start at which an effect is tried too."""
+MAGNITUDES = (0.25, 0.75)
+"""Places, in the order of their size, of the magnitudes that are tried beside other effects."""
 NOTHING = 1e-3
 """χ² below which an effect does nothing at all."""
 Responses = list[tuple[tuple[float, ...], Array]]
@@ -59,6 +55,19 @@ class Screened:
     effect: Effect
     starts: tuple[tuple[float, tuple[float, ...]], ...]
     promise: float
+
+
+def _thin_starts(starts: Starts) -> list[tuple[float, ...]]:
+    """Few magnitudes of each shape: a response scales with its magnitude more or less."""
+    shapes: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
+    for values in starts.values:
+        shapes.setdefault(values[1:], []).append(values)
+    found = []
+    for values in shapes.values():
+        values.sort(key=lambda each: abs(each[0]))
+        places = {round(share * (len(values) - 1)) for share in MAGNITUDES}
+        found += [values[place] for place in sorted(places)]
+    return found
 
 
 class Fitter:
@@ -258,50 +267,22 @@ class Fitter:
         Returns
         -------
         list of tuples
-            Values, and the response at the nominal plant; beside `first` if the nominal plant is
-            only a start, or if the effect does nothing without `first`, as a play does nothing
-            without friction.
+            Values, and the response beside `first`.
         """
-        rough = self.evidence.machine.rough and bool(first.effects)
-        if not rough and self.largest_response(effect) > NOTHING:
+        if not first.effects:
             return self._responses[effect]
         # A wave along the stroke changes much the same whatever else is there.
-        wave = rough and self.starts(effect).quadrature
+        wave = self.starts(effect).quadrature
         known = (effect, len(first.effects) > 0) if wave else (effect, first.effects, first.values)
         found = self._beside.get(known)
         if found is None:
             found = []
             here = self.residual_at(first)
-            values = (
-                self._starts_at(effect, first.plant).values
-                if rough
-                else [start for start, _ in self._responses[effect]]
-            )
-            for start in values:
+            for start in _thin_starts(self._starts_at(effect, first.plant)):
                 there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
                 found.append((start, (here - there).astype(np.float32)))
             self._beside = {**dict(list(self._beside.items())[-KEPT:]), known: found}
         return found
-
-    def responses_instead(self, effect: Effect, rest: Fit) -> Responses:
-        """What an effect would change in another's place.
-
-        Parameters
-        ----------
-        effect
-            One that was fitted alone before.
-        rest
-            The effects without that other one.
-
-        Returns
-        -------
-        list of tuples
-            Values, and the response at the nominal plant, or beside the rest if the nominal plant
-            is only a start.
-        """
-        if self.evidence.machine.rough:
-            return self.responses_beside(effect, rest)
-        return self._responses[effect]
 
     def residual_at(self, fit: Fit) -> Array:
         """The residual of a fit; that of the last one asked for is kept."""
@@ -357,11 +338,14 @@ class Fitter:
             )
             fit = improve(self.refine(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
+            fit = replace(fit, base=base, used=tuple(used.tolist()))
         return fit
 
     def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the
         misfit has a step, and Gauss-Newton does not climb it."""
+        if fit.misfit <= self.evidence.expected:
+            return fit
         for number, effect in enumerate(fit.effects):
             for place, share in product(range(len(effect.kind.parameters)), SHAKES):
                 own = list(fit.values[number])
@@ -438,41 +422,34 @@ class Fitter:
             Misfit, the other effects and their values, the least misfit first; without those in
             which an effect lacks what it acts through.
         """
-        sizes = [len(effect.kind.parameters) for effect in fit.effects]
-        owner = np.repeat(np.arange(len(sizes)), sizes)
-        steps = np.concatenate([self.starts(effect).steps for effect in fit.effects])
-        here = np.concatenate([np.asarray(values, float) for values in fit.values])
-        low, high = self.bounds(fit.effects)
+        around = _Linearised(self, fit)
+        everything = tuple(range(len(fit.effects)))
+        return around.leave_out_each(everything)
 
-        def split(vector: Array) -> Values:
-            return tuple(tuple(part.tolist()) for part in np.split(vector, np.cumsum(sizes)[:-1]))
+    def eliminate(self, fit: Fit) -> list[tuple[float, tuple[Effect, ...], Values]]:
+        """Leave out one effect after another, each time the one that is missed least, to first
+        order.
 
-        def residual(vector: Array) -> Array:
-            return self.evidence.residual(with_values(self.plant, fit.effects, split(vector)))
+        Parameters
+        ----------
+        fit
+            Of two effects or more.
 
-        left = residual(here)
-        jacobian = take_derivatives(residual, here, left, steps, high)
-        normal, gradient = self.space.normal_equations(jacobian, left)
-        normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
+        Returns
+        -------
+        list of tuples
+            Misfit, the remaining effects and their values, the largest set first.
+        """
+        around, remaining = _Linearised(self, fit), tuple(range(len(fit.effects)))
         found = []
-        for number, (effect, rest, _) in enumerate(without_each(fit)):
-            if not is_possible(rest, self.plant):
-                continue
-            # Of an effect that is not there only the magnitude says so.
-            magnitude = int(np.nonzero(owner == number)[0][0])
-            nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
-            move = np.zeros(len(here))
-            move[magnitude] = (nominal - here[magnitude]) / steps[magnitude]
-            others = owner != number
-            move[others] = -np.linalg.solve(
-                normal[np.ix_(others, others)],
-                gradient[others] + normal[others, magnitude] * move[magnitude],
-            )
-            misfit = self.space.misfit(left + jacobian @ move)
-            moved = split(np.clip(here + move * steps, low, high))
-            values = (*moved[:number], *moved[number + 1 :])
-            found.append((misfit, rest, values))
-        return sorted(found, key=lambda each: each[0])
+        while len(remaining) > 1:
+            fewer = around.leave_out_each(remaining)
+            if not fewer:
+                break
+            found.append(fewer[0])
+            left = set(fewer[0][1])
+            remaining = tuple(n for n in remaining if fit.effects[n] in left)
+        return found
 
     def refine(
         self,
@@ -518,7 +495,7 @@ class Fitter:
             np.concatenate([np.asarray(values, float) for values in start]),
             steps,
             self.bounds(effects),
-            ROUGHLY if self.evidence.machine.rough else CLOSELY,
+            self.evidence.expected,
         )
         values = split(found.values)
         return Fit(
@@ -528,3 +505,58 @@ class Fitter:
             split(found.widths),
             with_values(self.plant, effects, values),
         )
+
+
+class _Linearised:
+    """A fit's residual, linear in the parameters of its effects."""
+
+    def __init__(self, fitter: Fitter, fit: Fit) -> None:
+        self._fitter, self._fit = fitter, fit
+        self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
+        self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
+        self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
+        self._here = np.concatenate([np.asarray(values, float) for values in fit.values])
+        self._bounds = fitter.bounds(fit.effects)
+
+        def residual(vector: Array) -> Array:
+            plant = with_values(fitter.plant, fit.effects, self._split(vector))
+            return fitter.evidence.residual(plant)
+
+        self._left = residual(self._here)
+        self._jacobian = take_derivatives(
+            residual, self._here, self._left, self._steps, self._bounds[1]
+        )
+        normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._left)
+        self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
+
+    def _split(self, vector: Array) -> Values:
+        cuts = np.cumsum(self._sizes)[:-1]
+        return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
+
+    def leave_out_each(
+        self, remaining: Sequence[int]
+    ) -> list[tuple[float, tuple[Effect, ...], Values]]:
+        """Misfit, effects and values without each of the remaining effects, the best first."""
+        found = []
+        for out in remaining:
+            rest = [number for number in remaining if number != out]
+            effects = tuple(self._fit.effects[number] for number in rest)
+            if is_possible(effects, self._fitter.plant):
+                misfit, values = self._keep_only(rest)
+                found.append((misfit, effects, values))
+        return sorted(found, key=lambda each: each[0])
+
+    def _keep_only(self, rest: Sequence[int]) -> tuple[float, Values]:
+        move = np.zeros(len(self._here))
+        for number, effect in enumerate(self._fit.effects):
+            if number not in rest:
+                # Of an effect that is not there only the magnitude says so.
+                place = int(np.nonzero(self._owner == number)[0][0])
+                nominal = effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]
+                move[place] = (nominal - self._here[place]) / self._steps[place]
+        free = np.isin(self._owner, rest)
+        right = self._gradient[free] + self._normal[np.ix_(free, ~free)] @ move[~free]
+        move[free] = -np.linalg.solve(self._normal[np.ix_(free, free)], right)
+        misfit = self._fitter.space.misfit(self._left + self._jacobian @ move)
+        values = self._split(np.clip(self._here + move * self._steps, *self._bounds))
+        return misfit, tuple(values[number] for number in rest)

@@ -13,7 +13,7 @@ from rigtwin.numerics.arrays import Array
 
 PARTS = (1.0, 0.5, 0.2, 0.05)
 """Of a step that are tried in turn."""
-ITERATIONS = 8
+ITERATIONS = 16
 """Times that derivatives are taken at most."""
 GAINED = 0.2
 """χ² that a step must gain to be followed by another."""
@@ -21,21 +21,18 @@ DAMPING = 1e-6
 """Share of the normal matrix' diagonal that is added to it."""
 
 
-@dataclass(frozen=True)
-class Descent:
-    """How a minimum is gone down to. share: of the misfit that a step must gain besides `GAINED`;
-    widest: times the steps of the derivatives to which they are widened where nothing is
-    gained."""
+SHARE = 1e-3
+"""Share of the misfit beyond noise that a step must gain as well: beside what a model always
+leaves, smaller gains say nothing."""
+WIDEST, WIDENED = 5.0, 1.1
+"""Factor by which the steps of the derivatives are widened once where nothing is gained, if the
+misfit is that many times what noise leaves. Stick-slip makes the misfit discontinuous, and wide
+steps see over its small jumps."""
 
-    share: float
-    widest: float
 
-
-CLOSELY = Descent(share=0.0, widest=1.0)
-"""Of a model that leaves nothing but noise."""
-ROUGHLY = Descent(share=1e-3, widest=5.0)
-"""Of one that always leaves something, beside which small gains say nothing, and whose misfit has
-small steps where something sticks: wide ones see over them."""
+RESPONSE, SHORTEST = 0.05, 1e-3
+"""Share of the misfit that a derivative's step should change, and share of the given step that it
+has at least."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ def minimise(
     start: Array,
     steps: Array,
     bounds: tuple[Array, Array],
-    descent: Descent,
+    expected: float,
 ) -> Minimum:
     """Goes down from a start.
 
@@ -68,8 +65,8 @@ def minimise(
         Values, and steps of their derivatives, shape (parameters,).
     bounds
         Lowest and highest values.
-    descent
-        How.
+    expected
+        Misfit of noise alone.
 
     Returns
     -------
@@ -81,14 +78,19 @@ def minimise(
     left = residual(here)
     misfit = space.misfit(left)
     normal = np.eye(len(here))
-    wide = 1.0
+    wide, scale = 1.0, np.ones(len(here))
     for _ in range(ITERATIONS):
-        jacobian = take_derivatives(residual, here, left, wide * steps, high) / wide
+        taken = wide * scale
+        jacobian = take_derivatives(residual, here, left, taken * steps, high) / taken
+        # A derivative whose step changes more than is left of the residual is a secant far from the
+        # tangent: the next ones are taken over shorter steps.
+        power = np.maximum(np.sum(jacobian**2, axis=0), 1e-300)
+        scale = np.clip(np.sqrt(RESPONSE * misfit / power), SHORTEST, 1.0)
         normal, gradient = space.normal_equations(jacobian, left)
         damped = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
         move = -np.linalg.solve(damped, gradient)
-        enough, gained = max(GAINED, descent.share * misfit), 0.0
-        if descent.share == 0.0 or -float(gradient @ move) >= enough:
+        enough, gained = max(GAINED, SHARE * (misfit - expected)), 0.0
+        if -float(gradient @ move) >= enough:
             for part in PARTS:
                 there = np.clip(here + part * move * steps, low, high)
                 tried = residual(there)
@@ -97,9 +99,9 @@ def minimise(
                     here, left, misfit = there, tried, value
                     break
         if gained < enough:
-            if wide >= descent.widest:
+            if wide == WIDEST or misfit < WIDENED * expected:
                 break
-            wide = descent.widest
+            wide = WIDEST
     widths = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
     return Minimum(here, misfit, widths)
 

@@ -11,14 +11,18 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.ranking import LATE
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
-LOOKALIKES, RESEMBLES = 3, 0.6
-"""Effects that are tried in another's place at most, if they can explain this share of what it
-does."""
+LOOKALIKES = 2
+"""Effects that are tried in another's place at most."""
+MOVED = 6
+"""Rank among all that resemble an effect up to which the same kind elsewhere is tried too."""
+
+
+LATE = ("lag", "delay", "two_lags", "resonance")
+"""Kinds that make a signal late, each in its own way."""
 
 
 @dataclass(frozen=True)
@@ -85,21 +89,23 @@ def propose_additions(
 
 
 def propose_replacements(
-    fitter: Fitter, fit: Fit, effects: Sequence[Effect], threads: Threads
+    fitter: Fitter, fit: Fit, effects: Sequence[Effect], alike: float, threads: Threads
 ) -> list[tuple[tuple[Effect, ...], Values]]:
-    """The effects of a fit with each in turn replaced by those whose response is most like its
-    own: what was found first may only resemble what is there.
+    """Replace each effect of a fit in turn by those whose response is most like its own: what was
+    found first may only resemble what is there.
 
     Parameters
     ----------
     fitter
-        Of the evidence.
+        Fitter of the evidence.
     fit
         The fit.
     effects
-        Candidates, all fitted alone before.
+        Candidates, all screened before.
+    alike
+        Share of an effect's response that another must be able to explain.
     threads
-        Work side by side.
+        Threads that work side by side.
 
     Returns
     -------
@@ -107,22 +113,17 @@ def propose_replacements(
         Effects, and values to start from.
     """
     found = []
-    here = fitter.evidence.residual(fit.plant)
-    for number in range(len(fit.effects)):
-        rest = [place for place in range(len(fit.effects)) if place != number]
-        kept = tuple(fit.effects[place] for place in rest)
-        values_kept = tuple(fit.values[place] for place in rest)
-        plant = with_values(fitter.plant, kept, values_kept)
-        own = fitter.space.project_out((fitter.evidence.residual(plant) - here)[:, None])[:, 0]
-        without = Fit(kept, values_kept, fit.misfit, (), plant)
-        fitter.residual_at(without)
+    here = fitter.residual_at(fit)
+    for number, effect in enumerate(fit.effects):
+        kept = (*fit.effects[:number], *fit.effects[number + 1 :])
+        values = (*fit.values[:number], *fit.values[number + 1 :])
+        without = fitter.evidence.residual(with_values(fitter.plant, kept, values))
+        own = fitter.space.project_out((without - here)[:, None])[:, 0]
 
-        def resemble(
-            other: Effect, own: Array = own, without: Fit = without
-        ) -> tuple[float, Effect, Values]:
-            starts, responses = zip(*fitter.responses_instead(other, without), strict=True)
-            apart = fitter.space.project_out(np.stack(responses, axis=1).astype(np.float64))
-            along, power = apart.T @ own, np.maximum(np.sum(apart**2, axis=0), 1e-300)
+        def resemble(other: Effect, own: Array = own) -> tuple[float, Effect, Values]:
+            starts, responses = zip(*fitter.responses_beside(other, fit), strict=True)
+            shapes = fitter.space.project_out(np.stack(responses, axis=1).astype(np.float64))
+            along, power = shapes.T @ own, np.maximum(np.sum(shapes**2, axis=0), 1e-300)
             resemblance = np.maximum(along, 0.0) ** 2 / power
             best = int(np.argmax(resemblance))
             share = min(float(along[best] / power[best]), 3.0)
@@ -132,19 +133,38 @@ def propose_replacements(
             other
             for other in effects
             if other not in fit.effects
+            and not clashes(other, fit.effects)
+            and is_possible((*kept, other), fitter.plant)
+        ]
+        rivals = [
+            other
+            for other in effects
+            if other not in fit.effects
+            and clashes(other, (effect,))
             and not clashes(other, kept)
             and is_possible((*kept, other), fitter.plant)
         ]
         scored = sorted(threads.spread(resemble, others), key=lambda item: -item[0])
-        effect, rough = fit.effects[number], fitter.evidence.machine.rough
         for rank, (gain, other, start) in enumerate(scored):
-            resembles = rank < LOOKALIKES and gain > RESEMBLES * float(own @ own)
+            resembles = rank < LOOKALIKES and gain > alike * float(own @ own)
             # The same at another component is the first thing to be asked about, and what else
             # may make this one late.
-            elsewhere = rough and other.kind.name == effect.kind.name
+            elsewhere = rank < MOVED and other.kind.name == effect.kind.name
             late = other.group == effect.group and {other.kind.name, effect.kind.name} <= {*LATE}
             if resembles or elsewhere or late:
-                changed, values = list(fit.effects), list(fit.values)
-                changed[number], values[number] = other, start[0]
-                found.append((tuple(changed), tuple(values)))
+                found.append(_put(fit, number, other, start[0]))
+        # An effect that sets a parameter of the one that it replaces has no response beside it.
+        found += [
+            _put(fit, number, other, fitter.starts(other).values[0])
+            for other in rivals[:LOOKALIKES]
+        ]
     return found
+
+
+def _put(
+    fit: Fit, number: int, other: Effect, start: tuple[float, ...]
+) -> tuple[tuple[Effect, ...], Values]:
+    """The effects of a fit with one of them replaced, and values to start from."""
+    effects, values = list(fit.effects), list(fit.values)
+    effects[number], values[number] = other, start
+    return tuple(effects), tuple(values)

@@ -16,7 +16,7 @@ from markupsafe import Markup, escape
 from rigtwin import __version__
 from rigtwin.components import KINDS
 from rigtwin.diagnosis.advice import advise
-from rigtwin.diagnosis.attribute import library
+from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.finding import Answer, Finding
 from rigtwin.diagnosis.overlay import Overlay
 from rigtwin.diagnosis.text import against_nominal
@@ -71,11 +71,10 @@ TOLERABLE = 10.0
 """if it is more than so many percent of the signal."""
 NEXT_TO_NOTHING = 0.02
 """Share of the signals' swing below which a twin predicts nothing."""
-MEASURED = (
-    "how many of a hundred names like it were right on test machines whose physics this library "
-    "does not have"
+CONFIDENCE = (
+    "the probability that this effect is there, measured on test machines that other programs "
+    "simulate"
 )
-PROBABLE = "the probability that it is this effect, and none other that was tried"
 
 
 def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
@@ -168,11 +167,10 @@ def html(diagnosis: Diagnosis) -> str:
         title_of=title_of,
         meaning_of=meaning_of,
         share_of=share_of,
-        rough=diagnosis.described.rough,
         headlines=headlines(overlays, corrected),
         tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
-        confidence=MEASURED if diagnosis.described.rough else PROBABLE,
-        weight="weight among those tried" if diagnosis.described.rough else "probability",
+        confidence=CONFIDENCE,
+        weight="weight among those tried",
         spell=spell,
         say=say,
         against_nominal=against_nominal,
@@ -182,7 +180,7 @@ def html(diagnosis: Diagnosis) -> str:
         components=list(diagnosis.evidence.machine.components)
         if diagnosis.evidence is not None
         else [],
-        tried=len(library(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
+        tried=len(candidates(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
         version=__version__,
     )
 

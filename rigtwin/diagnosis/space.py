@@ -54,6 +54,12 @@ class Space:
         self._taken = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
+    @property
+    def columns(self) -> Array:
+        """Response of the prediction to each tolerance, shape (size, tolerances); 0 where an effect
+        takes the tolerance's place."""
+        return self._columns
+
     def beside(self, effects: Sequence[Effect]) -> Space:
         """The same tolerances, less those that effects take the place of."""
         if not any(self._replaced(effects)):

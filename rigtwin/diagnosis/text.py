@@ -51,17 +51,11 @@ def describe(diagnosis: Answer) -> str:
         lines.append(f"  {effect.name}, confidence {sure:.0f} %, share of the gap {share:.0f} %")
         for name, estimate in effect.parameters.items():
             lines.append(f"    {name} = {number(estimate)}")
-        if len(effect.alternatives) > 1:
-            lines.append(
-                "    these data cannot tell it from "
-                f"{', '.join(str(name) for name in effect.alternatives[1:])}"
-            )
+        if effect.rivals:
+            lines.append(f"    these data cannot tell it from {_list_rivals(effect)}")
     if (nearest := diagnosis.nearest) is not None:
         names = " + ".join(str(name) for name in nearest.names)
-        if nearest.of == "noise":
-            left = f"{nearest.left:.3g} times what noise leaves, {nearest.without:.3g} without"
-        else:
-            left = f"{100 * nearest.left:.2g} % of the signals, {100 * nearest.without:.2g} without"
+        left = f"{100 * nearest.left:.2g} % of the signals, {100 * nearest.without:.2g} without"
         lines.append(f"  nearest: {names}, not enough to be named; it leaves {left}")
     for effect in diagnosis.traces:
         values = ", ".join(
@@ -114,6 +108,17 @@ def describe(diagnosis: Answer) -> str:
     lines += [f"  note: {note}" for note in diagnosis.notes]
     lines.append(f"  {diagnosis.seconds:.1f} s")
     return "\n".join(lines)
+
+
+def _list_rivals(effect: Finding) -> str:
+    """The effects that the data cannot tell from one, with the values that they would have."""
+    rivals = []
+    for rival in effect.rivals:
+        values = ", ".join(
+            f"{name} {write(each.value, each.unit)}" for name, each in rival.parameters.items()
+        )
+        rivals.append(f"{rival.name} ({values})" if values else str(rival.name))
+    return enumerate_words(rivals)
 
 
 def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:

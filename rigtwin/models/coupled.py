@@ -317,11 +317,11 @@ class CoupledModel:
 
     def _judge_start(self) -> None:
         """Find out whether the error of a start as it is read shows."""
-        rough, plant = self._machine.rough, self._configuration.plant
+        plant = self._configuration.plant
         rows = {
             number: (
                 self._seen_by(row.name, row.kind),
-                self._machine.form_of(row) if rough else 0.0,
+                self._machine.prior.even * self._machine.form_of(row),
             )
             for number, row in enumerate(self.rows)
             if row.kind in ("position", "velocity")

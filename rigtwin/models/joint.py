@@ -41,8 +41,11 @@ from rigtwin.models.model import Form
 from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Recording
-from rigtwin.signals.noise import smooth, white_noise
+from rigtwin.signals.band import limit_band
+from rigtwin.signals.noise import motion_band, smooth, white_noise
 
+INERTIAL = 0.1
+"""Share of a measured force that inertia must have for the motion's band to matter."""
 KEPT = 24
 """Motions that are kept."""
 ELASTIC = 0.3
@@ -141,11 +144,31 @@ class JointModel:
         self._starts: dict[tuple[object, ...], Start] = {}
         self._smoothed: dict[str, tuple[Array, float]] = {}
         self._start = self._find_start()
+        self._band = self._find_band()
 
     @property
     def band(self) -> float:
-        """Infinite."""
-        return math.inf
+        """Hz, up to which a measured motion shows its acceleration, where much of the force that it
+        takes is inertia; infinite otherwise.
+
+        Above it the smoothed motion lacks what the measured force has: both pass the same filter.
+        """
+        return self._band
+
+    def _find_band(self) -> float:
+        if self._motion is None or self._integrated or self._error == 0.0:
+            return math.inf
+        rows = [row for row in self.rows if row.kind == "force"]
+        if not rows:
+            return math.inf
+        moved = self.move(self._configuration.plant)
+        inertia = self._parts(self._configuration.plant)[1].mass
+        accelerating = inertia * float(np.std(np.gradient(moved[1], self._apart)))
+        measured = float(np.std(self._recording.column(*rows[0].channel)))
+        if accelerating < INERTIAL * measured:
+            return math.inf
+        assert self._mover.channel is not None
+        return motion_band(self._recording.column(*self._mover.channel), self._period)
 
     def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
@@ -186,7 +209,7 @@ class JointModel:
         channel = components[name].channel
         assert channel is not None
         start = JointStart(name, kinds[name], self._recording.column(*channel), self._period)
-        if name in rows and self._control is None and self._machine.rough:
+        if name in rows and self._control is None:
             move = self._prepare_pushed(plant, getattr(plant, self._mover.name))
             nominal = getattr(self._machine.plant, name)
             start.judge(nominal, move, self._machine.form_of(rows[name]), self._command)
@@ -419,7 +442,7 @@ class JointModel:
         for number, row in enumerate(self.rows):
             if row.kind != "command":
                 found[number] = apply_sensor(getattr(plant, row.name), true[number], self._apart)
-        return found
+        return limit_band(found, self.band, self._apart)
 
     def predict(self, plant: Plant) -> Array:
         return self._apply_sensors(plant, self.predict_true(plant))
@@ -523,7 +546,8 @@ class JointModel:
             level = white_noise(self._recording.column(*self._mover.channel))
             again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
             shift = (again - self._motion)[:: self.every]
-            return self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
+            carried = self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
+            return limit_band(carried, self.band, self._apart)
         control = self._control
         if control is None or not self._sensors:
             return None

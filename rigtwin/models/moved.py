@@ -34,7 +34,9 @@ STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands, and s for which it does to be at rest."""
 ENDS = 0.3
 """s at both ends of a recording, where smoothing does not know how a motion goes on."""
-DRAWS = 4
+REGRESSORS = 40
+"""Regressors of bodies that are remembered: a search returns to few motions."""
+DRAWS = 2
 """Times that the motions' noise is drawn."""
 Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
@@ -175,7 +177,7 @@ class MovedModel:
             if columns is None:
                 columns = self._bodies.regressor(motion, mjcf, self._gravity(plant))
             if key is not None:
-                kept = dict(list(self._columns.items())[-KEPT:])
+                kept = dict(list(self._columns.items())[-REGRESSORS:])
                 self._columns = {**kept, (name, key): columns}
             found = found + np.tensordot(more, columns, 1)
         return found
@@ -338,8 +340,7 @@ class MovedModel:
         key = self._key(plant)
         if key not in self._drawn:
             random, drawn = np.random.default_rng(SEED), []
-            # A rough model's own error is more than a reversal in a tick beside makes.
-            for _ in range(1 if self._machine.rough else DRAWS):
+            for _ in range(DRAWS):
                 shifts = {}
                 for name in self._movers:
                     signal, error = self._read[name]

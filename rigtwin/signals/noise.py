@@ -26,16 +26,30 @@ HIGHEST_MOTION = 200.0
 """Hz; no plate or carriage of such a rig moves measurably above."""
 
 
+SWITCHED = 4
+"""Values in all up to which a signal is switched, and its steps are no bits."""
+
+
 def white_noise(signal: Array) -> float:
     """Standard deviation of a signal's white noise.
 
     From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz,
     and their median, which ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse
-    bits make most of them zero, their rms is taken.
+    bits make most of them zero, their rms is taken. A signal that is switched between few values
+    shows no noise at all.
     """
     third = np.diff(signal, 3)
+    if _is_switched(signal):
+        return 0.0
     typical = float(np.median(np.abs(third))) / NORMAL_MEDIAN
     return (typical or rms(third)) / math.sqrt(20.0)
+
+
+def _is_switched(signal: Array) -> bool:
+    """Whether a signal has few values in all, as that of a relay; a constant one is none."""
+    # The first samples of most signals show at once that they have more.
+    start = signal[: 64 * SWITCHED]
+    return len(np.unique(start)) <= SWITCHED and 1 < len(np.unique(signal)) <= SWITCHED
 
 
 def smallest_step(signal: Array) -> float:
@@ -44,6 +58,8 @@ def smallest_step(signal: Array) -> float:
     The smallest difference of two of its values, rounding apart; 0 if it shows none.
     """
     values = np.unique(signal)
+    if len(values) <= SWITCHED:
+        return 0.0
     steps = np.diff(values)
     steps = steps[steps > 1e-9 * max(float(np.ptp(signal)), 1e-300)]
     if not len(steps):
@@ -233,6 +249,32 @@ def smooth(signal: Array, period: float) -> tuple[Array, float]:
     )
     error = noise * math.sqrt(float(np.mean(gain)))
     return _straighten_rests(kept, error, max(3, round(REST / period))), error
+
+
+def motion_band(signal: Array, period: float) -> float:
+    """Find up to which frequency a measured motion stands out of its noise.
+
+    Parameters
+    ----------
+    signal : Array
+        Shape (ticks,).
+    period : float
+        s.
+
+    Returns
+    -------
+    float
+        Hz, where `smooth` leaves half of the motion; infinite without noise.
+    """
+    noise = white_noise(signal)
+    if noise == 0.0:
+        return math.inf
+    line = np.linspace(signal[0], signal[-1], len(signal))
+    swing = signal - line
+    frequencies, density = spectrum(np.concatenate([swing, -swing[-2:0:-1]]), period)
+    gain = wiener_gain(frequencies, density, 2 * noise**2 * period)
+    passed = np.nonzero(gain >= 0.5)[0]
+    return float(frequencies[passed[-1]]) if len(passed) else math.inf
 
 
 def _straighten_rests(motion: Array, error: float, window: int) -> Array:

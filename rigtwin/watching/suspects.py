@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigtwin.diagnosis.attribute import detection_limit, library
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.ranking import penalised_cost
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.watching.alarm import Suspect
@@ -17,6 +16,8 @@ FITTED = 12
 """Effects that are fitted, those that promise most."""
 NAMED = 4
 """Suspects at most."""
+TEMPERED = 0.05
+"""Share of the rest by which differences of the misfit count less."""
 WORTH = 0.02
 """Probability from which one is named."""
 
@@ -36,20 +37,22 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     tuple of Suspect
         The likeliest first; none if nothing explains any of it.
     """
-    searched = (evidence.thin() if evidence.machine.rough else evidence).halve_steps()
-    fitter, least = Fitter(searched), detection_limit(evidence, thresholds)
+    searched = evidence.thin().halve_steps()
+    # Twice the nats that an effect must gain where noise alone is left, as chi-square.
+    price = 2.0 * (thresholds.occam_quiet + thresholds.materiality * evidence.expected)
+    fitter, least = Fitter(searched), price
     nothing = fitter.nothing
     with Threads() as threads:
-        screened = threads.map(fitter.screen, library(evidence))
+        screened = threads.map(fitter.screen, candidates(evidence))
         screened.sort(key=lambda each: -each.promise)
         promising = [each for each in screened[:FITTED] if each.promise >= least]
         tried = threads.map(fitter.fit_one, promising)
-    found = [fit for fit in tried if _cost(fit, thresholds) < nothing.misfit]
+    found = [fit for fit in tried if fit.misfit + least < nothing.misfit]
     if not found:
         return ()
-    costs = np.array([_cost(fit, thresholds) for fit in found])
+    costs = np.array([fit.misfit for fit in found])
     left = max(min(fit.misfit for fit in found) - evidence.expected, 0.0)
-    temper = thresholds.temper + thresholds.form_temper * left
+    temper = thresholds.temper + TEMPERED * left
     weights = np.exp(-np.minimum((costs - costs.min()) / (2.0 * temper), 700.0))
     weights /= weights.sum()
     gap = max(nothing.misfit - evidence.expected, 1e-300)
@@ -59,10 +62,6 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     ]
     suspects.sort(key=lambda each: -each.probability)
     return tuple(each for each in suspects[:NAMED] if each.probability >= WORTH)
-
-
-def _cost(fit: Fit, thresholds: Thresholds) -> float:
-    return penalised_cost(fit, thresholds.price)
 
 
 def _suspect(fit: Fit, explained: float, probability: float) -> Suspect:
