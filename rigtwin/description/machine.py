@@ -251,5 +251,5 @@ class Machine:
         return TURNING.get(unit, unit) if component.turns else unit
 
 
-SAME_AS = {"gain": "constant"}
+SAME_AS = {"gain": "constant", "lag": "delay"}
 """Parameter → the one that has the same meaning and may have the declared tolerance."""

@@ -130,12 +130,16 @@ def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence:
 
 
 def _widths(found: Explanation) -> list[tuple[float, ...]]:
-    """Standard errors, by the cross-validation and by the final fit, whichever is larger."""
-    scored = found.posterior.best.widths
-    return [
-        tuple(max(pair) for pair in zip(one, other, strict=True))
-        for one, other in zip(scored, found.fit.widths, strict=True)
-    ]
+    """Standard errors: by the cross-validation, by the final fit, or by what other hypotheses make
+    of a value, whichever is largest."""
+    posterior = found.posterior
+    widths = []
+    for effect, one, other in zip(
+        found.fit.effects, posterior.best.widths, found.fit.widths, strict=True
+    ):
+        spread = (each / STANDARD.wider for each in posterior.spread(effect))
+        widths.append(tuple(max(each) for each in zip(one, other, spread, strict=True)))
+    return widths
 
 
 def _shares(

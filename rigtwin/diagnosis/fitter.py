@@ -39,8 +39,8 @@ KEPT = 64
 """Responses beside a fit that are kept."""
 SMALL = 0.05
 """Share of the smallest start at which an effect is tried too."""
-MAGNITUDES = (0.25, 0.75)
-"""Places, in the order of their size, of the magnitudes that are tried beside other effects."""
+SMALLER = 0.2
+"""Share of the smallest start at which an effect is tried beside others as well."""
 NOTHING = 1e-3
 """χ² below which an effect does nothing at all."""
 Responses = list[tuple[tuple[float, ...], Array]]
@@ -55,19 +55,6 @@ class Screened:
     effect: Effect
     starts: tuple[tuple[float, tuple[float, ...]], ...]
     promise: float
-
-
-def _thin_starts(starts: Starts) -> list[tuple[float, ...]]:
-    """Few magnitudes of each shape: a response scales with its magnitude more or less."""
-    shapes: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
-    for values in starts.values:
-        shapes.setdefault(values[1:], []).append(values)
-    found = []
-    for values in shapes.values():
-        values.sort(key=lambda each: abs(each[0]))
-        places = {round(share * (len(values) - 1)) for share in MAGNITUDES}
-        found += [values[place] for place in sorted(places)]
-    return found
 
 
 class Fitter:
@@ -115,6 +102,24 @@ class Fitter:
             motion = self.evidence.models[longest].motion(component, self.plant)
             self._scales[component] = Scales.of(motion, force, self.evidence.lines[longest].period)
         return self._scales[component]
+
+    def _few_starts(self, effect: Effect, plant: Plant) -> list[tuple[float, ...]]:
+        """A small and a middle magnitude of each shape and sign: responses scale with their
+        magnitude, but those of small ones need not resemble those of large ones."""
+        starts = self._starts_at(effect, plant)
+        nominal = effect.nominal(plant)[effect.kind.parameters[0]]
+        shapes: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
+        for values in starts.values:
+            sign = 1.0 if values[0] >= nominal else -1.0
+            shapes.setdefault((sign, *values[1:]), []).append(values)
+        found = []
+        for values in shapes.values():
+            values.sort(key=lambda each: abs(each[0] - nominal))
+            found.append(values[len(values) // 2])
+            if effect.kind.name not in LIMITS and not starts.quadrature:
+                small = nominal + SMALLER * (values[0][0] - nominal)
+                found.append((small, *values[0][1:]))
+        return found
 
     def screen(self, effect: Effect) -> Screened:
         """What one effect does at every value that a search for it starts from.
@@ -278,7 +283,7 @@ class Fitter:
         if found is None:
             found = []
             here = self.residual_at(first)
-            for start in _thin_starts(self._starts_at(effect, first.plant)):
+            for start in self._few_starts(effect, first.plant):
                 there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
                 found.append((start, (here - there).astype(np.float32)))
             self._beside = {**dict(list(self._beside.items())[-KEPT:]), known: found}

@@ -84,8 +84,9 @@ def minimise(
         jacobian = take_derivatives(residual, here, left, taken * steps, high) / taken
         # A derivative whose step changes more than is left of the residual is a secant far from the
         # tangent: the next ones are taken over shorter steps.
-        power = np.maximum(np.sum(jacobian**2, axis=0), 1e-300)
-        scale = np.clip(np.sqrt(RESPONSE * misfit / power), SHORTEST, 1.0)
+        power = np.sum(jacobian**2, axis=0)
+        least = RESPONSE * misfit + 1e-12 * power
+        scale = np.clip(np.sqrt(least / np.maximum(power, least)), SHORTEST, 1.0)
         normal, gradient = space.normal_equations(jacobian, left)
         damped = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
         move = -np.linalg.solve(damped, gradient)

@@ -5,8 +5,8 @@ Gelman, Gabry 2017], less the price of its parameters. Let a signal have N sampl
 independent, and let its held-out residual have the power q in units of noise and declared error.
 Then
 
-    -2 ln p = n q                              for q <= 1,
-    -2 ln p = n + n ln(1 + (q - 1) N / n)      for q > 1:
+    -2 ln p = k n q                              for q <= 1,
+    -2 ln p = k n + n ln(1 + (q - 1) N / n)      for q > 1:
 
 a Gaussian whose variance is that of the noise, and of a discrepancy of unknown scale in n of the
 samples where more is left [Kennedy, O'Hagan 2001]. Weights are proportional to exp(score / temper),
@@ -29,6 +29,11 @@ from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.numerics.arrays import Array
 
+NOT_FAR = 10.0
+"""Tempers by which a hypothesis may be worse for its values to widen an interval."""
+WITHIN = 0.3
+"""Slope k of the density within noise and declared error: the noise is estimated from above, and
+what is gained within the declared error is little evidence of an effect."""
 RARE = (
     "backlash",
     "compliance",
@@ -67,7 +72,8 @@ def misfit_of(levels: Array, pieces: Array, samples: Array) -> float:
     """
     narrow = samples / np.maximum(pieces, 1e-300)
     excess = np.maximum(levels - 1.0, 0.0)
-    return float(np.sum(pieces * (np.minimum(levels, 1.0) + np.log1p(excess * narrow))))
+    within = WITHIN * np.minimum(levels, 1.0)
+    return float(np.sum(pieces * (within + np.log1p(excess * narrow))))
 
 
 @dataclass(frozen=True)
@@ -154,6 +160,10 @@ class Posterior:
                 if new[one] and new[other]:
                     lacking = (t.undone - scored.together[one, other]) / (0.5 * t.undone)
                     cost += UNDONE_PRICE * float(np.clip(lacking, 0.0, 1.0))
+        for effect, share in zip(scored.fit.effects, scored.accounts, strict=True):
+            if is_rare(effect):
+                lacking = float(np.clip(1.0 - share / t.rare_share, 0.0, 1.0))
+                cost += self.discrepancy * lacking * t.rare_doubt * self.signal_samples
         for effect, values, widths in zip(
             scored.fit.effects, scored.fit.values, scored.widths, strict=True
         ):
@@ -207,6 +217,19 @@ class Posterior:
         out = {effect, *self.rivals(effect)}
         costs = [each.cost for each in self.ranking if out.isdisjoint(each.scored.fit.effects)]
         return min(min(costs, default=math.inf) - self.ranking[0].cost, 1e6)
+
+    def spread(self, effect: Effect) -> tuple[float, ...]:
+        """How far the values of an effect differ between the hypotheses that are not far behind."""
+        number = self.best.fit.effects.index(effect)
+        own, most = self.best.fit.values[number], self.ranking[0].cost + NOT_FAR * self.temper
+        others = [
+            each.scored.fit.values[each.scored.fit.effects.index(effect)]
+            for each in self.ranking
+            if each.cost <= most and effect in each.scored.fit.effects
+        ]
+        return tuple(
+            max(abs(other[place] - value) for other in others) for place, value in enumerate(own)
+        )
 
     def rivals(self, effect: Effect) -> tuple[Effect, ...]:
         """Effects that the data cannot tell from one of the best hypothesis."""

@@ -15,8 +15,8 @@ from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
-LOOKALIKES = 2
-"""Effects that are tried in another's place at most."""
+RESEMBLES = 0.6
+"""Share of an effect's response that another must be able to explain to be tried in its place."""
 MOVED = 6
 """Rank among all that resemble an effect up to which the same kind elsewhere is tried too."""
 
@@ -89,7 +89,7 @@ def propose_additions(
 
 
 def propose_replacements(
-    fitter: Fitter, fit: Fit, effects: Sequence[Effect], alike: float, threads: Threads
+    fitter: Fitter, fit: Fit, effects: Sequence[Effect], count: int, threads: Threads
 ) -> list[tuple[tuple[Effect, ...], Values]]:
     """Replace each effect of a fit in turn by those whose response is most like its own: what was
     found first may only resemble what is there.
@@ -102,8 +102,8 @@ def propose_replacements(
         The fit.
     effects
         Candidates, all screened before.
-    alike
-        Share of an effect's response that another must be able to explain.
+    count
+        Effects that are tried in the place of each.
     threads
         Threads that work side by side.
 
@@ -118,16 +118,20 @@ def propose_replacements(
         kept = (*fit.effects[:number], *fit.effects[number + 1 :])
         values = (*fit.values[:number], *fit.values[number + 1 :])
         without = fitter.evidence.residual(with_values(fitter.plant, kept, values))
-        own = fitter.space.project_out((without - here)[:, None])[:, 0]
+        response = without - here
 
-        def resemble(other: Effect, own: Array = own) -> tuple[float, Effect, Values]:
+        def resemble(other: Effect, response: Array = response) -> tuple[float, Effect, Values]:
             starts, responses = zip(*fitter.responses_beside(other, fit), strict=True)
-            shapes = fitter.space.project_out(np.stack(responses, axis=1).astype(np.float64))
-            along, power = shapes.T @ own, np.maximum(np.sum(shapes**2, axis=0), 1e-300)
-            resemblance = np.maximum(along, 0.0) ** 2 / power
-            best = int(np.argmax(resemblance))
+            # An effect that takes a tolerance's place is not what that tolerance may take up.
+            space = fitter.space.beside((other,))
+            both = np.column_stack([np.stack(responses, axis=1).astype(np.float64), response])
+            shapes = space.project_out(both)
+            shapes, own = shapes[:, :-1], shapes[:, -1]
+            along, power = shapes.T @ own, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
+            alike = np.maximum(along, 0.0) ** 2 / (power * float(own @ own) + 1e-300)
+            best = int(np.argmax(alike))
             share = min(float(along[best] / power[best]), 3.0)
-            return float(resemblance[best]), other, fitter.scale_start(other, starts[best], share)
+            return float(alike[best]), other, fitter.scale_start(other, starts[best], share)
 
         others = [
             other
@@ -146,7 +150,7 @@ def propose_replacements(
         ]
         scored = sorted(threads.spread(resemble, others), key=lambda item: -item[0])
         for rank, (gain, other, start) in enumerate(scored):
-            resembles = rank < LOOKALIKES and gain > alike * float(own @ own)
+            resembles = rank < count and gain > RESEMBLES
             # The same at another component is the first thing to be asked about, and what else
             # may make this one late.
             elsewhere = rank < MOVED and other.kind.name == effect.kind.name
@@ -155,8 +159,7 @@ def propose_replacements(
                 found.append(_put(fit, number, other, start[0]))
         # An effect that sets a parameter of the one that it replaces has no response beside it.
         found += [
-            _put(fit, number, other, fitter.starts(other).values[0])
-            for other in rivals[:LOOKALIKES]
+            _put(fit, number, other, fitter.starts(other).values[0]) for other in rivals[:count]
         ]
     return found
 

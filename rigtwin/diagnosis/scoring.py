@@ -30,6 +30,8 @@ from rigtwin.numerics.arrays import Array
 
 BLOCKS = 20
 """Blocks of each recording."""
+FEWEST = 3
+"""Independent samples that a residual has in each block at least, however narrow its band."""
 NARROWEST = 2 * BLOCKS
 """Lines of the lowest band; each band is twice as wide as the one before."""
 FOLDS = 5
@@ -38,6 +40,8 @@ each has all directions and speeds."""
 RIDGE = 1e-9
 """Share of the normal matrix' diagonal that is added to it."""
 TINY = 1e-300
+SMALLEST = 1e-12
+"""Share of the largest response below which another is none."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +74,9 @@ class Scored:
     together
         For each pair of effects whose responses oppose each other, the size of their joint response
         relative to the smaller of the two; 1 for other pairs; shape (effects, effects).
+    accounts
+        Amplitude that each effect alone accounts for, the others taken anew, as a share of the
+        signals', to first order; shape (effects,).
     bounded
         Whether a value lies at the end of the range that is searched.
     """
@@ -84,6 +91,7 @@ class Scored:
     correlation: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     reach: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     together: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    accounts: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     bounded: bool = False
 
 
@@ -94,6 +102,11 @@ class Scorer:
         self._fitter, self._evidence = fitter, fitter.evidence
         self._known: dict[tuple[object, ...], Scored] = {}
         self._samples = count_samples(self._evidence)
+        swings = [
+            lines.measured - lines.measured.mean(axis=1, keepdims=True)
+            for lines in self._evidence.lines
+        ]
+        self._signal_power = max(float(np.sum(self._evidence.whiten(swings) ** 2)), TINY)
 
     def score(self, fit: Fit) -> Scored:
         """Cross-validate a fit.
@@ -156,6 +169,7 @@ class Scorer:
             correlation=correlation,
             reach=self._reach(fit, sizes, products),
             together=self._together(fit, here, steps, sizes, products),
+            accounts=self._accounts(fit, here, steps, sizes, products, prior),
             bounded=bool(fit.effects) and fitter.is_bounded(fit),
         )
 
@@ -174,11 +188,33 @@ class Scorer:
             ]
         )
         gram = gram * np.outer(moves, moves)
-        size = np.maximum(np.diag(gram), TINY)
+        size = np.diag(gram)
         both = np.maximum(size[:, None] + size[None, :] + 2.0 * gram, 0.0)
-        relative = np.sqrt(both / np.maximum(np.minimum(size[:, None], size[None, :]), TINY))
+        least = np.minimum(size[:, None], size[None, :])
+        relative = np.sqrt(both / np.maximum(least, SMALLEST * float(np.max(size, initial=TINY))))
         relative[gram >= 0.0] = 1.0
         return np.minimum(relative, 1.0)
+
+    def _accounts(
+        self,
+        fit: Fit,
+        here: Array,
+        steps: Array,
+        sizes: Sequence[int],
+        products: Array,
+        prior: Array,
+    ) -> Array:
+        """Share of the signals' amplitude that would be left without each effect."""
+        if not fit.effects:
+            return np.zeros(0)
+        inverse = np.linalg.inv(_normal_matrix(products, prior))
+        places = np.cumsum([0, *sizes])[: len(fit.effects)]
+        found = []
+        for effect, place in zip(fit.effects, places, strict=True):
+            nominal = effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]
+            move = (here[place] - nominal) / steps[place]
+            found.append(move**2 / max(float(inverse[place, place]), TINY))
+        return np.sqrt(np.array(found) / self._signal_power)
 
     def _reach(self, fit: Fit, sizes: Sequence[int], products: Array) -> Array:
         """Share of each signal in the response to each effect's magnitude, to first order."""
@@ -301,7 +337,7 @@ def count_independent(evidence: Evidence, residual: Array) -> Array:
             most = 2.0 * np.count_nonzero(power[:, band], axis=1)
             own.append(np.minimum(4.0 * total**2 / np.maximum(squared, TINY), most))
         counts.append(np.stack(own, axis=1))
-    return np.maximum(_align(counts), 0.0)
+    return np.maximum(_align(counts), float(FEWEST * BLOCKS))
 
 
 def _align(arrays: Sequence[Array]) -> Array:
@@ -416,14 +452,19 @@ def _cross_validate(
     return np.maximum(out.sum(axis=3), 0.0) * inverse, power.sum(axis=3) * inverse
 
 
+def _normal_matrix(products: Array, prior: Array) -> Array:
+    """Normal matrix of all data with the prior of the nuisances."""
+    columns = products.shape[-1] - 1
+    normal = products[..., :columns, :columns].sum(axis=(0, 1, 2, 3))
+    return np.asarray(normal + np.diag(prior + RIDGE * np.diag(normal) + 1e-12))
+
+
 def _covariance(products: Array, expected: Array, prior: Array, count: int) -> tuple[Array, Array]:
     """Standard errors of the effects' parameters, in steps, and their correlation."""
     if not count:
         return np.zeros(0), np.zeros((0, 0))
     columns = products.shape[-1] - 1
-    normal = products[..., :columns, :columns].sum(axis=(0, 1, 2, 3))
-    normal = normal + np.diag(prior + RIDGE * np.diag(normal) + 1e-12)
-    inverse = np.linalg.inv(normal)
+    inverse = np.linalg.inv(_normal_matrix(products, prior))
     scores = products[..., :columns, columns].sum(axis=(1, 2)).reshape(-1, columns)
     blocks = len(scores)
     spread = scores.T @ scores * blocks / max(blocks - columns, 1)

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, product
 
-from rigtwin.components import Effect, Guide
+from rigtwin.components import Effect, Guide, measures
 from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
@@ -34,6 +34,8 @@ SETTLED = 6
 """Single effects that are fitted precisely."""
 PRECISE, SCORED = 2, 4
 """Neighbours of a leader that are fitted precisely, and times as many that are scored."""
+AHEAD = 1
+"""Effects that a hypothesis may have more than the best one and still be extended."""
 BEHIND = 0.5
 """Share of what the best hypothesis explains that another may lack and still be extended."""
 MISSED = 10.0
@@ -46,15 +48,16 @@ IN_SERIES = ("compliance", "backlash")
 """Kinds in series with dry friction that hide it."""
 GATEWAY_STARTS = 3
 """Sizes of the gateway from which regular effects are fitted together."""
+FEW_REGULAR = 6
+"""Regular effects up to which all of these sizes are tried."""
 ELIMINATED = 4
 """Sets that are fitted of those from which one regular effect after another was left out."""
 SECOND_ORDER = ("two_lags", "resonance")
 """Kinds that a lag together with a delay resembles."""
 COMBINATIONS, FOLLOWED = 150, 2
 """Combinations of starts that are tried of one hypothesis at most, and those that are fitted."""
-RESEMBLING, NEARLY_THE_SAME = 0.6, 0.9
-"""Share of an effect's response that another must explain to be tried in its place: while
-something is left, and where only rivals of a sufficient hypothesis are asked for."""
+VARIED, COMPARED = 2, 5
+"""Effects that are tried in the place of each while the search climbs, and of its result."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 Start = tuple[tuple[Effect, ...], Values]
@@ -190,8 +193,9 @@ class Search:
             values = [v for v in coarse.starts(effect).values if v[0] > 0.0]
             return values[min(number, len(values) - 1)]
 
+        count = GATEWAY_STARTS if len(chosen) <= FEW_REGULAR else 1
         starts: list[Values] = [
-            tuple(start_of(effect, number) for effect in chosen) for number in range(GATEWAY_STARTS)
+            tuple(start_of(effect, number) for effect in chosen) for number in range(count)
         ]
         if (balanced := balance_forces(coarse, chosen)) is not None:
             starts.append(balanced)
@@ -210,8 +214,9 @@ class Search:
         chosen: dict[tuple[str, str], Effect] = {}
         for effect in self.effects:
             name = effect.kind.name
+            if measures(effect.of()):
+                continue
             if name in REGULAR and (promise[effect] > worth or name == GATEWAY):
-                # A constant force and the zero of a sensor move much the same.
                 at = effect.group if coupled and effect.of is Guide else ""
                 chosen.setdefault((name, at), effect)
         return list(chosen.values())
@@ -221,20 +226,20 @@ class Search:
         fails, vary them."""
         steady = 0
         while steady < STEADY_ROUNDS:
-            before = self.posterior.ranking[0].cost
+            before = self.posterior.best
             if (leader := self._next_leader()) is None:
                 return
-            promising = self._extend(leader)
+            self._extend(leader)
             if not self._improved(before):
-                if not promising and not self._leaves_something(self.posterior):
+                if not self._leaves_something(self.posterior):
                     return
-                self._vary(leader, RESEMBLING)
+                self._vary(leader, VARIED)
             steady = 0 if self._improved(before) else steady + 1
 
-    def _improved(self, before: float) -> bool:
-        """Whether the best hypothesis is better than one of that cost by more than a tie."""
+    def _improved(self, before: Scored) -> bool:
+        """Whether the best hypothesis is better than another by more than a tie."""
         posterior = self.posterior
-        return posterior.ranking[0].cost < before - 0.5 * posterior.temper
+        return posterior.ranking[0].cost < posterior.cost(before) - 0.5 * posterior.temper
 
     def _next_leader(self) -> Fit | None:
         """The best hypothesis that was not extended yet, or the best with dry friction."""
@@ -245,7 +250,8 @@ class Search:
         # A hypothesis that explains much less than the best one leads nowhere.
         nothing, best = self.pool[frozenset()].fit.misfit, min(fit.misfit for fit in ranked)
         most = best + BEHIND * max(nothing - best, 0.0)
-        near = [fit for fit in ranked if fit.misfit <= most]
+        longest = len(ranked[0].effects) + AHEAD
+        near = [fit for fit in ranked if fit.misfit <= most and len(fit.effects) <= longest]
         through = [f for f in near if any(e.kind.name == GATEWAY for e in f.effects)]
         # A step on the way may not be worth its price yet: the closest fits lead on as well.
         closest = sorted(near, key=lambda fit: fit.misfit)
@@ -255,8 +261,8 @@ class Search:
                 return fit
         return None
 
-    def _extend(self, leader: Fit) -> bool:
-        """Fit a hypothesis with one more effect; whether any of them promised enough."""
+    def _extend(self, leader: Fit) -> None:
+        """Fit a hypothesis with one more effect."""
         self._extended.add(frozenset(leader.effects))
         limit = self.posterior.price_for_one()
         proposals = sorted(
@@ -269,11 +275,10 @@ class Search:
         if self._leaves_something(self.posterior):
             fits += self._refine([*self._series_starts(leader), *self._unfold(leader)])
         self._keep(fits)
-        return bool(proposals)
 
-    def _vary(self, leader: Fit, alike: float) -> None:
-        """Fit a hypothesis with each effect left out, and with each replaced by others that explain
-        that share of its response."""
+    def _vary(self, leader: Fit, count: int) -> None:
+        """Fit a hypothesis with each effect left out, and with each replaced by so many others that
+        resemble it."""
         limit = 2.0 * self.posterior.price_for_one()
         starts: list[Start] = []
         if len(leader.effects) > 1:
@@ -283,7 +288,7 @@ class Search:
                 for misfit, rest, values in self.coarse.predict_without(leader)
                 if misfit - leader.misfit < MISSED * limit
             ]
-        starts += propose_replacements(self.coarse, leader, self.effects, alike, self.threads)
+        starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
         starts += self._regular_instead(leader)
         self._keep(self._refine(starts))
 
@@ -314,7 +319,7 @@ class Search:
         varied: set[frozenset[Effect]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
             varied.add(frozenset(best))
-            self._vary(self.posterior.best.fit, NEARLY_THE_SAME)
+            self._vary(self.posterior.best.fit, COMPARED)
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
         """Fit from starts that were not tried before."""
@@ -402,7 +407,7 @@ class Search:
         the valley of another.
         """
         leaders = [each.scored.fit for each in self.posterior.ranking if math.isfinite(each.cost)]
-        leaders = [fit for fit in leaders if fit.effects][: 2 * self.thresholds.leaders]
+        leaders = [fit for fit in leaders if fit.effects][: self.thresholds.leaders]
         fits = [
             fit for each in self.threads.spread(self._from_other_values, leaders) for fit in each
         ]

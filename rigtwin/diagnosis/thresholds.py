@@ -20,7 +20,7 @@ class Thresholds:
     """Share of what the best effect explains that another may lack to be fitted precisely."""
     leaders: int = 3
     """Hypotheses of each round that are extended by one more effect."""
-    additions: int = 4
+    additions: int = 6
     """Further effects that are fitted beside each leader."""
 
     # The score of a hypothesis.
@@ -41,6 +41,11 @@ class Thresholds:
     rare_price: float = 0.06
     """Nats per independent sample of one signal that a rare effect must gain in addition where an
     unexplained rest dominates."""
+    rare_share: float = 0.11
+    """Share of the signals' amplitude that a rare effect should account for."""
+    rare_doubt: float = 0.3
+    """Nats per independent sample of one signal that a rare effect costs which accounts for none of
+    it, where an unexplained rest dominates."""
     steady: float = 4.0
     """Standard errors by which a magnitude should differ from its nominal value; each one that is
     lacking costs nats quadratically."""

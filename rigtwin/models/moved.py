@@ -326,8 +326,8 @@ class MovedModel:
         """
         own, total = self.predict_true(plant), np.zeros(())
         motions = self._draw_motions(plant)
-        for motion, forces in motions:
-            bodies = forces + self._surplus(plant, motion)
+        for number, (motion, forces) in enumerate(motions):
+            bodies = forces + self._surplus(plant, motion, (number, *self._key(plant)))
             found = self._rows_of(bodies).copy()
             for name, onto in self._onto.items():
                 found += onto[:, None] * self._share_of(name, plant, motion, bodies)
