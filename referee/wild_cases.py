@@ -312,7 +312,8 @@ def _record_arm(case: WildCase, own: np.random.Generator, test: np.random.Genera
         phase=float(own.uniform(-3.0, 3.0)),
     )
     ticks = 1600
-    free = not ({"sag", "ripple"} & set(parts)) and case.number % 2 == 0
+    # Arms come once a round, at the same place in it: every second round has a free swing.
+    free = not ({"sag", "ripple"} & set(parts)) and case.number // len(ROUND) % 2 == 0
     torque, start = np.zeros(ticks), float(test.uniform(0.8, 1.5))
     if not free:
         torque, start = 0.4 * wander(test, ticks * period, period, 1.0, 0.2, 2.0), 0.0

@@ -15,8 +15,7 @@ from rigtwin.components import Motion, RigPlant, find
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Blocks, halves, interval, reject_worsening, shrinkage
-from rigtwin.diagnosis.diagnose import _find_instead
+from rigtwin.diagnosis.cross_validation import Blocks, interval, reject_worsening, shrinkage
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.localisation import region
@@ -180,19 +179,6 @@ def drifting(recording: Recording, rate: float) -> Recording:
     return replace_sensors(recording, suspension_lvdt=moved)
 
 
-@SLOW
-def test_what_something_unnamed_at_its_component_explains_alone_is_not_named():
-    evidence = evidence_of(drifting(recorded("imposed", (), 20.0), 8e-5))
-    offset, gain = (find(name, evidence.plant) for name in ("offset@suspension_lvdt", "gain@motor"))
-    most = 1.1 * evidence.expected
-    instead = _find_instead(evidence, (offset,), most)
-    assert instead is not None
-    assert instead[0].component == "suspension_lvdt"
-    assert _find_instead(evidence, (gain,), most) is None
-    assert _find_instead(evidence, (), most) is None
-    assert _find_instead(evidence, (offset,), 1.0 * evidence.expected) is None
-
-
 def test_a_free_disturbance_is_judged_beside_the_tolerances_that_the_plant_uses():
     evidence = evidence_of(drifting(recorded("imposed", (), 8.0), 1e-4))
     offset = find("offset@suspension_lvdt", evidence.plant)
@@ -336,14 +322,6 @@ def test_the_gate_keeps_what_helps_and_drops_what_harms():
         return Blocks(np.full(4, 5.0), np.full(4, left))
 
     assert reject_worsening((good, bad), across) == ((good,), (bad,))
-
-
-def test_halves_share_every_tick_out():
-    recording = recorded("imposed")
-    first, second = halves((recording,))
-    assert np.allclose(first[0] + second[0], 1.0)
-    assert first[0][0] == 1.0
-    assert second[0][-1] == 1.0
 
 
 def test_regions_are_told_apart():

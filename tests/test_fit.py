@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from rigtwin.components import KINDS, RigPlant
-from rigtwin.diagnosis.attribute import attribute, detection_limit, library, within_tolerance
 from rigtwin.diagnosis.evidence import Evidence, despike
+from rigtwin.diagnosis.explain import candidates, explain
 from rigtwin.diagnosis.fit import Fit, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import BEYOND, Space
@@ -16,6 +16,8 @@ from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
 """Kinds that are read off the signals."""
+DETECTED = 60.0
+"""Chi-square that every effect of this table explains."""
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +34,7 @@ def test_every_kind_is_searched_for_or_read_off_the_signals():
 
 def test_starts_lie_within_bounds_and_away_from_nominal(nominal):
     fitter = Fitter(nominal)
-    for effect in library(nominal):
+    for effect in candidates(nominal):
         found = fitter.starts(effect)
         quantities = list(effect.quantities().values())
         assert len(found.steps) == len(quantities)
@@ -83,7 +85,7 @@ def test_an_effect_is_found_at_its_size(text):
     nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])
-    assert fitter.nothing.misfit - fit.misfit > detection_limit(evidence)
+    assert fitter.nothing.misfit - fit.misfit > DETECTED
 
 
 def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
@@ -114,20 +116,6 @@ def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
     )
 
 
-def test_a_deviation_within_tolerance_is_no_finding(nominal):
-    effect = rig_effect("mass@carriage")
-    tolerance = RIG.tolerance_of("carriage", "mass")
-    assert tolerance is not None
-
-    def fit(value: float) -> Fit:
-        return Fit(
-            (effect,), ((value,),), 0.0, ((0.0,),), with_values(RigPlant(), (effect,), ((value,),))
-        )
-
-    assert within_tolerance(fit(34.0 * 1.005), nominal)
-    assert not within_tolerance(fit(34.0 * 1.02), nominal)
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [("gain@load_cell", 1.03), ("offset@load_cell", 5.0), ("gain@suspension_lvdt", 0.97)],
@@ -153,7 +141,7 @@ def test_what_a_fit_leaves_without_an_effect_is_foreseen(nominal):
     assert foreseen[0][1] == effects[:2]
     assert foreseen[2][1] == (effects[0], effects[2])
     assert [each.misfit for each in again] == sorted(each.misfit for each in again)
-    assert foreseen[0][0] == pytest.approx(again[0].misfit, abs=5.0)
+    assert foreseen[0][0] == pytest.approx(again[0].misfit, abs=10.0)
     assert np.allclose(foreseen[0][2], again[0].values, rtol=2e-3)
 
 
@@ -170,11 +158,11 @@ def test_two_effects_are_told_apart():
     evidence = evidence_of(
         recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96"), 5.0)
     )
-    found = attribute(evidence)
-    assert found.best is not None
-    assert set(found.best.names) == {"viscous@motor", "gain@suspension_lvdt"}
-    assert sum(found.shares.values()) == pytest.approx(found.explained)
-    assert sum(each.probability for each in found.ranking) == pytest.approx(1.0)
+    found = explain(evidence)
+    named = {effect.name for effect in found.fit.effects}
+    assert named == {"viscous@motor", "gain@suspension_lvdt"}
+    assert sum(each.weight for each in found.posterior.ranking) == pytest.approx(1.0)
+    assert all(found.posterior.inclusion(effect) > 0.9 for effect in found.fit.effects)
 
 
 def test_a_shape_at_the_end_of_its_range_is_seen_and_a_phase_or_a_zero_is_none(nominal):

@@ -53,7 +53,16 @@ def test_the_document_has_every_field(explained):
     document = json.loads(json.dumps(explained.document()))
     assert document["verdict"] == "explained"
     (effect,) = document["effects"]
-    fields = {"component", "kind", "parameters", "confidence", "class", "share", "support"}
+    fields = {
+        "component",
+        "kind",
+        "parameters",
+        "confidence",
+        "class",
+        "share",
+        "support",
+        "rivals",
+    }
     assert set(effect) == fields
     assert set(effect["parameters"]["coulomb"]) == {"value", "low", "high", "nominal", "unit"}
     assert effect["class"][0] == {"component": "rail", "kind": "coulomb"}

@@ -25,7 +25,6 @@ from referee.wild_truth import (
 )
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
-from rigtwin.diagnosis.thresholds import SelectionRules
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
@@ -181,14 +180,3 @@ def test_reliability_is_drawn(tmp_path):
     assert "300" in path.read_text()
     with pytest.raises(RigtwinError, match="cannot write"):
         draw_reliability([], tmp_path / "r.xyz")
-
-
-def test_confidence_grows_with_the_margin_and_is_never_certain():
-    rules = SelectionRules()
-    margins = np.linspace(0.0, 5.0, 50)
-    said = [rules.confidence(float(margin), left=0.1) for margin in margins]
-    assert said == sorted(said)
-    assert 0.5 < said[0] < said[-1] < 1.0
-    # Where more is left than was ever measured, less is said.
-    assert rules.confidence(5.0, left=0.4) == 0.85 < said[-1]
-    assert rules.confidence(0.05, left=0.4) == said[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,8 +15,9 @@ from rigtwin.description.mistakes import Mistakes, near
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 
-TICKS_LATE, TICKS_LATE_TO_COMMAND = 0.5, 0.1
-"""Ticks by which a sample may be early or late."""
+TICKS_LATE, LATE_TO_COMMAND = 0.5, 1e-3
+"""Ticks by which a sample may be early or late, and s of that at most where it answers to a command:
+a servo that is late by half a slow tick is late."""
 
 
 class Replays:
@@ -248,8 +250,10 @@ class Replays:
         for replay in replays:
             # Of joints that move together only what is observed is timed: against all of them.
             structure = self.structure(replays)
-            width = TICKS_LATE if structure is Structure.MOVED else TICKS_LATE_TO_COMMAND
+            longest = math.inf if structure is Structure.MOVED else LATE_TO_COMMAND
             for name in (row.name for row in replay.rows if row.kind != "command"):
                 # What is in one loop with the controller was sampled with it.
                 if (name, "delay") not in declared and not replay.closed:
-                    self._components.tolerances.append(Tolerance(name, "delay", width, ticks=True))
+                    self._components.tolerances.append(
+                        Tolerance(name, "delay", TICKS_LATE, ticks=True, longest=longest)
+                    )

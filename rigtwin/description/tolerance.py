@@ -3,6 +3,7 @@ diagnosis, never a finding."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from rigtwin.components.plant import P, Plant
@@ -14,18 +15,19 @@ MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 @dataclass(frozen=True)
 class Tolerance:
     """A declared tolerance of one parameter. group: the component; half_width: in the parameter's
-    unit, or as a share of its value if relative, or in ticks."""
+    unit, or as a share of its value if relative, or in ticks, but no more than `longest`, s."""
 
     group: str
     parameter: str
     half_width: float
     relative: bool = False
     ticks: bool = False
+    longest: float = math.inf
 
     def width(self, plant: Plant, period: float = 1.0) -> float:
         """Its half width in the parameter's unit, at that plant. period: s, of a tick."""
         if self.ticks:
-            return self.half_width * period
+            return min(self.half_width * period, self.longest)
         return self.half_width * (
             abs(float(getattr(getattr(plant, self.group), self.parameter)))
             if self.relative

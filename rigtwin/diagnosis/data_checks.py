@@ -55,8 +55,6 @@ CORRELATED = 0.75
 SAME_UNIT, NEAR_UNIT = 0.15, 0.5
 """Differences of the logarithms of a scale and of a unit's factor: below the first the unit is
 wrong, below the second a scale that is implausible anyway is said to look like that unit."""
-CONSTANT_FORCE = 0.01
-"""Swing of a predicted force, as a share of its mean, below which its mean says its scale."""
 EXCHANGED = 0.5
 """Share of the signals that their best order may leave for an exchange to be believed."""
 
@@ -309,11 +307,10 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
     odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
         signal, where = recording.column(*row.channel), ".".join(row.channel)
-        # The zero of a sensor may be displaced, so the means are left out, unless they are all
-        # that is there: a force at rest is its preload.
-        a, b = signal - signal.mean(), model - model.mean()
-        if row.kind == "force" and rms(b) < CONSTANT_FORCE * abs(float(model.mean())):
-            a, b = signal, model
+        # The zero of a sensor may be displaced, so the means are left out. A force of known scale
+        # has its preload, which says its scale even at rest.
+        whole = row.kind == "force" and np.isfinite(far)
+        a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
         alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))

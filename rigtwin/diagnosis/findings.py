@@ -57,9 +57,14 @@ def choose_named(
     An effect is named where it, or one that the data cannot tell from it, is more likely there than
     not. All of its rivals take its place together.
     """
-    posterior = found.posterior
-    named = []
-    for effect in found.fit.effects:
+    posterior, named = found.posterior, []
+    for effect, values, widths in zip(
+        found.fit.effects, found.fit.values, _widths(found), strict=True
+    ):
+        nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
+        if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
+            # An interval that holds the nominal value is no finding.
+            continue
         family = sum(posterior.inclusion(each) for each in (effect, *posterior.rivals(effect)))
         chance = min(family, 1.0) * (1.0 - support[effect].mimic)
         if chance >= thresholds.nameable:

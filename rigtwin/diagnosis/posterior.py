@@ -23,12 +23,15 @@ from functools import cached_property
 import numpy as np
 
 from rigtwin.components import Effect, measures
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.numerics.arrays import Array
 
+CHANCE = 2.0
+"""Standard deviations of the power of noise in a band that are no rest."""
 NOT_FAR = 10.0
 """Tempers by which a hypothesis may be worse for its values to widen an interval."""
 WITHIN = 0.3
@@ -49,6 +52,8 @@ CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler one at the end of their range."""
 DOUBT = 0.5
 """Parameters that such a kind costs besides its own."""
+UNSTEADY_PRICE = 20.0
+"""Nats by the square of the standard errors that a magnitude lacks."""
 UNDONE_PRICE = 50.0
 """Nats that two effects cost at most which undo each other."""
 TOLERANCE_PRICE = 50.0
@@ -110,6 +115,11 @@ class Posterior:
         t, share = self._thresholds, self.discrepancy
         self.temper = t.temper + t.discrepancy_temper * self.signal_samples * share
 
+    @property
+    def nominal(self) -> Plant:
+        """The plant without any effect."""
+        return self._fitter.plant
+
     def levels(self, scored: Scored) -> Array:
         """Power of a held-out residual in units of noise and declared error at the reference."""
         return scored.levels / self._noise
@@ -170,7 +180,7 @@ class Posterior:
             parameter = effect.kind.parameters[0]
             off = abs(values[0] - effect.nominal(self._fitter.plant)[parameter])
             sure = off / max(widths[0], 1e-300)
-            cost += 2.0 * max(t.steady - sure, 0.0) ** 2
+            cost += UNSTEADY_PRICE * max(t.steady - sure, 0.0) ** 2
             tolerance = self._evidence.machine.tolerance_of(effect.group, parameter)
             if tolerance is not None:
                 width = self._evidence.width(tolerance)
@@ -246,8 +256,9 @@ class Posterior:
         return tuple(dict.fromkeys(found))
 
     def excess(self, scored: Scored) -> Array:
-        """Power beyond noise and declared error, weighed by samples, shape (signals,)."""
-        return np.sum(self.pieces * np.maximum(self.levels(scored) - 1.0, 0.0), axis=(0, 2))
+        """Power beyond noise and declared error, shape (signals,)."""
+        beyond = np.maximum(self.levels(scored) - 1.0, 0.0)
+        return np.asarray(np.sum(scored.samples * beyond, axis=(0, 2)))
 
     def remains(self, effect: Effect) -> float:
         """Share of the gap's amplitude that is left in the signals that an effect acts on."""
@@ -263,14 +274,20 @@ class Posterior:
 
     @property
     def unexplained(self) -> float:
-        """Nats that the best hypothesis loses to one that leaves noise and declared error."""
-        noise = misfit_of(np.minimum(self.levels(self.best), 1.0), self.pieces, self.best.samples)
-        return self.loss(self.best) - 0.5 * noise
+        """Nats that the best hypothesis loses to one that leaves noise and declared error, beyond
+        what chance makes of noise."""
+        samples, levels = self.best.samples, self.levels(self.best)
+        chance = CHANCE * np.sqrt(2.0 / np.maximum(self.pieces, 1.0))
+        within = np.minimum(levels, 1.0)
+        beyond = within + np.maximum(levels - within - chance, 0.0)
+        return 0.5 * (
+            misfit_of(beyond, self.pieces, samples) - misfit_of(within, self.pieces, samples)
+        )
 
     @property
     def rest(self) -> float:
         """Excess of the best hypothesis, as a share of noise and declared error."""
-        return float(self.excess(self.best).sum() / np.sum(self.pieces))
+        return float(self.excess(self.best).sum() / np.sum(self.best.samples))
 
 
 def is_rare(effect: Effect) -> bool:
