@@ -16,8 +16,8 @@ from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 
 TICKS_LATE, LATE_TO_COMMAND = 0.5, 1e-3
-"""Ticks by which a sample may be early or late, and s of that at most where it answers to a command:
-a servo that is late by half a slow tick is late."""
+"""Ticks by which a sample may be early or late, and s of that at most where it answers to a
+command: a servo that is late by half a slow tick is late."""
 
 
 class Replays:

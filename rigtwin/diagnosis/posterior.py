@@ -54,6 +54,8 @@ DOUBT = 0.5
 """Parameters that such a kind costs besides its own."""
 UNSTEADY_PRICE = 20.0
 """Nats by the square of the standard errors that a magnitude lacks."""
+NEAR = 0.25
+"""Standard errors within which that price doubles where an interval holds the nominal value."""
 UNDONE_PRICE = 50.0
 """Nats that two effects cost at most which undo each other."""
 TOLERANCE_PRICE = 50.0
@@ -180,7 +182,9 @@ class Posterior:
             parameter = effect.kind.parameters[0]
             off = abs(values[0] - effect.nominal(self._fitter.plant)[parameter])
             sure = off / max(widths[0], 1e-300)
-            cost += UNSTEADY_PRICE * max(t.steady - sure, 0.0) ** 2
+            lacking = max(t.steady - sure, 0.0) ** 2
+            # Near the nominal value the price rises steeply: an interval that holds it names nothing.
+            cost += UNSTEADY_PRICE * lacking * (1.0 + (max(t.wider - sure, 0.0) / NEAR) ** 2)
             tolerance = self._evidence.machine.tolerance_of(effect.group, parameter)
             if tolerance is not None:
                 width = self._evidence.width(tolerance)
