@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from rigtwin.components import Effect
+from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.support import Support
@@ -30,15 +31,15 @@ def _logistic(ratio: float) -> float:
     return 1.0 / (1.0 + math.exp(-STEEPNESS * math.log(ratio)))
 
 
-def relative_rest(evidence: Evidence, posterior: Posterior) -> Array:
-    """Residual of each signal beside the best hypothesis, in units of its standard deviation.
+def relative_rest(evidence: Evidence, plant: Plant) -> Array:
+    """Residual of each signal beyond its noise, in units of its standard deviation.
 
     Parameters
     ----------
     evidence
         The recordings.
-    posterior
-        All hypotheses.
+    plant
+        Plant whose predictions are taken.
 
     Returns
     -------
@@ -46,9 +47,7 @@ def relative_rest(evidence: Evidence, posterior: Posterior) -> Array:
         Shape (signals,).
     """
     residual, swing = [], []
-    for lines, predicted in zip(
-        evidence.lines, evidence.predict(posterior.best.fit.plant), strict=True
-    ):
+    for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
         counted = lines.fade.max(axis=0) > 0.5
         residual.append(np.mean((lines.measured - predicted)[:, counted] ** 2, axis=1))
         swing.append(np.var(lines.measured[:, counted], axis=1))
@@ -82,8 +81,10 @@ def support_of(
     number = best.fit.effects.index(effect)
     nominal = effect.nominal(evidence.plant)[effect.kind.parameters[0]]
     width = max(best.widths[number][0], 1e-300)
-    remains = posterior.remains(effect)
-    rest = float(best.reach[number] @ relative_rest(evidence, posterior))
+    reach = best.reach[number]
+    rest = float(reach @ relative_rest(evidence, best.fit.plant))
+    gap = float(reach @ relative_rest(evidence, evidence.plant))
+    remains = min(rest / gap, 1.0) if gap > 0.0 else 0.0
     # A rest within the model error that is expected needs no unnamed effect.
     unnamed = _logistic(rest / evidence.machine.prior.error) * _logistic(
         posterior.rest / thresholds.rest

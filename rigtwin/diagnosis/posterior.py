@@ -183,7 +183,7 @@ class Posterior:
             off = abs(values[0] - effect.nominal(self._fitter.plant)[parameter])
             sure = off / max(widths[0], 1e-300)
             lacking = max(t.steady - sure, 0.0) ** 2
-            # Near the nominal value the price rises steeply: an interval that holds it names nothing.
+            # An interval that holds the nominal value names nothing: the price rises steeply there.
             cost += UNSTEADY_PRICE * lacking * (1.0 + (max(t.wider - sure, 0.0) / NEAR) ** 2)
             tolerance = self._evidence.machine.tolerance_of(effect.group, parameter)
             if tolerance is not None:
@@ -263,13 +263,6 @@ class Posterior:
         """Power beyond noise and declared error, shape (signals,)."""
         beyond = np.maximum(self.levels(scored) - 1.0, 0.0)
         return np.asarray(np.sum(scored.samples * beyond, axis=(0, 2)))
-
-    def remains(self, effect: Effect) -> float:
-        """Share of the gap's amplitude that is left in the signals that an effect acts on."""
-        number = self.best.fit.effects.index(effect)
-        reach = self.best.reach[number]
-        before, after = self.excess(self.empty), self.excess(self.best)
-        return math.sqrt(min(float(reach @ after) / max(float(reach @ before), 1e-300), 1.0))
 
     def closes(self, scored: Scored) -> float:
         """Share of the gap's amplitude beyond noise and declared error that is closed."""
