@@ -364,17 +364,6 @@ class Evidence:
         like._transform()
         return like
 
-    def beginning(self, share: float) -> Evidence:
-        """The first share of every recording."""
-        parts = [
-            recording.between(
-                -math.inf, float(recording.time[0]) + share * recording.ticks * recording.period
-            )
-            for recording in self.recordings
-        ]
-        counted = [each[: part.ticks] for each, part in zip(self._counted, parts, strict=True)]
-        return Evidence(self.machine, parts, self.configurations, counted)
-
     def _loosen(self) -> None:
         """Adds to what no line is held to what half the integration step would change."""
         for each, model in zip(self.lines, self.models, strict=True):

@@ -4,8 +4,7 @@
 2. Fit the promising effects alone, and the regular ones (friction, mass, stiffness) together.
 3. Extend the best hypotheses by one effect; replace each of their effects by those that resemble
    it; leave each out. Repeat as long as a better hypothesis is found.
-4. Where much is left, try other starts: other values, other components, and the beginnings of the
-   recordings, from which each longer stretch leads on to the next.
+4. Where much is left, try other values, and the same kinds at other components.
 
 A hypothesis is fitted on coarse evidence (half the integration steps, thinned where the model can
 do without), and scored on fine evidence.
