@@ -39,6 +39,8 @@ KEPT = 64
 """Responses beside a fit that are kept."""
 SMALL = 0.05
 """Share of the smallest start at which an effect is tried too."""
+SUFFICIENT = 0.95
+"""Share of what noise and declared error leave below which no better fit is looked for nearby."""
 SMALLER = 0.2
 """Share of the smallest start at which an effect is tried beside others as well."""
 NOTHING = 1e-3
@@ -349,7 +351,7 @@ class Fitter:
     def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the
         misfit has a step, and Gauss-Newton does not climb it."""
-        if fit.misfit <= self.evidence.expected:
+        if fit.misfit <= SUFFICIENT * self.evidence.expected:
             return fit
         for number, effect in enumerate(fit.effects):
             for place, share in product(range(len(effect.kind.parameters)), SHAKES):

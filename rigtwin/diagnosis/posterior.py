@@ -52,6 +52,8 @@ CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler one at the end of their range."""
 DOUBT = 0.5
 """Parameters that such a kind costs besides its own."""
+IMMATERIAL_PRICE = 100.0
+"""Nats that an effect costs at most which accounts for less than the declared model error."""
 UNSTEADY_PRICE = 20.0
 """Nats by the square of the standard errors that a magnitude lacks."""
 NEAR = 0.25
@@ -172,7 +174,12 @@ class Posterior:
                 if new[one] and new[other]:
                     lacking = (t.undone - scored.together[one, other]) / (0.5 * t.undone)
                     cost += UNDONE_PRICE * float(np.clip(lacking, 0.0, 1.0))
+        machine = self._evidence.machine
+        form = float(np.mean([machine.form_of(row) for row in machine.rows]))
         for effect, share in zip(scored.fit.effects, scored.accounts, strict=True):
+            # What is less than the declared error of the model is no effect.
+            immaterial = float(np.clip(t.material - share / form, 0.0, 1.0))
+            cost += machine.prior.even * IMMATERIAL_PRICE * immaterial
             if is_rare(effect):
                 lacking = float(np.clip(1.0 - share / t.rare_share, 0.0, 1.0))
                 cost += self.discrepancy * lacking * t.rare_doubt * self.signal_samples

@@ -315,6 +315,7 @@ class Search:
 
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
+        self._keep(self._refine(self._unfold(self.posterior.best.fit)))
         varied: set[frozenset[Effect]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
             varied.add(frozenset(best))

@@ -46,6 +46,9 @@ class Thresholds:
     rare_doubt: float = 0.3
     """Nats per independent sample of one signal that a rare effect costs which accounts for none of
     it, where an unexplained rest dominates."""
+    material: float = 2.0
+    """Declared model errors that an effect should account for where that error is spread evenly;
+    below it the price rises over one such error."""
     steady: float = 4.0
     """Standard errors by which a magnitude should differ from its nominal value; each one that is
     lacking costs nats quadratically."""
