@@ -3,6 +3,7 @@ from them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from rigtwin.components import Effect, find, title
@@ -20,8 +21,6 @@ from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import tell_apart
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-OFF_NOMINAL = 0.95
-"""Share of the way to the nominal value that other hypotheses may widen an interval."""
 SHOWN = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
 
@@ -61,7 +60,7 @@ def choose_named(
     """
     posterior, named = found.posterior, []
     for effect, values, widths in zip(
-        found.fit.effects, found.fit.values, _own_widths(found), strict=True
+        found.fit.effects, found.fit.values, _widths(found), strict=True
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
         if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
@@ -137,27 +136,17 @@ def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence:
 
 
 def _widths(found: Explanation) -> list[tuple[float, ...]]:
-    """Standard errors: by the cross-validation, by the final fit, or by what other hypotheses make
-    of a value, whichever is largest."""
+    """Standard errors of all values: the larger one of cross-validation and final fit, and what the
+    choice of the hypothesis adds."""
     posterior = found.posterior
-    widths = []
-    for effect, values, own in zip(
-        found.fit.effects, found.fit.values, _own_widths(found), strict=True
-    ):
-        spread = [each / STANDARD.wider for each in posterior.spread(effect)]
-        # Which hypothesis holds is what the confidence says: an interval is that of a named effect,
-        # and a named effect is not the nominal one.
-        off = abs(values[0] - effect.nominal(posterior.nominal)[effect.kind.parameters[0]])
-        spread[0] = min(spread[0], OFF_NOMINAL * off / STANDARD.wider)
-        widths.append(tuple(max(each) for each in zip(own, spread, strict=True)))
-    return widths
-
-
-def _own_widths(found: Explanation) -> list[tuple[float, ...]]:
-    """Standard errors within the best hypothesis alone."""
     return [
-        tuple(max(each) for each in zip(one, other, strict=True))
-        for one, other in zip(found.posterior.best.widths, found.fit.widths, strict=True)
+        tuple(
+            math.hypot(max(one, other), spread)
+            for one, other, spread in zip(scored, fitted, posterior.spread(effect), strict=True)
+        )
+        for effect, scored, fitted in zip(
+            found.fit.effects, posterior.best.widths, found.fit.widths, strict=True
+        )
     ]
 
 

@@ -32,8 +32,6 @@ from rigtwin.numerics.arrays import Array
 
 CHANCE = 2.0
 """Standard deviations of the power of noise in a band that are no rest."""
-NOT_FAR = 10.0
-"""Tempers by which a hypothesis may be worse for its values to widen an interval."""
 WITHIN = 0.3
 """Slope k of the density within noise and declared error: the noise is estimated from above, and
 what is gained within the declared error is little evidence of an effect."""
@@ -240,17 +238,17 @@ class Posterior:
         return min(min(costs, default=math.inf) - self.ranking[0].cost, 1e6)
 
     def spread(self, effect: Effect) -> tuple[float, ...]:
-        """How far the values of an effect differ between the hypotheses that are not far behind."""
+        """Standard deviation of the values of an effect over all hypotheses that contain it, about
+        those of the best one: how uncertain a value is because the hypothesis is."""
         number = self.best.fit.effects.index(effect)
-        own, most = self.best.fit.values[number], self.ranking[0].cost + NOT_FAR * self.temper
-        others = [
-            each.scored.fit.values[each.scored.fit.effects.index(effect)]
-            for each in self.ranking
-            if each.cost <= most and effect in each.scored.fit.effects
-        ]
-        return tuple(
-            max(abs(other[place] - value) for other in others) for place, value in enumerate(own)
-        )
+        own = np.array(self.best.fit.values[number])
+        variance, weight = np.zeros(len(own)), 0.0
+        for each in self.ranking:
+            if effect in each.scored.fit.effects:
+                values = each.scored.fit.values[each.scored.fit.effects.index(effect)]
+                variance += each.weight * (np.array(values) - own) ** 2
+                weight += each.weight
+        return tuple(np.sqrt(variance / weight).tolist())
 
     def rivals(self, effect: Effect) -> tuple[Effect, ...]:
         """Effects that the data cannot tell from one of the best hypothesis."""

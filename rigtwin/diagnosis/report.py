@@ -71,10 +71,7 @@ TOLERABLE = 10.0
 """if it is more than so many percent of the signal."""
 NEXT_TO_NOTHING = 0.02
 """Share of the signals' swing below which a twin predicts nothing."""
-CONFIDENCE = (
-    "the probability that this effect is there, measured on test machines that other programs "
-    "simulate"
-)
+CONFIDENCE = "the probability that it is this effect, among all hypotheses that were tried"
 
 
 def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:

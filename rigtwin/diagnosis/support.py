@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 CALIBRATION = ((0.0, 0.0), (0.5, 0.5), (0.8, 0.8), (0.95, 0.93), (0.999, 0.98), (1.0, 0.98))
-"""Probability → share of such names that were right, on the referees of docs/confidence.md."""
+"""Probability → confidence. Chosen by hand and close to the diagonal; not fitted to the referees
+yet (docs/confidence.md)."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,6 @@ class Support:
 
     @property
     def confidence(self) -> float:
-        """Calibrated probability that this effect is there."""
+        """Probability that this effect is there, a mimic excluded."""
         said, right = zip(*CALIBRATION, strict=True)
         return float(np.interp(self.probability * (1.0 - self.mimic), said, right))

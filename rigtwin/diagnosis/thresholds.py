@@ -1,7 +1,7 @@
 """Every number that decides what a diagnosis says.
 
-They were set on cases drawn with other seeds than those that are reported (docs/confidence.md).
-"Nats" are units of log likelihood: a hypothesis that is better by one nat is e times as likely.
+They were set by hand on the recordings that docs/diagnosis.md lists, and are not calibrated on the
+referees yet (docs/confidence.md). "Nats" are units of log likelihood: a hypothesis that is better by one nat is e times as likely.
 """
 
 from __future__ import annotations
@@ -113,4 +113,4 @@ class Thresholds:
 
 
 STANDARD = Thresholds()
-"""The thresholds that every published figure was made with."""
+"""The thresholds that a diagnosis uses unless it is given others."""
