@@ -9,8 +9,9 @@ import pytest
 from rigtwin.components import KINDS, RigPlant
 from rigtwin.diagnosis.evidence import Evidence, despike
 from rigtwin.diagnosis.explain import candidates, explain
-from rigtwin.diagnosis.fit import Fit, with_values
+from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.space import BEYOND, Space
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
@@ -135,7 +136,7 @@ def test_what_a_fit_leaves_without_an_effect_is_foreseen(nominal):
     names = ("mass@carriage", "gain@motor", "stiffness@tyre")
     effects = tuple(rig_effect(name) for name in names)
     fit = fitter.refine(effects, [fitter.starts(effect).values[0] for effect in effects])
-    foreseen = fitter.predict_without(fit)
+    foreseen = Linearised(fitter, fit).leave_out_each()
     again = [fitter.refine(rest, values) for _, rest, values in foreseen]
     # A stiffness that is nominal is missed least; a gain of 10 tolerances most.
     assert foreseen[0][1] == effects[:2]
@@ -163,20 +164,3 @@ def test_two_effects_are_told_apart():
     assert named == {"viscous@motor", "gain@suspension_lvdt"}
     assert sum(each.weight for each in found.posterior.ranking) == pytest.approx(1.0)
     assert all(found.posterior.inclusion(effect) > 0.9 for effect in found.fit.effects)
-
-
-def test_a_shape_at_the_end_of_its_range_is_seen_and_a_phase_or_a_zero_is_none(nominal):
-    fitter = Fitter(nominal)
-    stribeck, cogging = (rig_effect(name) for name in ("stribeck@rail", "cogging@motor"))
-    inside, low, high = (
-        Fit((stribeck,), ((5.0, speed, exponent),), 0.0, (), fitter.plant)
-        for speed, exponent in ((0.01, 1.0), (1e-4, 1.0), (0.01, 3.0))
-    )
-    assert not fitter.has_shape_at_end(inside)
-    assert fitter.has_shape_at_end(low)
-    assert fitter.has_shape_at_end(high)
-    end = cogging.quantities()["cogging_phase"].high
-    turned = Fit((cogging,), ((5.0, 0.03, end),), 0.0, (), fitter.plant)
-    assert not fitter.has_shape_at_end(turned)
-    yielding = rig_effect("compliance@structure_cylinder")
-    assert not fitter.has_shape_at_end(Fit((yielding,), ((1e-6, 0.0),), 0.0, (), fitter.plant))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rigtwin.diagnosis.blocks import count_independent, find_bands, split_transforms
 from rigtwin.diagnosis.explain import explain
 from rigtwin.diagnosis.posterior import Posterior, misfit_of
-from rigtwin.diagnosis.scoring import count_independent, find_bands, split_transforms
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import STANDARD
 from tests.helpers.twin import evidence_of, recorded
@@ -23,7 +23,7 @@ def damped():
 
 
 def density(level: float) -> float:
-    return misfit_of(np.array([[[level]]]), PIECES, SAMPLES)
+    return misfit_of(np.array([[[level]]]), PIECES, SAMPLES, STANDARD.within)
 
 
 def test_the_density_falls_with_the_residual_and_has_no_step_at_the_noise():

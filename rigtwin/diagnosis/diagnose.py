@@ -277,12 +277,12 @@ def _leaves_something(found: Explanation, kept: Sequence[Effect]) -> bool:
     """Whether more than noise and declared error is left once the kept effects are corrected."""
     posterior = found.posterior
     if set(kept) == set(posterior.best.fit.effects):
-        return posterior.unexplained > posterior.price_for_one()
+        return posterior.leaves_something
     known = [each.scored for each in posterior.ranking if set(each.scored.fit.effects) == set(kept)]
     # What was fitted and is not named leaves what it explained.
     scored = known[0] if known else posterior.empty
     left = posterior.loss(scored) - posterior.loss(posterior.best) + posterior.unexplained
-    return left > posterior.price_for_one()
+    return left > posterior.prices.ordinary
 
 
 def _alternatives(

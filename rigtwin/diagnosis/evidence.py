@@ -344,11 +344,6 @@ class Evidence:
             found.append(np.maximum(spread - each.spread, 0.0) * each.weight**2)
         return found
 
-    def expected_misfit(self, plant: Plant) -> float:
-        """Chi-square of noise and declared error about a plant; `expected` at least."""
-        more = sum(float(2.0 * e.sum()) for e in self.excess_noise(plant) if e is not None)
-        return self.expected + more
-
     def halve_steps(self) -> Evidence:
         """The same with half as many integration steps: for a search, not for its result."""
         like = copy(self)

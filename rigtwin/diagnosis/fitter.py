@@ -3,7 +3,7 @@ prior beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -16,7 +16,7 @@ from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
-from rigtwin.diagnosis.gauss_newton import DAMPING, minimise, take_derivatives
+from rigtwin.diagnosis.gauss_newton import minimise
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -195,31 +195,6 @@ class Fitter:
             key=lambda fit: fit.misfit,
         )
 
-    def unfitted(self, screened: Screened) -> Fit:
-        """The best of what was tried of an effect, or none of it if nothing helped.
-
-        Parameters
-        ----------
-        screened
-            What was tried of it.
-
-        Returns
-        -------
-        Fit
-            Of that effect alone.
-        """
-        (misfit, start), effect = screened.starts[0], screened.effect
-        values: Values = (start,)
-        if misfit >= self.nothing.misfit and effect.kind.name not in LIMITS:
-            misfit, values = self.nothing.misfit, self.scale_start(effect, start, 0.0)
-        return Fit(
-            (effect,),
-            values,
-            misfit,
-            ((0.0,) * len(start),),
-            with_values(self.plant, (effect,), values),
-        )
-
     def _blend(self, effect: Effect, responses: Responses) -> list[tuple[float, tuple[float, ...]]]:
         """The blends of neighbouring quadratures that promise most, with their misfits."""
         left = self.space.subtract_tolerances(self._nominal)
@@ -321,20 +296,13 @@ class Fitter:
         Fit
             Of the same effects.
         """
-        return self._settle(fit, SETTLING, self._perturb)
-
-    def settle(self, fit: Fit) -> Fit:
-        """The same once, and not tried to be better further away: for a search."""
-        return self._settle(fit, 1, lambda fit, *_: fit)
-
-    def _settle(self, fit: Fit, rounds: int, improve: Callable[[Fit, Space, Plant], Fit]) -> Fit:
         tolerances = self.evidence.machine.tolerances
         mechanical = np.array([tolerance.mechanical for tolerance in tolerances], bool)
         # A first guess of how much of them is used does not depend on where it is made.
         space = self.space.beside(fit.effects)
         used = np.zeros(len(tolerances))
         residual = self.evidence.residual(fit.plant)
-        for number in range(rounds):
+        for number in range(SETTLING):
             found = np.where(mechanical, space.estimate_tolerances(residual), 0.0)
             if number and np.max(np.abs(found - used), initial=0.0) < UNMOVED:
                 break
@@ -343,7 +311,7 @@ class Fitter:
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
             )
-            fit = improve(self.refine(fit.effects, fit.values, space, base), space, base)
+            fit = self._perturb(self.refine(fit.effects, fit.values, space, base), space, base)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
             fit = replace(fit, base=base, used=tuple(used.tolist()))
         return fit
@@ -399,65 +367,6 @@ class Fitter:
             )
         )
 
-    def has_shape_at_end(self, fit: Fit) -> bool:
-        """Whether a parameter other than an effect's magnitude stands at the end of the range that
-        it is searched in: then the effect only resembles what is there. A phase has no end."""
-        low, high = self.bounds(fit.effects)
-        names = [(n, name) for e in fit.effects for n, name in enumerate(e.kind.parameters)]
-        values = np.concatenate([np.asarray(each) for each in fit.values])
-        return any(
-            place > 0
-            and not name.endswith("phase")
-            and np.any((ends != 0.0) & (np.abs(value - ends) <= AT_BOUND * np.abs(ends)))
-            for (place, name), value, ends in zip(
-                names, values, np.stack([low, high], axis=1), strict=True
-            )
-        )
-
-    def predict_without(self, fit: Fit) -> list[tuple[float, tuple[Effect, ...], Values]]:
-        """What a fit would leave without each of its effects, the others taken anew, to first
-        order.
-
-        Parameters
-        ----------
-        fit
-            Of two effects or more.
-
-        Returns
-        -------
-        list of tuples
-            Misfit, the other effects and their values, the least misfit first; without those in
-            which an effect lacks what it acts through.
-        """
-        around = _Linearised(self, fit)
-        everything = tuple(range(len(fit.effects)))
-        return around.leave_out_each(everything)
-
-    def eliminate(self, fit: Fit) -> list[tuple[float, tuple[Effect, ...], Values]]:
-        """Leave out one effect after another, each time the one that is missed least, to first
-        order.
-
-        Parameters
-        ----------
-        fit
-            Of two effects or more.
-
-        Returns
-        -------
-        list of tuples
-            Misfit, the remaining effects and their values, the largest set first.
-        """
-        around, remaining = _Linearised(self, fit), tuple(range(len(fit.effects)))
-        found = []
-        while len(remaining) > 1:
-            fewer = around.leave_out_each(remaining)
-            if not fewer:
-                break
-            found.append(fewer[0])
-            left = set(fewer[0][1])
-            remaining = tuple(n for n in remaining if fit.effects[n] in left)
-        return found
-
     def refine(
         self,
         effects: tuple[Effect, ...],
@@ -512,58 +421,3 @@ class Fitter:
             split(found.widths),
             with_values(self.plant, effects, values),
         )
-
-
-class _Linearised:
-    """A fit's residual, linear in the parameters of its effects."""
-
-    def __init__(self, fitter: Fitter, fit: Fit) -> None:
-        self._fitter, self._fit = fitter, fit
-        self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
-        self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
-        self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
-        self._here = np.concatenate([np.asarray(values, float) for values in fit.values])
-        self._bounds = fitter.bounds(fit.effects)
-
-        def residual(vector: Array) -> Array:
-            plant = with_values(fitter.plant, fit.effects, self._split(vector))
-            return fitter.evidence.residual(plant)
-
-        self._left = residual(self._here)
-        self._jacobian = take_derivatives(
-            residual, self._here, self._left, self._steps, self._bounds[1]
-        )
-        normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._left)
-        self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
-
-    def _split(self, vector: Array) -> Values:
-        cuts = np.cumsum(self._sizes)[:-1]
-        return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
-
-    def leave_out_each(
-        self, remaining: Sequence[int]
-    ) -> list[tuple[float, tuple[Effect, ...], Values]]:
-        """Misfit, effects and values without each of the remaining effects, the best first."""
-        found = []
-        for out in remaining:
-            rest = [number for number in remaining if number != out]
-            effects = tuple(self._fit.effects[number] for number in rest)
-            if is_possible(effects, self._fitter.plant):
-                misfit, values = self._keep_only(rest)
-                found.append((misfit, effects, values))
-        return sorted(found, key=lambda each: each[0])
-
-    def _keep_only(self, rest: Sequence[int]) -> tuple[float, Values]:
-        move = np.zeros(len(self._here))
-        for number, effect in enumerate(self._fit.effects):
-            if number not in rest:
-                # Of an effect that is not there only the magnitude says so.
-                place = int(np.nonzero(self._owner == number)[0][0])
-                nominal = effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]
-                move[place] = (nominal - self._here[place]) / self._steps[place]
-        free = np.isin(self._owner, rest)
-        right = self._gradient[free] + self._normal[np.ix_(free, ~free)] @ move[~free]
-        move[free] = -np.linalg.solve(self._normal[np.ix_(free, free)], right)
-        misfit = self._fitter.space.misfit(self._left + self._jacobian @ move)
-        values = self._split(np.clip(self._here + move * self._steps, *self._bounds))
-        return misfit, tuple(values[number] for number in rest)

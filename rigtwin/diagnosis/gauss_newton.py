@@ -82,11 +82,7 @@ def minimise(
     for _ in range(ITERATIONS):
         taken = wide * scale
         jacobian = take_derivatives(residual, here, left, taken * steps, high) / taken
-        # A derivative whose step changes more than is left of the residual is a secant far from the
-        # tangent: the next ones are taken over shorter steps.
-        power = np.sum(jacobian**2, axis=0)
-        least = RESPONSE * misfit + 1e-12 * power
-        scale = np.clip(np.sqrt(least / np.maximum(power, least)), SHORTEST, 1.0)
+        scale = shorten(jacobian, misfit)
         normal, gradient = space.normal_equations(jacobian, left)
         damped = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
         move = -np.linalg.solve(damped, gradient)
@@ -105,6 +101,28 @@ def minimise(
             wide = WIDEST
     widths = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
     return Minimum(here, misfit, widths)
+
+
+def shorten(jacobian: Array, misfit: float) -> Array:
+    """Shorten the steps of derivatives that change more than is left of the residual.
+
+    A response to such a step is a secant far from the tangent.
+
+    Parameters
+    ----------
+    jacobian
+        Response to each step, shape (size, parameters).
+    misfit
+        Chi-square of the residual.
+
+    Returns
+    -------
+    array
+        Share of each step that should be taken, at most 1, shape (parameters,).
+    """
+    power = np.sum(jacobian**2, axis=0)
+    least = RESPONSE * misfit + SHORTEST**2 * power
+    return np.asarray(np.sqrt(least / np.maximum(power, least)))
 
 
 def take_derivatives(

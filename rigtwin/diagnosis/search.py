@@ -15,17 +15,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, product
 
 from rigtwin.components import Effect, Guide, measures
 from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
+from rigtwin.diagnosis.fit import Fit, Values
 from rigtwin.diagnosis.fitter import Fitter, Screened
-from rigtwin.diagnosis.posterior import Posterior, is_rare
+from rigtwin.diagnosis.linearised import Linearised
+from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.proposals import propose_additions, propose_replacements
 from rigtwin.diagnosis.scoring import Scored, Scorer
+from rigtwin.diagnosis.starts import (
+    GATEWAY,
+    REGULAR,
+    Start,
+    start_elsewhere,
+    start_in_series,
+    start_otherwise,
+    start_regular_instead,
+    start_unfolded,
+)
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
 
@@ -39,28 +49,16 @@ BEHIND = 0.5
 """Share of what the best hypothesis explains that another may lack and still be extended."""
 MISSED = 10.0
 """Prices of an effect whose loss is worth a fit without it."""
-REGULAR = ("coulomb", "viscous", "stiffness", "mass", "armature", "offset")
-"""Kinds that nearly every machine has more or less of."""
-GATEWAY = "coulomb"
-"""Kind without which a play, a spring or a Stribeck peak in series with it does nothing."""
-IN_SERIES = ("compliance", "backlash")
-"""Kinds in series with dry friction that hide it."""
 GATEWAY_STARTS = 3
 """Sizes of the gateway from which regular effects are fitted together."""
 FEW_REGULAR = 6
 """Regular effects up to which all of these sizes are tried."""
 ELIMINATED = 4
 """Sets that are fitted of those from which one regular effect after another was left out."""
-SECOND_ORDER = ("two_lags", "resonance")
-"""Kinds that a lag together with a delay resembles."""
-COMBINATIONS, FOLLOWED = 150, 2
-"""Combinations of starts that are tried of one hypothesis at most, and those that are fitted."""
 VARIED, COMPARED = 2, 5
 """Effects that are tried in the place of each while the search climbs, and of its result."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
-Start = tuple[tuple[Effect, ...], Values]
-"""Effects, and the values that a fit starts from."""
 
 
 @dataclass
@@ -113,10 +111,10 @@ class Search:
         singles = self._fit_singles()
         if self._has_gap(singles):
             self._climb()
-            if self._leaves_something(self.posterior) or len(self.posterior.best.fit.effects) > 1:
+            if self.posterior.leaves_something or len(self.posterior.best.fit.effects) > 1:
                 self._fit_regulars()
                 self._climb()
-            if self._leaves_something(self.posterior):
+            if self.posterior.leaves_something:
                 self._restart()
                 self._climb()
             self._vary_best()
@@ -129,7 +127,7 @@ class Search:
         self.screened = self.threads.map(self.coarse.screen, self.effects)
         nothing = self.fine.refit_with_tolerances(self.fine.nothing)
         self._add([nothing])
-        limit = self.posterior.price_for_one()
+        limit = self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, 2.0 * limit, self.thresholds))
         most = max((each.promise for each in self.screened), default=0.0)
         worth = self.thresholds.promising * max(most, 2.0 * limit)
@@ -151,14 +149,10 @@ class Search:
         return bool(posterior.best.fit.effects) or (
             bool(singles)
             and (
-                self.coarse.nothing.misfit - singles[0].misfit > 2.0 * posterior.price_for_one()
+                self.coarse.nothing.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
                 or posterior.rest > self.thresholds.rest
             )
         )
-
-    def _leaves_something(self, posterior: Posterior) -> bool:
-        """Whether the rest of the best hypothesis could pay for one more effect."""
-        return posterior.unexplained > posterior.price_for_one()
 
     # The pool
 
@@ -200,14 +194,16 @@ class Search:
             starts.append(balanced)
         tries = self.threads.map(lambda values: coarse.refine(tuple(chosen), values), starts)
         whole = min(tries, key=lambda fit: fit.misfit)
-        price = 2.0 * self.posterior.price_for_one()
-        path = sorted(coarse.eliminate(whole), key=lambda each: each[0] + price * len(each[1]))
+        price = 2.0 * self.posterior.prices.ordinary
+        path = sorted(
+            Linearised(coarse, whole).eliminate(), key=lambda each: each[0] + price * len(each[1])
+        )
         fits = self.threads.map(lambda each: coarse.refine(*each[1:]), path[:ELIMINATED])
         self._keep([whole, *fits])
 
     def _choose_regulars(self) -> list[Effect]:
         """Regular effects that promise anything, at every component that can have them."""
-        worth = self.posterior.price_for_one()
+        worth = self.posterior.prices.ordinary
         promise = {each.effect: each.promise for each in self.screened}
         coupled = len({e.group for e in self.effects if e.of is Guide}) > 1
         chosen: dict[tuple[str, str], Effect] = {}
@@ -230,7 +226,7 @@ class Search:
                 return
             self._extend(leader)
             if not self._improved(before):
-                if not self._leaves_something(self.posterior):
+                if not self.posterior.leaves_something:
                     return
                 self._vary(leader, VARIED)
             steady = 0 if self._improved(before) else steady + 1
@@ -263,7 +259,7 @@ class Search:
     def _extend(self, leader: Fit) -> None:
         """Fit a hypothesis with one more effect."""
         self._extended.add(frozenset(leader.effects))
-        limit = self.posterior.price_for_one()
+        limit = self.posterior.prices.ordinary
         proposals = sorted(
             propose_additions(self.coarse, leader, self.effects, 2.0 * limit, self.threads),
             key=lambda proposal: proposal.promised,
@@ -271,51 +267,35 @@ class Search:
         fits = self.threads.map(
             lambda each: self.coarse.refine(each.effects, each.values, each.space), proposals
         )
-        if self._leaves_something(self.posterior):
-            fits += self._refine([*self._series_starts(leader), *self._unfold(leader)])
+        if self.posterior.leaves_something:
+            fits += self._refine(
+                [
+                    *start_in_series(self.coarse, leader, self.effects, self.pool.keys()),
+                    *start_unfolded(self.coarse, leader, self.effects),
+                ]
+            )
         self._keep(fits)
 
     def _vary(self, leader: Fit, count: int) -> None:
         """Fit a hypothesis with each effect left out, and with each replaced by so many others that
         resemble it."""
-        limit = 2.0 * self.posterior.price_for_one()
+        limit = 2.0 * self.posterior.prices.ordinary
         starts: list[Start] = []
         if len(leader.effects) > 1:
             # An effect whose loss costs far more than its price is not worth a fit without it.
             starts += [
                 (rest, values)
-                for misfit, rest, values in self.coarse.predict_without(leader)
+                for misfit, rest, values in Linearised(self.coarse, leader).leave_out_each()
                 if misfit - leader.misfit < MISSED * limit
             ]
         starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
-        starts += self._regular_instead(leader)
+        starts += start_regular_instead(self.coarse, leader, self.effects)
         self._keep(self._refine(starts))
-
-    def _regular_instead(self, leader: Fit) -> list[Start]:
-        """Each rare effect replaced by the regular ones of its component, however unlike they are:
-        what few machines have needs to be compared with what all have."""
-        found: list[Start] = []
-        for number, effect in enumerate(leader.effects):
-            if not is_rare(effect):
-                continue
-            kept = (*leader.effects[:number], *leader.effects[number + 1 :])
-            values = (*leader.values[:number], *leader.values[number + 1 :])
-            for other in self.effects:
-                if (
-                    other.group == effect.group
-                    and other.kind.name in REGULAR
-                    and other not in kept
-                    and not clashes(other, kept)
-                    and is_possible((*kept, other), self.coarse.plant)
-                ):
-                    middle = self.coarse.starts(other).values
-                    start = min(middle, key=lambda each: abs(each[0]))
-                    found.append(((*kept, other), (*values, start)))
-        return found
 
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
-        self._keep(self._refine(self._unfold(self.posterior.best.fit)))
+        best_fit = self.posterior.best.fit
+        self._keep(self._refine(start_unfolded(self.coarse, best_fit, self.effects)))
         varied: set[frozenset[Effect]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
             varied.add(frozenset(best))
@@ -331,7 +311,7 @@ class Search:
         """Settle the most promising of some coarse fits of each size, and score all others."""
         if not fits:
             return
-        price = 2.0 * self.posterior.price_for_one()
+        price = 2.0 * self.posterior.prices.ordinary
         distinct: dict[frozenset[Effect], Fit] = {}
         for fit in sorted(fits, key=lambda fit: fit.misfit + price * len(fit.effects)):
             distinct.setdefault(frozenset(fit.effects), fit)
@@ -341,62 +321,6 @@ class Search:
         near = [fit for fit in ranked[:PRECISE] if fit.misfit <= hopeless or not best.effects]
         self._settle(near)
         self._add([fit for fit in ranked if fit not in near])
-
-    def _series_starts(self, leader: Fit) -> list[Start]:
-        """Starts for pairs of dry friction and what is in series with it: friction behind a soft
-        spring hardly resembles friction alone, nor does a play resemble one behind a spring."""
-        found = []
-        gates = [e for e in self.effects if e.kind.name == GATEWAY and e.of is Guide]
-        for gate in gates:
-            series = [gate] + [
-                e for e in self.effects if e.group == gate.group and e.kind.name in IN_SERIES
-            ]
-            present = [effect for effect in series if effect in leader.effects]
-            for pair in combinations(series, 2):
-                rest = [
-                    (effect, values)
-                    for effect, values in zip(leader.effects, leader.values, strict=True)
-                    if effect not in pair
-                ]
-                kept = tuple(effect for effect, _ in rest)
-                wanted = gate in pair or gate in present
-                known = frozenset((*kept, *pair)) in self.pool
-                if wanted and not known and not any(clashes(each, kept) for each in pair):
-                    found.append(self._pair_start(kept, tuple(v for _, v in rest), pair))
-        return found
-
-    def _pair_start(
-        self, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]
-    ) -> Start:
-        """A pair of effects beside others, at the best of all pairs of their starts."""
-        coarse, both = self.coarse, (*effects, *pair)
-        one, two = (coarse.starts(effect).values for effect in pair)
-        starts = [(*values, *start) for start in product(one, two)]
-        residuals = (
-            coarse.evidence.residual(with_values(coarse.plant, both, start)) for start in starts
-        )
-        return both, min(
-            (coarse.space.misfit(residual), start)
-            for residual, start in zip(residuals, starts, strict=True)
-        )[1]
-
-    def _unfold(self, leader: Fit) -> list[Start]:
-        """Starts with a lag and a delay in the place of an effect of second order: they are alike
-        at low frequencies."""
-        found = []
-        for effect, rest, values in without_each(leader):
-            pair = [
-                each
-                for each in self.effects
-                if each.group == effect.group and each.kind.name in ("lag", "delay")
-            ]
-            if (
-                effect.kind.name in SECOND_ORDER
-                and len(pair) == 2
-                and not any(clashes(each, rest) for each in pair)
-            ):
-                found.append(self._pair_start(rest, values, (pair[0], pair[1])))
-        return found
 
     # Where much is left
 
@@ -408,44 +332,9 @@ class Search:
         """
         leaders = [each.scored.fit for each in self.posterior.ranking if math.isfinite(each.cost)]
         leaders = [fit for fit in leaders if fit.effects][: self.thresholds.leaders]
-        fits = [
-            fit for each in self.threads.spread(self._from_other_values, leaders) for fit in each
-        ]
-        if leaders:
-            fits += self.threads.map(
-                lambda start: self.coarse.refine(*start), self._elsewhere(leaders[0])
-            )
-        self._keep(fits)
-
-    def _from_other_values(self, fit: Fit) -> list[Fit]:
-        coarse = self.coarse
-        starts = [coarse.starts(effect).values for effect in fit.effects]
-        if math.prod(len(each) for each in starts) > COMBINATIONS:
-            return []
-        scored = sorted(
-            (
-                coarse.space.misfit(
-                    coarse.evidence.residual(with_values(coarse.plant, fit.effects, values))
-                ),
-                values,
-            )
-            for values in product(*starts)
-        )
-        return [coarse.refine(fit.effects, values) for _, values in scored[:FOLLOWED]]
-
-    def _elsewhere(self, fit: Fit) -> list[Start]:
-        """Each effect of a hypothesis in turn at every other component that may have it."""
-        found = []
-        for number, effect in enumerate(fit.effects):
-            kept = (*fit.effects[:number], *fit.effects[number + 1 :])
-            for other in self.effects:
-                effects = (*fit.effects[:number], other, *fit.effects[number + 1 :])
-                if (
-                    other != effect
-                    and other.kind == effect.kind
-                    and not clashes(other, kept)
-                    and is_possible(effects, self.coarse.plant)
-                    and frozenset(effects) not in self.pool
-                ):
-                    found.append((effects, fit.values))
-        return found
+        coarse, known = self.coarse, self.pool.keys()
+        again = self.threads.spread(lambda fit: start_otherwise(coarse, fit), leaders)
+        starts = [start for each in again for start in each]
+        for fit in leaders[:1]:
+            starts += start_elsewhere(coarse, fit, self.effects, known)
+        self._keep(self._refine(starts))

@@ -1,7 +1,8 @@
 """Every number that decides what a diagnosis says.
 
 They were set by hand on the recordings that docs/diagnosis.md lists, and are not calibrated on the
-referees yet (docs/confidence.md). "Nats" are units of log likelihood: a hypothesis that is better by one nat is e times as likely.
+referees yet (docs/confidence.md). "Nats" are units of log likelihood: a hypothesis that is better
+by one nat is e times as likely.
 """
 
 from __future__ import annotations
@@ -50,8 +51,18 @@ class Thresholds:
     """Declared model errors that an effect should account for where that error is spread evenly;
     below it the price rises over one such error."""
     steady: float = 4.0
-    """Standard errors by which a magnitude should differ from its nominal value; each one that is
-    lacking costs nats quadratically."""
+    """Standard errors by which a magnitude should differ from its nominal value."""
+    unsteady: float = 20.0
+    """Nats that the first standard error costs which a magnitude lacks; the price grows with the
+    square, and steeply once the interval holds the nominal value."""
+    forbidding: float = 50.0
+    """Nats that an effect costs at most which is immaterial, undone by another, or no more than its
+    declared tolerance."""
+    within: float = 0.3
+    """Share of its weight that the likelihood has within noise and declared error. The noise is
+    estimated from above, and what is gained within the declared error is little evidence."""
+    chance: float = 2.0
+    """Standard deviations of the power of noise in a band that are no rest."""
     undone: float = 0.6
     """Share of the smaller response that two effects must have together; with less they undo each
     other, which costs nats linearly."""
