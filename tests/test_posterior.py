@@ -84,7 +84,14 @@ def test_a_rival_that_does_worse_takes_no_more_weight(damped):
 
 
 def support(**changes: float) -> Support:
-    values = {"probability": 0.9, "margin": 10.0, "steadiness": 9.0, "remains": 0.0, "mimic": 0.0}
+    values = {
+        "probability": 0.9,
+        "margin": 10.0,
+        "steadiness": 9.0,
+        "remains": 0.0,
+        "dominance": 9.0,
+        "mimic": 0.0,
+    }
     return Support(**{**values, **changes})
 
 

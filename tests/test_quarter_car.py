@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments import EXPERIMENTS
-from rigtwin.components import Effect, RigPlant, Swing, candidates
+from rigtwin.components import Effect, RigPlant, Scales, Swing, candidates
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
 from rigtwin.diagnosis.evidence import despike
@@ -17,6 +17,7 @@ from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
 from rigtwin.models.quarter_car_motion import motor_friction, solve_velocity
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
+from rigtwin.simulation.plant import initial_yield
 from rigtwin.simulation.twin import Twin
 from tests.helpers.twin import RIG, recorded
 
@@ -74,8 +75,9 @@ def swing():
 
 
 def size_of(effect: Effect, swing: dict[str, Swing]) -> tuple[float, ...]:
-    # No search on the suspension rig starts from the size of a motion.
-    starts = effect.starts(RIG.plant, swing.get(effect.component, Swing()), pytest.fail).values
+    # The load at which a cylinder was set to zero is the only start here that depends on a motion.
+    scales = Scales(0.03, 0.05, 0.2, 1.0, force=230.0, period=1e-3)
+    starts = effect.starts(RIG.plant, swing.get(effect.component, Swing()), lambda: scales).values
     return starts[len(starts) // 2]
 
 
@@ -93,6 +95,23 @@ def test_every_effect_does_the_same_to_both(effect, swing):
     loose = 4.0 if effect.kind.name in LOOSE else 1.0
     assert motion < loose * 0.5 * 6e-5
     assert force < loose * 1.5
+
+
+@pytest.mark.parametrize("cylinder", ["structure_cylinder", "ground_cylinder"])
+def test_a_plate_that_was_set_to_zero_under_load_yields_to_the_rest(cylinder):
+    """In both models alike; at rest it stands at compliance·(load − zero load)."""
+    stiff = getattr(QUIET, cylinder)._replace(compliance=5e-6, zero_load=150.0)
+    configuration = EXPERIMENTS["imposed"].configuration._replace(
+        plant=QUIET._replace(**{cylinder: stiff})
+    )
+    motion, force = apart(configuration)
+    assert motion < 4.0 * 0.5 * 6e-5
+    assert force < 4.0 * 1.5
+    ground, structure = initial_yield(configuration.plant, preload=200.0)
+    expected = 5e-6 * (200.0 - 150.0)
+    assert (-ground, structure) == (
+        pytest.approx((expected, 0.0) if cylinder == "ground_cylinder" else (0.0, expected))
+    )
 
 
 @pytest.mark.parametrize("rhs", [-3.0, -0.5, -0.01, 0.0, 0.01, 0.5, 3.0])

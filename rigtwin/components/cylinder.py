@@ -19,7 +19,7 @@ from rigtwin.numerics.arrays import Array
 class Cylinder(NamedTuple):
     """Position-controlled hydraulic cylinder: (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s +
     a0), scaled to unit static gain, then a limit of the speed, a play between piston and plate, and
-    a plate that yields by compliance·load, `yield_lag` behind it."""
+    a plate that yields by compliance·(load − `zero_load`), `yield_lag` behind it."""
 
     b2: loop.B2 = loop.NOMINAL.b2
     b1: loop.B1 = loop.NOMINAL.b1
@@ -40,6 +40,9 @@ class Cylinder(NamedTuple):
         float, Quantity("m/N", 0.0, 2e-5, "0: a cylinder in position control does not yield, §3.2")
     ] = 0.0
     yield_lag: Annotated[float, Quantity("s", 0.0, 0.1, "0: yields at once; assumed")] = 0.0
+    zero_load: Annotated[
+        float, Quantity("N", -2000.0, 2000.0, "0: the plate was set to zero without load; assumed")
+    ] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 0.05, NONE)] = 0.0
 
 

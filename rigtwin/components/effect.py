@@ -123,7 +123,8 @@ class Kind:
     title: its name in a sentence; parameters: of the component that it sets, the first its
     magnitude; meaning: what it does; at: type of component that can have it → where the search
     starts, None where it is read off the signals instead; negative: what it does where its
-    magnitude is below zero, if that is something else.
+    magnitude is below zero, if that is something else; nuisances: parameters that must be fitted
+    with it but say nothing of it, such as the load at which a thing was set to zero.
     """
 
     name: str
@@ -132,6 +133,7 @@ class Kind:
     meaning: str
     at: Mapping[type, Guess | None] = field(compare=False, repr=False)
     negative: str = field(default="", compare=False, repr=False)
+    nuisances: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
 
 @dataclass(frozen=True)

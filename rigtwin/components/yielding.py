@@ -9,6 +9,30 @@ solved together, so that a cylinder of any compliance stays stable at any timest
 from __future__ import annotations
 
 from controllers.compiled import compilable
+from rigtwin.components.cylinder import Cylinder
+from rigtwin.components.sensors import Lvdt, apply_sensor
+from rigtwin.numerics.arrays import Array
+
+
+def yield_to_load(cylinder: Cylinder, load: Array, period: float) -> Array:
+    """Compute how far a plate yields to a load that is known.
+
+    Parameters
+    ----------
+    cylinder
+        Its compliance c, lag and zero load z: the displacement follows c·(load − z).
+    load
+        Load in N, shape (ticks,).
+    period
+        Time between ticks in s.
+
+    Returns
+    -------
+    array
+        Displacement in m, shape (ticks,).
+    """
+    behind = Lvdt(lag=cylinder.yield_lag)
+    return cylinder.compliance * apply_sensor(behind, load - cylinder.zero_load, period)
 
 
 @compilable

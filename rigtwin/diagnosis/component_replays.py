@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from controllers import Commands, Measurements
-from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import Lvdt, apply_sensor, remove_drift, undo_sensor
+from rigtwin.components.sensors import apply_sensor, remove_drift, undo_sensor
+from rigtwin.components.yielding import yield_to_load
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.component import (
@@ -114,7 +114,7 @@ class ComponentReplays:
         tyre = self.configuration.plant.tyre.stiffness * (
             self._clean(self._sensor("ground_lvdt") - self.wheel)
         )
-        return unloaded - self._yielded(cylinder, np.maximum(tyre, 0.0))
+        return unloaded - yield_to_load(cylinder, np.maximum(tyre, 0.0), self.period)
 
     @cached_property
     def structure_cylinder_output(self) -> Array:
@@ -128,12 +128,8 @@ class ComponentReplays:
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
-        return unloaded + self._yielded(cylinder, self._clean(self._sensor("load_cell")))
-
-    def _yielded(self, cylinder: Cylinder, load: Array) -> Array:
-        """How far a cylinder yields to a load that was measured, m."""
-        behind = Lvdt(lag=cylinder.yield_lag)
-        return cylinder.compliance * apply_sensor(behind, load, self.period)
+        load = self._clean(self._sensor("load_cell"))
+        return unloaded + yield_to_load(cylinder, load, self.period)
 
     @cached_property
     def ground_motion(self) -> EstimatedMotion:

@@ -21,6 +21,8 @@ BLOCK = 0.5
 """s, length of a block of the bootstrap: what a test leaves is correlated within it."""
 DRAWS = 1000
 """Draws of the bootstrap."""
+CLEAR = 1.5
+"""Ratio of a signal's power to that of noise and declared error from which it has a gap."""
 SEED = 20
 """Seed of the bootstrap."""
 Effects = tuple[Effect, ...]
@@ -72,6 +74,46 @@ def declared_floor(evidence: Evidence) -> float:
         for lines in evidence.lines
     ]
     return float(np.mean(floors))
+
+
+def largest_shrinkage(evidence: Evidence, before: Plant, after: Plant) -> float:
+    """Share of the gap that a correction closes in the signal where it closes most.
+
+    Parameters
+    ----------
+    evidence
+        The recordings.
+    before, after
+        The nominal and the corrected plant.
+
+    Returns
+    -------
+    float
+        At most 1; signals without a gap before do not count.
+    """
+    machine = evidence.machine
+    powers = np.zeros((2, len(evidence.names)))
+    floor, ticks = np.zeros(len(evidence.names)), 0
+    for lines, one, other in zip(
+        evidence.lines, evidence.predict(before), evidence.predict(after), strict=True
+    ):
+        counted = lines.fade.max(axis=0) > 0.5
+        for number, predicted in enumerate((one, other)):
+            relative = (lines.measured - predicted)[:, counted] / lines.noise[:, None]
+            powers[number] += np.sum(relative**2, axis=1)
+        error = np.array([machine.form_of(row) for row in machine.rows])
+        swing = np.std(lines.measured, axis=1) / lines.noise
+        floor += int(counted.sum()) * (1.0 + (error * swing) ** 2)
+        ticks += int(counted.sum())
+    powers, floor = powers / max(ticks, 1), floor / max(ticks, 1)
+    return max(
+        (
+            shrinkage(float(one), float(other), float(least))
+            for one, other, least in zip(*powers, floor, strict=True)
+            if one > CLEAR * least
+        ),
+        default=0.0,
+    )
 
 
 def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
@@ -141,6 +183,8 @@ class Validation:
         Effects that do.
     data
         What was held out, in words.
+    largest
+        Share that the kept effects close in the signal where they close most.
     """
 
     predicted: float
@@ -148,6 +192,7 @@ class Validation:
     kept: Effects
     rejected: Effects
     data: str
+    largest: float
 
 
 def validate(
@@ -187,7 +232,12 @@ def validate(
         out, own = (float(np.sum(each * best.samples)) for each in (best.levels, best.inside))
         after = inside.after * max(out / max(own, 1e-300), 1.0)
         closed = interval(Blocks(inside.before, after, inside.floor))
-        return Validation(predicted, closed, named, (), "blocks left out of the fit in turn")
+        largest = largest_shrinkage(
+            evidence, evidence.plant, with_effects(evidence.plant, fit, named)
+        )
+        return Validation(
+            predicted, closed, named, (), "blocks left out of the fit in turn", largest
+        )
 
     def across(kept: Effects) -> Blocks:
         return blocks(other, evidence.plant, with_effects(evidence.plant, fit, kept))
@@ -195,7 +245,8 @@ def validate(
     count = len(other.recordings)
     data = f"{count} held-out recording{'s' if count > 1 else ''}"
     kept, rejected = reject_worsening(named, across, thresholds.worse)
-    return Validation(predicted, interval(across(kept)), kept, rejected, data)
+    largest = largest_shrinkage(other, evidence.plant, with_effects(evidence.plant, fit, kept))
+    return Validation(predicted, interval(across(kept)), kept, rejected, data, largest)
 
 
 def _shrinkage_of(of: Blocks) -> float:

@@ -189,10 +189,10 @@ def _diagnose(
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
-    if kept and left and validation.held_out.value < thresholds.removes:
+    if kept and left and validation.largest < thresholds.removes:
         names = " and ".join(effect.name for effect in kept)
-        closed = f"{100 * validation.held_out.value:.0f} %"
-        notes.append(f"{names} not named: it closes {closed} of the gap on held-out data")
+        closed = f"{100 * validation.largest:.0f} %"
+        notes.append(f"{names} not named: it closes at most {closed} of any signal's gap")
         kept = ()
     plant = with_effects(evidence.plant, found.fit, kept)
     progress("looking where", 1)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from rigtwin.components import Effect, measures
+from rigtwin.components.quantity import fields
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -27,7 +28,8 @@ RARE = (
     "load_friction",
     "deadband_asymmetry",
 )
-"""Kinds that few machines have; the rest that other friction leaves resembles them."""
+"""Kinds that few machines have; the rest that dry friction at the same component leaves resembles
+them."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler one at the end of their range."""
 DOUBT = 0.5
@@ -41,7 +43,7 @@ def is_rare(effect: Effect) -> bool:
     """Whether few machines have it; the gain of a sensor is one such effect, its zero is not."""
     if measures(effect.of()):
         return effect.kind.name != "offset"
-    return effect.kind.name in RARE
+    return effect.kind.name in RARE and "coulomb" in fields(effect.of)
 
 
 class Prices:
@@ -91,7 +93,8 @@ class Prices:
 
     def of(self, effect: Effect) -> float:
         """Nats that an effect must gain to be worth its parameters."""
-        t, count = self._thresholds, float(len(effect.kind.parameters))
+        t = self._thresholds
+        count = float(len(effect.kind.parameters) - len(effect.kind.nuisances))
         starts = self._fitter.starts(effect)
         if starts.quadrature:
             # Each pitch of a wave is a place of its own, and was looked at in two phases.

@@ -73,6 +73,8 @@ class Scored:
     accounts
         Amplitude that each effect alone accounts for, the others taken anew, as a share of the
         signals', to first order; shape (effects,).
+    rest
+        Amplitude of the residual beyond noise and declared error, in the same unit.
     bounded
         Whether a value lies at the end of the range that is searched.
     """
@@ -87,6 +89,7 @@ class Scored:
     reach: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     together: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     accounts: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    rest: float = 0.0
     bounded: bool = False
 
 
@@ -173,6 +176,7 @@ class Scorer:
             reach=_reach(places, products),
             together=_together(moves, places, products),
             accounts=self._accounts(moves, places, products, prior),
+            rest=self._rest(products, expected),
             bounded=fitter.is_bounded(fit),
         )
 
@@ -190,6 +194,11 @@ class Scorer:
         inverse = np.linalg.inv(_normal_matrix(products, prior))
         power = moves**2 / np.maximum(np.diag(inverse)[places], TINY)
         return np.asarray(np.sqrt(power / self._signal_power))
+
+    def _rest(self, products: Array, expected: Array) -> float:
+        """Amplitude beyond noise and declared error, as a share of the signals'."""
+        beyond = float(products[..., -1, -1].sum() - expected.sum())
+        return float(np.sqrt(max(beyond, 0.0) / self._signal_power))
 
 
 def _together(moves: Array, places: Sequence[int], products: Array) -> Array:

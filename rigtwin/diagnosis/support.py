@@ -26,6 +26,9 @@ class Support:
         Standard errors by which its magnitude differs from the nominal value.
     remains
         Share of the gap's amplitude that is left in the signals that it acts on.
+    dominance
+        Amplitude that it alone accounts for, relative to what is left beyond noise and declared
+        error; at most 1000.
     mimic
         Probability that it only resembles something that has no name.
     """
@@ -34,6 +37,7 @@ class Support:
     margin: float
     steadiness: float
     remains: float
+    dominance: float
     mimic: float
 
     @property

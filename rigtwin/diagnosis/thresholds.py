@@ -86,7 +86,8 @@ class Thresholds:
     explained: float = 0.8
     """Share of the gap that "explained" must close on held-out data."""
     removes: float = 0.2
-    """Share of the gap that named effects must remove on held-out data to be named at all."""
+    """Share of the gap of one signal that named effects must close on held-out data to be named at
+    all."""
     mimicry: float = 0.17
     """Share of the gap's amplitude that may be left beside an unnamed effect; with more, the named
     effect is as likely a mere likeness of the unnamed one."""

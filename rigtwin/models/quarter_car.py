@@ -136,7 +136,7 @@ class QuarterCarModel:
         start: float,
         at: float | None,
     ) -> Plate:
-        unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0)
+        unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0, zero_load=0.0)
         key = (unloaded, computer.delay, id(commands), at)
         found = self._plates.get(key)
         if found is None:

@@ -235,7 +235,8 @@ def _mechanics(
             ground_velocity = (ground_there - ground_here) * rate
             structure_now, ground_now = structure_here + yielded[1], ground_here + yielded[0]
             # How fast the plates would give up what they have yielded, without load.
-            ground_loss, structure_loss = -yielded[0] * ground_fades, -yielded[1] * structure_fades
+            ground_loss = (now.ground_unloaded - yielded[0]) * ground_fades
+            structure_loss = (now.structure_unloaded - yielded[1]) * structure_fades
             ground_velocity += ground_loss
             travel = structure_now - x
             deflection = ground_now - x

@@ -54,8 +54,10 @@ class Contacts(NamedTuple):
     hardening: float
     hardening_power: float
     ground_compliance: float
+    ground_unloaded: float
     ground_lag: float
     structure_compliance: float
+    structure_unloaded: float
     structure_lag: float
     mass: float
     rail_viscous: float
@@ -107,6 +109,7 @@ def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) ->
     """
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
+    unloaded = unloaded_yield(plant)
     forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
     return Contacts(
         changing=rail.changing or motor.changing or any(forces),
@@ -122,8 +125,10 @@ def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) ->
         hardening=tyre.hardening,
         hardening_power=tyre.hardening_power,
         ground_compliance=compliances[0],
+        ground_unloaded=unloaded[0],
         ground_lag=plant.ground_cylinder.yield_lag,
         structure_compliance=compliances[1],
+        structure_unloaded=unloaded[1],
         structure_lag=plant.structure_cylinder.yield_lag,
         mass=plant.carriage.mass,
         rail_viscous=plant.rail.viscous,
@@ -144,11 +149,17 @@ def initial_deflection(plant: RigPlant, preload: float) -> float:
 
 def initial_yield(plant: RigPlant, preload: float) -> tuple[float, float]:
     """How far ground and structure plate have yielded at the start, m, under a preload in N."""
-    tyre = preload + plant.gas_spring.force
+    tyre, unloaded = preload + plant.gas_spring.force, unloaded_yield(plant)
     return (
-        -plant.ground_cylinder.compliance * tyre,
-        plant.structure_cylinder.compliance * preload,
+        unloaded[0] - plant.ground_cylinder.compliance * tyre,
+        unloaded[1] + plant.structure_cylinder.compliance * preload,
     )
+
+
+def unloaded_yield(plant: RigPlant) -> tuple[float, float]:
+    """How far ground and structure plate stand from their zero without load, m."""
+    ground, structure = plant.ground_cylinder, plant.structure_cylinder
+    return ground.compliance * ground.zero_load, -structure.compliance * structure.zero_load
 
 
 class Simulation:
@@ -316,7 +327,7 @@ def give_way(
     load, inertia, tyre = motor_force(mechanics), now.mass + h * now.rail_viscous, 0.0
     deflection = mechanics.qpos[mechanics.ground] - place
     share = share_of_load(now.ground_compliance, now.ground_lag, h)
-    unloaded = ground - now.yielded[0] / (now.ground_lag + h)
+    unloaded = ground + (now.ground_unloaded - now.yielded[0]) / (now.ground_lag + h)
     if deflection > 0.0:
         slope = now.stiffness * stiffness_ratio(now, deflection)
         tyre = slope * (deflection + h * (unloaded - ground)) + now.damping * (unloaded - v)
@@ -332,7 +343,7 @@ def give_way(
     # What friction has more in one direction stands among the motor's forces already.
     load -= 0.5 * (backward - forward)
     push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
-    free = structure - now.yielded[1] / (now.structure_lag + h)
+    free = structure + (now.structure_unloaded - now.yielded[1]) / (now.structure_lag + h)
     _, cell = solve_yielding(
         rhs=now.mass * v + h * push,
         inertia=inertia,
