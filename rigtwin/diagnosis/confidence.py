@@ -94,6 +94,6 @@ def support_of(
         margin=posterior.margin(effect),
         steadiness=abs(best.fit.values[number][0] - nominal) / width,
         remains=remains,
-        dominance=min(float(best.accounts[number]) / max(best.rest, 1e-9), 1000.0),
+        dominance=float(np.clip(best.accounts[number] / max(best.rest, 1e-9), 1e-3, 1e3)),
         mimic=unnamed * _logistic(remains / thresholds.mimicry),
     )

@@ -60,7 +60,7 @@ def choose_named(
     """
     posterior, named = found.posterior, []
     for effect, values, widths in zip(
-        found.fit.effects, found.fit.values, _widths(found), strict=True
+        found.fit.effects, found.fit.values, _widths(found, support, thresholds), strict=True
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
         if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
@@ -103,7 +103,8 @@ def describe_attributed(
     posterior, fit = found.posterior, found.fit
     shares = _shares(fit, kept, evidence, posterior)
     findings = []
-    for effect, values, widths in zip(fit.effects, fit.values, _widths(found), strict=True):
+    all_widths = _widths(found, support, thresholds)
+    for effect, values, widths in zip(fit.effects, fit.values, all_widths, strict=True):
         if effect not in kept:
             continue
         rivals = posterior.rivals(effect)
@@ -135,19 +136,29 @@ def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence:
     return Rival(_name(rival), {}, found.posterior.inclusion(rival))
 
 
-def _widths(found: Explanation) -> list[tuple[float, ...]]:
-    """Standard errors of all values: the larger one of cross-validation and final fit, and what the
-    choice of the hypothesis adds."""
-    posterior = found.posterior
-    return [
-        tuple(
-            math.hypot(max(one, other), spread)
-            for one, other, spread in zip(scored, fitted, posterior.spread(effect), strict=True)
-        )
-        for effect, scored, fitted in zip(
-            found.fit.effects, posterior.best.widths, found.fit.widths, strict=True
-        )
-    ]
+def _widths(
+    found: Explanation, support: dict[Effect, Support], thresholds: Thresholds
+) -> list[tuple[float, ...]]:
+    """Standard errors of all values: the larger one of cross-validation and final fit, what the
+    choice of the hypothesis adds, and what an unexplained rest may.
+
+    A rest whose amplitude is 1/d of an effect's own shifts its magnitude by that share times the
+    correlation of both, of which only the usual size is known.
+    """
+    posterior, widths = found.posterior, []
+    for effect, values, scored, fitted in zip(
+        found.fit.effects,
+        found.fit.values,
+        posterior.best.widths,
+        found.fit.widths,
+        strict=True,
+    ):
+        nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
+        shift = thresholds.aligned * abs(values[0] - nominal) / support[effect].dominance
+        shifts = (shift, *[0.0] * (len(values) - 1))
+        parts = zip(scored, fitted, posterior.spread(effect), shifts, strict=True)
+        widths.append(tuple(math.hypot(max(a, b), c, d) for a, b, c, d in parts))
+    return widths
 
 
 def _shares(

@@ -101,6 +101,9 @@ class Thresholds:
     """Confidence below which another test is proposed."""
     wider: float = 2.5
     """Standard errors in half an interval; the form of a model is never exact."""
+    aligned: float = 0.3
+    """Usual correlation of an unexplained rest with the response to an effect; it widens
+    intervals."""
     possible: float = 0.01
     """Weight from which another explanation is kept beside the chosen one."""
     left_over: float = 1.3
