@@ -16,7 +16,7 @@ from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
-from rigtwin.diagnosis.gauss_newton import minimise
+from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
@@ -319,7 +319,7 @@ class Fitter:
     def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
         """The fit, or a better one a little further away: where a stick begins or is missed, the
         misfit has a step, and Gauss-Newton does not climb it."""
-        if fit.misfit <= SUFFICIENT * self.evidence.expected:
+        if is_sufficient(fit.misfit, self.evidence.expected, SUFFICIENT):
             return fit
         for number, effect in enumerate(fit.effects):
             for place, share in product(range(len(effect.kind.parameters)), SHAKES):

@@ -30,6 +30,8 @@ misfit is that many times what noise leaves. Stick-slip makes the misfit discont
 steps see over its small jumps."""
 
 
+OVERESTIMATED = 0.8
+"""Share of the expected misfit below which the noise was estimated too large."""
 RESPONSE, SHORTEST = 0.05, 1e-3
 """Share of the misfit that a derivative's step should change, and share of the given step that it
 has at least."""
@@ -96,11 +98,19 @@ def minimise(
                     here, left, misfit = there, tried, value
                     break
         if gained < enough:
-            if wide == WIDEST or misfit < WIDENED * expected:
+            if wide == WIDEST or is_sufficient(misfit, expected):
                 break
             wide = WIDEST
     widths = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
     return Minimum(here, misfit, widths)
+
+
+def is_sufficient(misfit: float, expected: float, enough: float = WIDENED) -> bool:
+    """Whether a fit leaves about what noise does, so that no closer one need be looked for.
+
+    One that leaves much less shows that the expected noise was too large; closer ones still matter.
+    """
+    return OVERESTIMATED * expected < misfit < enough * expected
 
 
 def shorten(jacobian: Array, misfit: float) -> Array:

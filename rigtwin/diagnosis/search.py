@@ -57,6 +57,8 @@ ELIMINATED = 4
 """Sets that are fitted of those from which one regular effect after another was left out."""
 VARIED, COMPARED = 2, 5
 """Effects that are tried in the place of each while the search climbs, and of its result."""
+BEGINNINGS = 4
+"""Single effects that are extended where the best hypothesis leaves much."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
@@ -111,7 +113,11 @@ class Search:
         singles = self._fit_singles()
         if self._has_gap(singles):
             self._climb()
-            if self.posterior.leaves_something or len(self.posterior.best.fit.effects) > 1:
+            if (
+                self.posterior.leaves_something
+                or len(self.posterior.best.fit.effects) > 1
+                or self._swings_freely()
+            ):
                 self._fit_regulars()
                 self._climb()
             if self.posterior.leaves_something:
@@ -132,9 +138,7 @@ class Search:
         most = max((each.promise for each in self.screened), default=0.0)
         worth = self.thresholds.promising * max(most, 2.0 * limit)
         promising = [each for each in self.screened if each.promise >= worth]
-        singles = sorted(
-            self.threads.map(self.coarse.fit_one, promising), key=lambda fit: fit.misfit
-        )
+        singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
         if singles:
             gain = max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
             near = singles[0].misfit + self.thresholds.near * gain + 4.0 * limit
@@ -142,6 +146,21 @@ class Search:
             self._settle([fit for fit in singles[:SETTLED] if fit.misfit <= near])
             self._add(singles[SETTLED : 2 * SETTLED])
         return singles
+
+    def _fit_single(self, screened: Screened) -> Fit:
+        """Fit an effect alone; where a joint swings freely, also from what its forces take."""
+        fit = self.coarse.fit_one(screened)
+        if screened.effect.kind.name in REGULAR:
+            balanced = balance_forces(self.coarse, (screened.effect,))
+            if balanced is not None:
+                other = self.coarse.refine((screened.effect,), balanced)
+                fit = min(fit, other, key=lambda each: each.misfit)
+        return fit
+
+    def _swings_freely(self) -> bool:
+        """Whether a joint goes by itself, so that a single effect may fit at more than one value,
+        and one effect may pass for another."""
+        return self.coarse.evidence.missing_force(self.coarse.plant) is not None
 
     def _has_gap(self, singles: Sequence[Fit]) -> bool:
         """Whether anything is worth more than its price, or the rest is more than noise."""
@@ -193,13 +212,16 @@ class Search:
         if (balanced := balance_forces(coarse, chosen)) is not None:
             starts.append(balanced)
         tries = self.threads.map(lambda values: coarse.refine(tuple(chosen), values), starts)
-        whole = min(tries, key=lambda fit: fit.misfit)
+        whole, further = min(tries, key=lambda fit: fit.misfit), list[Start]()
         price = 2.0 * self.posterior.prices.ordinary
         path = sorted(
             Linearised(coarse, whole).eliminate(), key=lambda each: each[0] + price * len(each[1])
         )
-        fits = self.threads.map(lambda each: coarse.refine(*each[1:]), path[:ELIMINATED])
-        self._keep([whole, *fits])
+        for _, effects, _ in path[:ELIMINATED]:
+            if (balanced := balance_forces(coarse, effects)) is not None:
+                further.append((effects, balanced))
+        further += [(effects, values) for _, effects, values in path[:ELIMINATED]]
+        self._keep([whole, *self._refine(further)])
 
     def _choose_regulars(self) -> list[Effect]:
         """Regular effects that promise anything, at every component that can have them."""
@@ -338,3 +360,25 @@ class Search:
         for fit in leaders[:1]:
             starts += start_elsewhere(coarse, fit, self.effects, known)
         self._keep(self._refine(starts))
+        for fit in self._choose_beginnings():
+            self._extend(fit)
+
+    def _choose_beginnings(self) -> list[Fit]:
+        """Choose the best single effects that were not extended yet, and the same where the forces
+        along the measured motion put them.
+
+        What explains most alone, and what was found beside it, may resemble two others together;
+        and a joint that swings freely has more than one best place for a single effect.
+        """
+        singles = sorted(
+            (scored.fit for effects, scored in self.pool.items() if len(effects) == 1),
+            key=lambda fit: fit.misfit,
+        )
+        fresh = [fit for fit in singles if frozenset(fit.effects) not in self._extended]
+        starts: list[Start] = []
+        for fit in singles[: 2 * BEGINNINGS]:
+            if fit.effects[0].kind.name in REGULAR:
+                balanced = balance_forces(self.coarse, fit.effects)
+                if balanced is not None:
+                    starts.append((fit.effects, balanced))
+        return [*self._refine(starts), *fresh[:BEGINNINGS]]
