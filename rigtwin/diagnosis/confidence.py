@@ -16,6 +16,7 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.posterior import Posterior
+from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.numerics.arrays import Array
@@ -56,6 +57,12 @@ def relative_rest(evidence: Evidence, plant: Plant) -> Array:
     return np.sqrt(left / np.maximum(np.mean(swing, axis=0), 1e-300))
 
 
+def _dominance(scored: Scored, number: int) -> float:
+    """Amplitude of an effect, relative to that of the rest in the signals that it acts on."""
+    rest = float(np.sqrt(scored.reach[number] @ scored.rest**2))
+    return float(np.clip(scored.accounts[number] / max(rest, 1e-9), 1e-3, 1e3))
+
+
 def support_of(
     effect: Effect, posterior: Posterior, evidence: Evidence, thresholds: Thresholds
 ) -> Support:
@@ -94,6 +101,6 @@ def support_of(
         margin=posterior.margin(effect),
         steadiness=abs(best.fit.values[number][0] - nominal) / width,
         remains=remains,
-        dominance=float(np.clip(best.accounts[number] / max(best.rest, 1e-9), 1e-3, 1e3)),
+        dominance=_dominance(best, number),
         mimic=unnamed * _logistic(remains / thresholds.mimicry),
     )

@@ -21,6 +21,8 @@ from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import tell_apart
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
+CLEAR = 0.9
+"""Share of the way to the nominal value that an unexplained rest may widen an interval."""
 SHOWN = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
 
@@ -56,7 +58,8 @@ def choose_named(
     """Choose the effects of the best hypothesis that are named.
 
     An effect is named where it, or one that the data cannot tell from it, is more likely there than
-    not. All of its rivals take its place together.
+    not. All of its rivals take its place together, unless they are so many that the finding says
+    little of what is there.
     """
     posterior, named = found.posterior, []
     for effect, values, widths in zip(
@@ -66,9 +69,10 @@ def choose_named(
         if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
             # An interval that holds the nominal value is no finding.
             continue
-        family = sum(posterior.inclusion(each) for each in (effect, *posterior.rivals(effect)))
-        chance = min(family, 1.0) * (1.0 - support[effect].mimic)
-        if chance >= thresholds.nameable:
+        shares = [posterior.inclusion(each) for each in (effect, *posterior.rivals(effect))]
+        chance = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
+        members = sum(shares) ** 2 / sum(share**2 for share in shares)
+        if chance >= thresholds.nameable and members <= thresholds.members:
             named.append(effect)
     return tuple(named)
 
@@ -143,7 +147,8 @@ def _widths(
     choice of the hypothesis adds, and what an unexplained rest may.
 
     A rest whose amplitude is 1/d of an effect's own shifts its magnitude by that share times the
-    correlation of both, of which only the usual size is known.
+    correlation of both, of which only the usual size is known. That alone does not make an effect
+    doubtful: `Support.mimic` says how likely the rest has been taken for it.
     """
     posterior, widths = found.posterior, []
     for effect, values, scored, fitted in zip(
@@ -154,10 +159,12 @@ def _widths(
         strict=True,
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
-        shift = thresholds.aligned * abs(values[0] - nominal) / support[effect].dominance
-        shifts = (shift, *[0.0] * (len(values) - 1))
-        parts = zip(scored, fitted, posterior.spread(effect), shifts, strict=True)
-        widths.append(tuple(math.hypot(max(a, b), c, d) for a, b, c, d in parts))
+        parts = zip(scored, fitted, posterior.spread(effect), strict=True)
+        own = [math.hypot(max(one, other), spread) for one, other, spread in parts]
+        off = abs(values[0] - nominal)
+        shift = thresholds.aligned / support[effect].dominance * off
+        most = max(own[0], CLEAR * off / thresholds.wider)
+        widths.append((min(math.hypot(own[0], shift), most), *own[1:]))
     return widths
 
 

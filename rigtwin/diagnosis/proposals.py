@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
@@ -17,6 +18,8 @@ from rigtwin.numerics.arrays import Array
 
 RESEMBLES = 0.6
 """Share of an effect's response that another must be able to explain to be tried in its place."""
+SAME = 0.999
+"""Cosine of two responses from which they are the same."""
 MOVED = 6
 """Rank among all that resemble an effect up to which the same kind elsewhere is tried too."""
 
@@ -28,12 +31,14 @@ LATE = ("lag", "delay", "two_lags", "resonance")
 @dataclass(frozen=True)
 class Proposal:
     """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start
-    from; space: tolerances."""
+    from; space: tolerances; response: of the effect that is added, of unit length, shape
+    (size,)."""
 
     promised: float
     effects: tuple[Effect, ...]
     values: Values
     space: Space = field(repr=False)
+    response: NDArray[np.float32] = field(repr=False)
 
 
 def propose_additions(
@@ -83,9 +88,38 @@ def propose_additions(
             return None
         promised = first.misfit - gain
         start = fitter.scale_start(effect, starts[best], float(share[best]))
-        return Proposal(promised, (*first.effects, effect), (*first.values, *start), space)
+        response = responses[best] / max(float(np.linalg.norm(responses[best])), 1e-30)
+        effects, values = (*first.effects, effect), (*first.values, *start)
+        return Proposal(promised, effects, values, space, response)
 
     return [each for each in threads.spread(propose, effects) if each is not None]
+
+
+def choose_distinct(proposals: Sequence[Proposal], count: int) -> list[Proposal]:
+    """Choose the proposals that promise most, none of which does the same as another.
+
+    What does the same is tried in the place of what is found.
+
+    Parameters
+    ----------
+    proposals
+        Additions to one fit.
+    count
+        How many to choose at most.
+
+    Returns
+    -------
+    list of Proposal
+        The most promising one first.
+    """
+    chosen: list[Proposal] = []
+    for proposal in sorted(proposals, key=lambda each: each.promised):
+        alike = (abs(float(proposal.response @ each.response)) for each in chosen)
+        if all(one < SAME for one in alike):
+            chosen.append(proposal)
+        if len(chosen) == count:
+            break
+    return chosen
 
 
 def propose_replacements(

@@ -74,7 +74,8 @@ class Scored:
         Amplitude that each effect alone accounts for, the others taken anew, as a share of the
         signals', to first order; shape (effects,).
     rest
-        Amplitude of the residual beyond noise and declared error, in the same unit.
+        Amplitude of each signal's residual beyond noise and declared error, in the same unit, shape
+        (signals,).
     bounded
         Whether a value lies at the end of the range that is searched.
     """
@@ -89,7 +90,7 @@ class Scored:
     reach: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     together: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     accounts: Array = field(default_factory=lambda: np.zeros(0), repr=False)
-    rest: float = 0.0
+    rest: Array = field(default_factory=lambda: np.zeros(0), repr=False)
     bounded: bool = False
 
 
@@ -195,10 +196,10 @@ class Scorer:
         power = moves**2 / np.maximum(np.diag(inverse)[places], TINY)
         return np.asarray(np.sqrt(power / self._signal_power))
 
-    def _rest(self, products: Array, expected: Array) -> float:
-        """Amplitude beyond noise and declared error, as a share of the signals'."""
-        beyond = float(products[..., -1, -1].sum() - expected.sum())
-        return float(np.sqrt(max(beyond, 0.0) / self._signal_power))
+    def _rest(self, products: Array, expected: Array) -> Array:
+        """Amplitude of each signal beyond noise and declared error, as a share of all signals'."""
+        beyond = products[..., -1, -1].sum(axis=(0, 2, 3)) - expected.sum(axis=(0, 2, 3))
+        return np.asarray(np.sqrt(np.maximum(beyond, 0.0) / self._signal_power))
 
 
 def _together(moves: Array, places: Sequence[int], products: Array) -> Array:

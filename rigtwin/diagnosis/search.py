@@ -24,7 +24,7 @@ from rigtwin.diagnosis.fit import Fit, Values
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.posterior import Posterior
-from rigtwin.diagnosis.proposals import propose_additions, propose_replacements
+from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.scoring import Scored, Scorer
 from rigtwin.diagnosis.starts import (
     GATEWAY,
@@ -282,10 +282,10 @@ class Search:
         """Fit a hypothesis with one more effect."""
         self._extended.add(frozenset(leader.effects))
         limit = self.posterior.prices.ordinary
-        proposals = sorted(
+        proposals = choose_distinct(
             propose_additions(self.coarse, leader, self.effects, 2.0 * limit, self.threads),
-            key=lambda proposal: proposal.promised,
-        )[: self.thresholds.additions]
+            self.thresholds.additions,
+        )
         fits = self.threads.map(
             lambda each: self.coarse.refine(each.effects, each.values, each.space), proposals
         )

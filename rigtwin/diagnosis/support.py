@@ -28,7 +28,7 @@ class Support:
         Share of the gap's amplitude that is left in the signals that it acts on.
     dominance
         Amplitude that it alone accounts for, relative to what is left beyond noise and declared
-        error; 0.001 to 1000.
+        error in the signals that it acts on; 0.001 to 1000.
     mimic
         Probability that it only resembles something that has no name.
     """

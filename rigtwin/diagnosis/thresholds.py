@@ -79,6 +79,9 @@ class Thresholds:
     member: float = 0.05
     """Weight, relative to the chosen hypothesis, from which another effect is named as one that the
     data cannot tell from it."""
+    members: float = 3.5
+    """Effective number of effects up to which those that the data cannot tell from each other are
+    named together."""
     nameable: float = 0.5
     """Confidence from which an effect is named."""
     rest: float = 0.15
