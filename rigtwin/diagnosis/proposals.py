@@ -13,6 +13,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.starts import LATE_BY_TIME
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
@@ -191,6 +192,9 @@ def propose_replacements(
             late = other.group == effect.group and {other.kind.name, effect.kind.name} <= {*LATE}
             if resembles or elsewhere or late:
                 found.append(_put(fit, number, other, start[0]))
+            if {other.kind.name, effect.kind.name} <= {*LATE_BY_TIME} and (late or elsewhere):
+                # To first order a lag does the same as a delay of equal size.
+                found.append(_put(fit, number, other, fit.values[number]))
         # An effect that sets a parameter of the one that it replaces has no response beside it.
         found += [
             _put(fit, number, other, fitter.starts(other).values[0]) for other in rivals[:count]

@@ -32,6 +32,7 @@ from rigtwin.diagnosis.starts import (
     Start,
     start_elsewhere,
     start_in_series,
+    start_merged,
     start_otherwise,
     start_regular_instead,
     start_unfolded,
@@ -312,6 +313,7 @@ class Search:
             ]
         starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
         starts += start_regular_instead(self.coarse, leader, self.effects)
+        starts += start_merged(leader)
         self._keep(self._refine(starts))
 
     def _vary_best(self) -> None:

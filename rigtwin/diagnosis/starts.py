@@ -18,6 +18,8 @@ REGULAR = ("coulomb", "viscous", "stiffness", "mass", "armature", "offset")
 """Kinds that nearly every machine has more or less of."""
 GATEWAY = "coulomb"
 """Kind without which a play, a spring or a Stribeck peak in series with it does nothing."""
+LATE_BY_TIME = ("lag", "delay")
+"""Kinds of one parameter, the time by which a signal is late."""
 IN_SERIES = ("compliance", "backlash")
 """Kinds in series with dry friction that hide it."""
 SECOND_ORDER = ("two_lags", "resonance")
@@ -104,6 +106,21 @@ def _start_pair(
     one, two = (fitter.starts(effect).values for effect in pair)
     starts = [(*values, *start) for start in product(one, two)]
     return both, min(starts, key=lambda start: _misfit(fitter, both, start))
+
+
+def start_merged(leader: Fit) -> list[Start]:
+    """Start one lag or delay in the place of two: in a loop only their sum can be seen, and the
+    data may be explained by either alone; parameters as of `start_in_series`."""
+    found = []
+    for effect, rest, values in without_each(leader):
+        if effect.kind.name not in LATE_BY_TIME:
+            continue
+        time = leader.values[leader.effects.index(effect)][0]
+        for number, other in enumerate(rest):
+            if other.kind.name in LATE_BY_TIME:
+                both = ((values[number][0] + time),)
+                found.append((rest, (*values[:number], both, *values[number + 1 :])))
+    return found
 
 
 def start_regular_instead(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
