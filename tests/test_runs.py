@@ -35,9 +35,19 @@ def stop_and_go() -> np.ndarray:
         (stop_and_go(), 0),
         (np.round(20.0 * SINE) / 20.0, 0),
         (np.sign(SINE), 0),
+        (np.maximum(SINE - 0.2, 0.0), 0),
         (np.round(300.0 * stop_and_go()) / 300.0, 0),
     ],
-    ids=["clipped", "clipped and noisy", "whole", "at rest", "bits", "steps", "at rest in bits"],
+    ids=[
+        "clipped",
+        "clipped and noisy",
+        "whole",
+        "at rest",
+        "bits",
+        "steps",
+        "off",
+        "at rest in bits",
+    ],
 )
 def test_what_runs_into_an_end_is_told_from_what_rests_there(signal, ends):
     assert len(runs_at_ends(signal)) == ends

@@ -18,6 +18,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.description.parts import parts
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
+from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
@@ -134,9 +135,12 @@ def diagnose(
     Raises
     ------
     RigtwinError
-        If the recordings' settings are unknown here, or held-out data are not fit to be compared.
+        If the recordings' settings are unknown here, or held-out data are not fit to be compared or
+        the same as those of the fit.
     """
     started = time.perf_counter()
+    recordings, copies = drop_copies(recordings)
+    refuse_copies(held_out, recordings)
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
         if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
@@ -160,9 +164,15 @@ def diagnose(
 
         found = [diagnose_part(part) for part in parts(machine)]
         if len(found) == 1:
-            return found[0]
+            return _with_notes(found[0], copies)
         apart = Evidence(machine, held_out, others) if held_out else None
-        return join(Evidence(machine, recordings, configurations), apart, found, started)
+        joined = join(Evidence(machine, recordings, configurations), apart, found, started)
+        return _with_notes(joined, copies)
+
+
+def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:
+    answer = replace(diagnosis.answer, notes=(*notes, *diagnosis.answer.notes))
+    return replace(diagnosis, answer=answer)
 
 
 def _diagnose(

@@ -44,6 +44,7 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
 def runs_at_ends(signal: Array) -> list[tuple[int, int]]:
     """Finds where a signal runs into an end of its range and stays there.
 
+    Zero is no end of a range: a motor that is switched off gives nothing for as long as it likes.
     What comes to rest there by itself is none of it: it slows down before, or stands still at
     other values beside it, as bits do.
 
@@ -59,6 +60,8 @@ def runs_at_ends(signal: Array) -> list[tuple[int, int]]:
     """
     found = []
     for extreme in (signal.max(), signal.min()):
+        if extreme == 0.0:
+            continue
         edges = np.diff(np.concatenate([[0], (signal == extreme).astype(np.int8), [0]]))
         starts, stops = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
         found += [
