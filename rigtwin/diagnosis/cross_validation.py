@@ -185,6 +185,9 @@ class Validation:
         What was held out, in words.
     largest
         Share that the kept effects close in the signal where they close most.
+    measurable
+        Whether the whole gap exceeds noise and declared error before the correction. One that
+        stands in few frequencies may not, and be clear there all the same.
     """
 
     predicted: float
@@ -193,6 +196,7 @@ class Validation:
     rejected: Effects
     data: str
     largest: float
+    measurable: bool
 
 
 def validate(
@@ -236,7 +240,13 @@ def validate(
             evidence, evidence.plant, with_effects(evidence.plant, fit, named)
         )
         return Validation(
-            predicted, closed, named, (), "blocks left out of the fit in turn", largest
+            predicted,
+            closed,
+            named,
+            (),
+            "blocks left out of the fit in turn",
+            largest,
+            _is_measurable(inside),
         )
 
     def across(kept: Effects) -> Blocks:
@@ -246,7 +256,14 @@ def validate(
     data = f"{count} held-out recording{'s' if count > 1 else ''}"
     kept, rejected = reject_worsening(named, across, thresholds.worse)
     largest = largest_shrinkage(other, evidence.plant, with_effects(evidence.plant, fit, kept))
-    return Validation(predicted, interval(across(kept)), kept, rejected, data, largest)
+    outside = across(kept)
+    return Validation(
+        predicted, interval(outside), kept, rejected, data, largest, _is_measurable(outside)
+    )
+
+
+def _is_measurable(of: Blocks) -> bool:
+    return bool(len(of.before)) and float(of.before.mean()) > of.floor
 
 
 def _shrinkage_of(of: Blocks) -> float:

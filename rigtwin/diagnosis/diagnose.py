@@ -201,8 +201,8 @@ def _diagnose(
         notes.append(f"{names} rejected: held-out data became worse with it")
     if kept and left and validation.largest < thresholds.removes:
         names = " and ".join(effect.name for effect in kept)
-        closed = f"{100 * validation.largest:.0f} %"
-        notes.append(f"{names} not named: it closes at most {closed} of any signal's gap")
+        share = f"{100 * validation.largest:.0f} %"
+        notes.append(f"{names} not named: it closes at most {share} of any signal's gap")
         kept = ()
     plant = with_effects(evidence.plant, found.fit, kept)
     progress("looking where", 1)
@@ -230,7 +230,10 @@ def _diagnose(
     ]
     odd_controller = any(each.kind == "unknown" for each in deviations)
     rest = left or odd_controller
-    closes = not kept or validation.held_out.value >= thresholds.explained
+    closed = found.posterior.closes(found.posterior.best)
+    if validation.measurable:
+        closed = validation.held_out.value
+    closes = not kept or closed >= thresholds.explained
     verdict: Verdict
     if effects:
         verdict = "explained" if closes and not rest else "partly explained"
