@@ -19,7 +19,7 @@ from rigtwin.numerics.arrays import Array
 
 RESEMBLES = 0.6
 """Share of an effect's response that another must be able to explain to be tried in its place."""
-SAME = 0.999
+SAME = 0.99999
 """Cosine of two responses from which they are the same."""
 MOVED = 6
 """Rank among all that resemble an effect up to which the same kind elsewhere is tried too."""

@@ -113,6 +113,9 @@ class Search:
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
+            if self.posterior.leaves_something:
+                # What explains most of all signals together, beside what explains one of them best.
+                self._extend(singles[0])
             self._climb()
             if (
                 self.posterior.leaves_something
