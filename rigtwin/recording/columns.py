@@ -15,7 +15,7 @@ from mcap.records import Channel, Schema
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
-from rigtwin.recording.schema import FIELD, tags
+from rigtwin.recording.schema import decode_rows
 
 
 def decode_columns(
@@ -54,13 +54,10 @@ def decode_columns(
             *(name for name in names if name in present),
             *(n for n in present if n not in names),
         ]
-        if (
-            numbers == list(range(1, len(present) + 1))
-            and len(block) == len(data) * len(present) * FIELD.itemsize
-        ):
-            fields = np.frombuffer(block, FIELD).reshape(len(data), len(present))
-            if (fields["tag"] == tags(len(present))).all():
-                return {name: fields["value"][:, present.index(name)].copy() for name in ours}
+        if numbers == list(range(1, len(present) + 1)):
+            values = decode_rows(block, len(data), len(present))
+            if values is not None:
+                return {name: values[:, present.index(name)].copy() for name in ours}
     else:
         raise RigtwinError(
             f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; "

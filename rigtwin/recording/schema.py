@@ -7,13 +7,14 @@ encoded and decoded at once.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from google.protobuf import descriptor_pb2
 from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import CHANNELS
 
 WRITTEN_FORMAT = "1"
@@ -88,13 +89,86 @@ def descriptor(topic: str, names: Sequence[str]) -> bytes:
     return descriptor_pb2.FileDescriptorSet(file=[file]).SerializeToString()
 
 
-FIELD = np.dtype([("tag", "u1"), ("value", "<f8")])
-"""An encoded field; a message is one of these for each channel of its topic."""
+Bytes = NDArray[np.uint8]
 
 
-def tags(count: int) -> NDArray[np.uint8]:
-    """Protobuf tags of fields 1 … count."""
-    return ((np.arange(1, count + 1) << 3) | _DOUBLE_WIRE_TYPE).astype(np.uint8)
+def _segments(count: int) -> Iterator[tuple[slice, np.dtype[np.void], Bytes]]:
+    """Fields 1 … count in runs whose tags are of equal length: which fields, the layout of one of
+    them, and their tags, shape (fields, length).
+
+    A tag is a varint: seven bits a byte, the lowest first, the highest bit set in all but the last.
+    """
+    first, length = 1, 1
+    while first <= count:
+        last = min(count, (1 << (7 * length - 3)) - 1)
+        numbers = (np.arange(first, last + 1) << 3) | _DOUBLE_WIRE_TYPE
+        parts = numbers[:, None] >> (7 * np.arange(length)) & 0x7F
+        parts[:, :-1] |= 0x80
+        layout = np.dtype([("tag", "u1", (length,)), ("value", "<f8")])
+        yield slice(first - 1, last), layout, parts.astype(np.uint8)
+        first, length = last + 1, length + 1
+
+
+def encode_rows(values: Array) -> Bytes:
+    """Encode messages of doubles as protobuf does.
+
+    Parameters
+    ----------
+    values
+        Fields 1, 2, … of each message, shape (messages, fields).
+
+    Returns
+    -------
+    array
+        One message a row, shape (messages, bytes).
+    """
+    parts = [np.empty((len(values), 0), np.uint8)]
+    for fields, layout, tags in _segments(values.shape[1]):
+        part = np.empty((len(values), len(tags)), layout)
+        part["tag"], part["value"] = tags, values[:, fields]
+        parts.append(part.view(np.uint8).reshape(len(values), -1))
+    return np.hstack(parts)
+
+
+def decode_rows(block: bytes, messages: int, count: int) -> Array | None:
+    """Decode messages that `encode_rows` made.
+
+    Parameters
+    ----------
+    block
+        All messages, one after another.
+    messages, count
+        Number of messages, and of fields in each.
+
+    Returns
+    -------
+    array or None
+        Shape (messages, fields); None if they are encoded in another way.
+    """
+    segments = list(_segments(count))
+    width = sum(len(tags) * layout.itemsize for _, layout, tags in segments)
+    if len(block) != messages * width:
+        return _decode_wrapped(block, messages, count)
+    rows = np.frombuffer(block, np.uint8).reshape(messages, width)
+    values, begin = np.empty((messages, count)), 0
+    for fields, layout, tags in segments:
+        end = begin + len(tags) * layout.itemsize
+        part = np.ascontiguousarray(rows[:, begin:end]).view(layout)
+        if not (part["tag"] == tags).all():
+            return None
+        values[:, fields], begin = part["value"], end
+    return values
+
+
+def _decode_wrapped(block: bytes, messages: int, count: int) -> Array | None:
+    """Decode messages of 16 fields and more as earlier releases wrote them: the tags cut to a byte,
+    which no other reader understands."""
+    layout = np.dtype([("tag", "u1"), ("value", "<f8")])
+    if len(block) != messages * count * layout.itemsize:
+        return None
+    fields = np.frombuffer(block, layout).reshape(messages, count)
+    tags = ((np.arange(1, count + 1) << 3) | _DOUBLE_WIRE_TYPE) & 0xFF
+    return fields["value"].copy() if (fields["tag"] == tags).all() else None
 
 
 def list_topics() -> tuple[str, ...]:
@@ -102,8 +176,6 @@ def list_topics() -> tuple[str, ...]:
     return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))
 
 
-def encode(values: NDArray[np.float64]) -> bytes:
+def encode(values: Array) -> bytes:
     """One message of a topic, of its fields' values."""
-    message = np.empty(len(values), FIELD)
-    message["tag"], message["value"] = tags(len(values)), values
-    return message.tobytes()
+    return encode_rows(values[None, :]).tobytes()

@@ -47,13 +47,12 @@ from rigtwin.recording.owner import open_alone
 from rigtwin.recording.records import seal
 from rigtwin.recording.schema import (
     END_RECORD,
-    FIELD,
     RECORD,
     TWIN_RECORD,
     WRITTEN_FORMAT,
     check_names,
     descriptor,
-    tags,
+    encode_rows,
     type_name,
 )
 
@@ -222,22 +221,22 @@ class Writer:
         ticks = len(times)
         for topic in columns:
             self._counts[topic] = self._counts.get(topic, 0) + ticks
+        encoded = {topic: encode_rows(values) for topic, values in columns.items()}
         layout = np.dtype(
             [
-                (topic, [*_MESSAGE, ("fields", FIELD, values.shape[1])])
-                for topic, values in columns.items()
+                (topic, [*_MESSAGE, ("fields", "u1", (rows.shape[1],))])
+                for topic, rows in encoded.items()
             ]
         )
         messages = np.zeros(ticks, layout)
-        for topic, values in columns.items():
+        for topic, rows in encoded.items():
             message = messages[topic]
             message["opcode"] = Opcode.MESSAGE
             message["length"] = layout[topic].itemsize - _PREFIX
             message["channel"] = self._topics[topic]
             message["sequence"] = sequence
             message["log_time"] = message["publish_time"] = times
-            message["fields"]["tag"] = tags(values.shape[1])
-            message["fields"]["value"] = values
+            message["fields"] = rows
         self._put_chunk(messages, times)
 
     def finish(self, reason: str) -> None:
