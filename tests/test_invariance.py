@@ -111,11 +111,6 @@ def bring_damper() -> tuple[Machine, Recordings]:
     return machine, [recording_of(record_wild(case, again), machine.name) for again in (0, 1)]
 
 
-def bring_swinging_arm() -> tuple[Machine, Recordings]:
-    machine = find(MACHINES["arm"])
-    return machine, [recording_of(record_wild(draw_wild(31, 5101)), machine.name)]
-
-
 def bring_shared(file: str, machine: str) -> Callable[[], tuple[Machine, Recordings]]:
     def bring() -> tuple[Machine, Recordings]:
         folder = BESIDE if machine == "suspension-rig" else JOINTS
@@ -130,7 +125,6 @@ def bring_shared(file: str, machine: str) -> Callable[[], tuple[Machine, Recordi
 CASES: dict[str, Callable[[], tuple[Machine, Recordings]]] = {
     "rig": bring_rig,
     "dampers": bring_damper,
-    "swinging arm": bring_swinging_arm,
     "known-delay": bring_shared("known-delay-structure_cylinder.mcap", "suspension-rig"),
     "unknown-5": bring_shared("unknown-5.mcap", "suspension-rig"),
     "nominal-drop": bring_shared("nominal-drop.mcap", "suspension-rig"),

@@ -88,9 +88,9 @@ class Thresholds:
     """Excess of the residual's power over noise and declared error from which something is left."""
     explained: float = 0.8
     """Share of the gap that "explained" must close on held-out data."""
-    removes: float = 0.2
-    """Share of the gap of one signal that named effects must close on held-out data to be named at
-    all."""
+    removes: float = 0.106
+    """Share of the amplitude of one signal's gap that named effects must close on held-out data to
+    be named at all: a fifth of its power."""
     mimicry: float = 0.17
     """Share of the gap's amplitude that may be left beside an unnamed effect; with more, the named
     effect is as likely a mere likeness of the unnamed one."""
