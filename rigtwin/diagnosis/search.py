@@ -113,9 +113,12 @@ class Search:
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
-            if self.posterior.leaves_something:
-                # What explains most of all signals together, beside what explains one of them best.
-                self._extend(singles[0])
+            # What explains most of all signals together, beside what explains one of them best; and
+            # dry friction, which alone explains little where it acts through a spring or a play.
+            through = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
+            for fit in (singles[0], *through[:1]):
+                if self.posterior.leaves_something and frozenset(fit.effects) not in self._extended:
+                    self._extend(fit)
             self._climb()
             if (
                 self.posterior.leaves_something
@@ -147,8 +150,9 @@ class Search:
             gain = max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
             near = singles[0].misfit + self.thresholds.near * gain + 4.0 * limit
             # A hypothesis far behind stays there, however the tolerances are taken.
-            self._settle([fit for fit in singles[:SETTLED] if fit.misfit <= near])
-            self._add(singles[SETTLED : 2 * SETTLED])
+            settled = [fit for fit in singles[:SETTLED] if fit.misfit <= near]
+            self._settle(settled)
+            self._add([fit for fit in singles[: 2 * SETTLED] if fit not in settled])
         return singles
 
     def _fit_single(self, screened: Screened) -> Fit:

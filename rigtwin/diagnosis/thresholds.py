@@ -63,7 +63,7 @@ class Thresholds:
     estimated from above, and what is gained within the declared error is little evidence."""
     chance: float = 2.0
     """Standard deviations of the power of noise in a band that are no rest."""
-    undone: float = 0.4
+    undone: float = 0.3
     """Share of the smaller response that two effects must have together; with less they undo each
     other, which costs nats linearly."""
     within_tolerance: float = 2.0
