@@ -161,6 +161,7 @@ def test_a_motorcycle_that_trips_without_compensation_comes_to_rest_with_it():
     assert np.std(tested["/sensor.structure_lvdt"][-500:]) < 3e-4
 
 
+@pytest.mark.slow
 def test_what_was_told_wrong_of_the_delay_is_found_in_the_commands(tmp_path):
     """The recording says 0, the controller had 4 ms."""
     path = tmp_path / "told.mcap"

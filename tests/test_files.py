@@ -91,6 +91,7 @@ def test_a_header_with_commas_is_quoted(tmp_path):
     assert (tmp_path / "g.csv").read_text().splitlines()[0] == 'time,"sensor.a,b"'
 
 
+@pytest.mark.slow
 def test_pictures_of_odd_recordings(tmp_path):
     values = np.array([[1e308], [-1e308]] * 150)
     with pytest.raises(RigtwinError, match=r"a goes beyond 1e\+100, which cannot be drawn"):

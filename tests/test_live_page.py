@@ -64,6 +64,7 @@ class Pace:
         time.sleep(max(self.begun + self.done - time.monotonic(), 0.0))
 
 
+@pytest.mark.slow
 def test_it_says_what_is_wrong_and_becomes_the_page_of_the_whole_test(changed, tmp_path):
     said: list[str] = []
     with rigtwin.show_live(changed, said=said.append, save_twin=tmp_path / "twin.toml") as page:

@@ -122,6 +122,7 @@ def error(recording: Recording) -> np.ndarray:
     return off[500:]
 
 
+@pytest.mark.slow
 def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
     study, folder = tmp_path / "study.toml", tmp_path / "out"
     study.write_text(STUDY)
@@ -135,6 +136,7 @@ def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
         assert np.std(error(each)) < 0.8 * np.std(error(before))
 
 
+@pytest.mark.slow
 def test_a_limit_bounds_what_a_study_tries(tmp_path: Path) -> None:
     folder = tmp_path
     for name in ("emps.toml", "emps.xml"):

@@ -625,6 +625,7 @@ def test_a_study_of_a_calibrated_twin_says_what_it_is_worth(tmp_path, capsys):
     assert {"front.png", "tuned-1.toml"} <= {each.name for each in (tmp_path / "out").iterdir()}
 
 
+@pytest.mark.slow
 def test_settings_that_should_not_be_used_are_said_and_end_with_another_code(tmp_path, capsys):
     """The bounds leave nothing but what is worse than before; a judged rig breaks its limit."""
     text = SMALL.replace("[50.0, 1500.0]", "[1.0, 20.0]")

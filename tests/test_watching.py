@@ -58,6 +58,7 @@ def test_a_nominal_test_gives_no_alarm(nominal):
         assert 0.7 < ratio < 1.3, signal
 
 
+@pytest.mark.slow
 def test_an_effect_from_a_time_on_gives_an_alarm_and_its_name(changed):
     told: list[tuple[float, bool]] = []
     watch = rigtwin.watch(changed, told=lambda now: told.append((now.judged, now.alarm is None)))
