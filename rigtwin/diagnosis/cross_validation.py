@@ -21,7 +21,7 @@ BLOCK = 0.5
 """s, length of a block of the bootstrap: what a test leaves is correlated within it."""
 DRAWS = 1000
 """Draws of the bootstrap."""
-CLEAR = 1.5
+GAP = 1.5
 """Ratio of a signal's power to that of noise and declared error from which it has a gap."""
 SEED = 20
 """Seed of the bootstrap."""
@@ -68,15 +68,24 @@ def gap_level(evidence: Evidence, plant: Plant) -> float:
 
 def declared_floor(evidence: Evidence) -> float:
     """Power of noise and declared model error, in units of the sensors' white noise."""
+    return float(np.mean(signal_floors(evidence)))
+
+
+def signal_floors(evidence: Evidence) -> Array:
+    """Power of noise and declared model error of each signal, in units of its white noise, shape
+    (recordings, signals)."""
     forms = np.array([evidence.machine.form_of(row) for row in evidence.machine.rows])
-    floors = [
-        float(np.mean(1.0 + (forms * np.std(lines.measured, axis=1) / lines.noise) ** 2))
-        for lines in evidence.lines
-    ]
-    return float(np.mean(floors))
+    return np.stack(
+        [
+            1.0 + (forms * np.std(lines.measured, axis=1) / lines.noise) ** 2
+            for lines in evidence.lines
+        ]
+    )
 
 
-def largest_shrinkage(evidence: Evidence, before: Plant, after: Plant) -> float:
+def largest_shrinkage(
+    evidence: Evidence, before: Plant, after: Plant, optimism: float = 1.0
+) -> float:
     """Share of the gap that a correction closes in the signal where it closes most.
 
     Parameters
@@ -85,32 +94,34 @@ def largest_shrinkage(evidence: Evidence, before: Plant, after: Plant) -> float:
         The recordings.
     before, after
         The nominal and the corrected plant.
+    optimism
+        Factor by which a fit's residual has more power on data left out than on its own; 1 if the
+        recordings are not those of the fit.
 
     Returns
     -------
     float
         At most 1; signals without a gap before do not count.
     """
-    machine = evidence.machine
-    powers = np.zeros((2, len(evidence.names)))
-    floor, ticks = np.zeros(len(evidence.names)), 0
-    for lines, one, other in zip(
-        evidence.lines, evidence.predict(before), evidence.predict(after), strict=True
+    powers, floors = np.zeros((2, len(evidence.names))), np.zeros(len(evidence.names))
+    for lines, floor, *predictions in zip(
+        evidence.lines,
+        signal_floors(evidence),
+        evidence.predict(before),
+        evidence.predict(after),
+        strict=True,
     ):
         counted = lines.fade.max(axis=0) > 0.5
-        for number, predicted in enumerate((one, other)):
+        floors += np.count_nonzero(counted) * floor
+        for number, predicted in enumerate(predictions):
             relative = (lines.measured - predicted)[:, counted] / lines.noise[:, None]
             powers[number] += np.sum(relative**2, axis=1)
-        error = np.array([machine.form_of(row) for row in machine.rows])
-        swing = np.std(lines.measured, axis=1) / lines.noise
-        floor += int(counted.sum()) * (1.0 + (error * swing) ** 2)
-        ticks += int(counted.sum())
-    powers, floor = powers / max(ticks, 1), floor / max(ticks, 1)
+    powers[1] *= optimism
     return max(
         (
             shrinkage(float(one), float(other), float(least))
-            for one, other, least in zip(*powers, floor, strict=True)
-            if one > CLEAR * least
+            for one, other, least in zip(*powers, floors, strict=True)
+            if one > GAP * least
         ),
         default=0.0,
     )
@@ -234,10 +245,11 @@ def validate(
     if other is None:
         best = posterior.best
         out, own = (float(np.sum(each * best.samples)) for each in (best.levels, best.inside))
-        after = inside.after * max(out / max(own, 1e-300), 1.0)
+        optimism = max(out / max(own, 1e-300), 1.0)
+        after = inside.after * optimism
         closed = interval(Blocks(inside.before, after, inside.floor))
         largest = largest_shrinkage(
-            evidence, evidence.plant, with_effects(evidence.plant, fit, named)
+            evidence, evidence.plant, with_effects(evidence.plant, fit, named), optimism
         )
         return Validation(
             predicted,

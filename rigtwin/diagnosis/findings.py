@@ -21,8 +21,8 @@ from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import tell_apart
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-CLEAR = 0.9
-"""Share of the way to the nominal value that an unexplained rest may widen an interval."""
+WIDEST = 0.9
+"""Share of the distance to the nominal value that an interval widened by the rest may span."""
 SHOWN = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
 
@@ -143,12 +143,13 @@ def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence:
 def _widths(
     found: Explanation, support: dict[Effect, Support], thresholds: Thresholds
 ) -> list[tuple[float, ...]]:
-    """Standard errors of all values: the larger one of cross-validation and final fit, what the
-    choice of the hypothesis adds, and what an unexplained rest may.
+    """Standard errors of all values.
 
-    A rest whose amplitude is 1/d of an effect's own shifts its magnitude by that share times the
-    correlation of both, of which only the usual size is known. That alone does not make an effect
-    doubtful: `Support.mimic` says how likely the rest has been taken for it.
+    Each combines the larger one of cross-validation and final fit, the spread over hypotheses, and
+    the shift that the rest may cause. A rest whose amplitude is 1/d of an effect's own shifts its
+    magnitude by 1/d times the correlation of both, of which only the usual size is known. That
+    shift does not make an effect doubtful: `Support.mimic` says how likely the rest has been taken
+    for it.
     """
     posterior, widths = found.posterior, []
     for effect, values, scored, fitted in zip(
@@ -163,7 +164,7 @@ def _widths(
         own = [math.hypot(max(one, other), spread) for one, other, spread in parts]
         off = abs(values[0] - nominal)
         shift = thresholds.aligned / support[effect].dominance * off
-        most = max(own[0], CLEAR * off / thresholds.wider)
+        most = max(own[0], WIDEST * off / thresholds.wider)
         widths.append((min(math.hypot(own[0], shift), most), *own[1:]))
     return widths
 

@@ -113,8 +113,9 @@ class Search:
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
-            # What explains most of all signals together, beside what explains one of them best; and
-            # dry friction, which alone explains little where it acts through a spring or a play.
+            # The cheapest single effect may explain one signal alone. The one that leaves least of
+            # all signals is extended too, and so is dry friction: where it acts through a spring or
+            # a play, it explains little by itself.
             through = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
             for fit in (singles[0], *through[:1]):
                 if self.posterior.leaves_something and frozenset(fit.effects) not in self._extended:
@@ -159,11 +160,15 @@ class Search:
         """Fit an effect alone; where a joint swings freely, also from what its forces take."""
         fit = self.coarse.fit_one(screened)
         if screened.effect.kind.name in REGULAR:
-            balanced = balance_forces(self.coarse, (screened.effect,))
-            if balanced is not None:
-                other = self.coarse.refine((screened.effect,), balanced)
-                fit = min(fit, other, key=lambda each: each.misfit)
+            others = [self.coarse.refine(*start) for start in self._balance((screened.effect,))]
+            fit = min(fit, *others, key=lambda each: each.misfit) if others else fit
         return fit
+
+    def _balance(self, effects: tuple[Effect, ...]) -> list[Start]:
+        """Start effects at the values with which the forces along the measured motion balance; no
+        start where no joint goes by itself."""
+        balanced = balance_forces(self.coarse, effects)
+        return [] if balanced is None else [(effects, balanced)]
 
     def _swings_freely(self) -> bool:
         """Whether a joint goes by itself, so that a single effect may fit at more than one value,
@@ -217,19 +222,16 @@ class Search:
         starts: list[Values] = [
             tuple(start_of(effect, number) for effect in chosen) for number in range(count)
         ]
-        if (balanced := balance_forces(coarse, chosen)) is not None:
-            starts.append(balanced)
+        starts += [values for _, values in self._balance(tuple(chosen))]
         tries = self.threads.map(lambda values: coarse.refine(tuple(chosen), values), starts)
-        whole, further = min(tries, key=lambda fit: fit.misfit), list[Start]()
+        whole = min(tries, key=lambda fit: fit.misfit)
         price = 2.0 * self.posterior.prices.ordinary
         path = sorted(
             Linearised(coarse, whole).eliminate(), key=lambda each: each[0] + price * len(each[1])
         )
-        for _, effects, _ in path[:ELIMINATED]:
-            if (balanced := balance_forces(coarse, effects)) is not None:
-                further.append((effects, balanced))
-        further += [(effects, values) for _, effects, values in path[:ELIMINATED]]
-        self._keep([whole, *self._refine(further)])
+        reduced = [(effects, values) for _, effects, values in path[:ELIMINATED]]
+        balanced = [start for effects, _ in reduced for start in self._balance(effects)]
+        self._keep([whole, *self._refine([*balanced, *reduced])])
 
     def _choose_regulars(self) -> list[Effect]:
         """Regular effects that promise anything, at every component that can have them."""
@@ -384,10 +386,6 @@ class Search:
             key=lambda fit: fit.misfit,
         )
         fresh = [fit for fit in singles if frozenset(fit.effects) not in self._extended]
-        starts: list[Start] = []
-        for fit in singles[: 2 * BEGINNINGS]:
-            if fit.effects[0].kind.name in REGULAR:
-                balanced = balance_forces(self.coarse, fit.effects)
-                if balanced is not None:
-                    starts.append((fit.effects, balanced))
-        return [*self._refine(starts), *fresh[:BEGINNINGS]]
+        regular = [fit for fit in singles[: 2 * BEGINNINGS] if fit.effects[0].kind.name in REGULAR]
+        balanced = [start for fit in regular for start in self._balance(fit.effects)]
+        return [*self._refine(balanced), *fresh[:BEGINNINGS]]
