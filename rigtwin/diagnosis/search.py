@@ -16,15 +16,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from rigtwin.components import Effect, Guide, measures
-from rigtwin.diagnosis.balance import balance_forces
+from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
-from rigtwin.diagnosis.fit import Fit, Values
+from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
+from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
 from rigtwin.diagnosis.scoring import Scored, Scorer
 from rigtwin.diagnosis.starts import (
     GATEWAY,
@@ -50,12 +50,6 @@ BEHIND = 0.5
 """Share of what the best hypothesis explains that another may lack and still be extended."""
 MISSED = 10.0
 """Prices of an effect whose loss is worth a fit without it."""
-GATEWAY_STARTS = 3
-"""Sizes of the gateway from which regular effects are fitted together."""
-FEW_REGULAR = 6
-"""Regular effects up to which all of these sizes are tried."""
-ELIMINATED = 4
-"""Sets that are fitted of those from which one regular effect after another was left out."""
 VARIED, COMPARED = 2, 5
 """Effects that are tried in the place of each while the search climbs, and of its result."""
 BEGINNINGS = 4
@@ -160,15 +154,12 @@ class Search:
         """Fit an effect alone; where a joint swings freely, also from what its forces take."""
         fit = self.coarse.fit_one(screened)
         if screened.effect.kind.name in REGULAR:
-            others = [self.coarse.refine(*start) for start in self._balance((screened.effect,))]
+            others = [
+                self.coarse.refine(*start)
+                for start in start_balanced(self.coarse, (screened.effect,))
+            ]
             fit = min(fit, *others, key=lambda each: each.misfit) if others else fit
         return fit
-
-    def _balance(self, effects: tuple[Effect, ...]) -> list[Start]:
-        """Start effects at the values with which the forces along the measured motion balance; no
-        start where no joint goes by itself."""
-        balanced = balance_forces(self.coarse, effects)
-        return [] if balanced is None else [(effects, balanced)]
 
     def _swings_freely(self) -> bool:
         """Whether a joint goes by itself, so that a single effect may fit at more than one value,
@@ -203,50 +194,12 @@ class Search:
     # Sets of effects
 
     def _fit_regulars(self) -> None:
-        """Fit what nearly every machine has together, and then leave out one after another.
-
-        What is found one by one may stand for several of them at once.
-        """
-        chosen = self._choose_regulars()
-        if len(chosen) < 2:
-            return
-        coarse = self.coarse
-
-        def start_of(effect: Effect, number: int) -> tuple[float, ...]:
-            if effect.kind.name != GATEWAY:
-                return tuple(effect.nominal(coarse.plant).values())
-            values = [v for v in coarse.starts(effect).values if v[0] > 0.0]
-            return values[min(number, len(values) - 1)]
-
-        count = GATEWAY_STARTS if len(chosen) <= FEW_REGULAR else 1
-        starts: list[Values] = [
-            tuple(start_of(effect, number) for effect in chosen) for number in range(count)
-        ]
-        starts += [values for _, values in self._balance(tuple(chosen))]
-        tries = self.threads.map(lambda values: coarse.refine(tuple(chosen), values), starts)
-        whole = min(tries, key=lambda fit: fit.misfit)
-        price = 2.0 * self.posterior.prices.ordinary
-        path = sorted(
-            Linearised(coarse, whole).eliminate(), key=lambda each: each[0] + price * len(each[1])
-        )
-        reduced = [(effects, values) for _, effects, values in path[:ELIMINATED]]
-        balanced = [start for effects, _ in reduced for start in self._balance(effects)]
-        self._keep([whole, *self._refine([*balanced, *reduced])])
-
-    def _choose_regulars(self) -> list[Effect]:
-        """Regular effects that promise anything, at every component that can have them."""
-        worth = self.posterior.prices.ordinary
-        promise = {each.effect: each.promise for each in self.screened}
-        coupled = len({e.group for e in self.effects if e.of is Guide}) > 1
-        chosen: dict[tuple[str, str], Effect] = {}
-        for effect in self.effects:
-            name = effect.kind.name
-            if measures(effect.of()):
-                continue
-            if name in REGULAR and (promise[effect] > worth or name == GATEWAY):
-                at = effect.group if coupled and effect.of is Guide else ""
-                chosen.setdefault((name, at), effect)
-        return list(chosen.values())
+        """Fit what nearly every machine has together, and sets of it with fewer effects."""
+        price = self.posterior.prices.ordinary
+        chosen = choose_regulars(self.effects, self.screened, price)
+        if len(chosen) > 1:
+            whole, reduced = fit_together(self.coarse, chosen, 2.0 * price, self.threads)
+            self._keep([whole, *self._refine(reduced)])
 
     def _climb(self) -> None:
         """Extend the best hypotheses by one effect as long as better ones are found; where that
@@ -387,5 +340,5 @@ class Search:
         )
         fresh = [fit for fit in singles if frozenset(fit.effects) not in self._extended]
         regular = [fit for fit in singles[: 2 * BEGINNINGS] if fit.effects[0].kind.name in REGULAR]
-        balanced = [start for fit in regular for start in self._balance(fit.effects)]
+        balanced = [start for fit in regular for start in start_balanced(self.coarse, fit.effects)]
         return [*self._refine(balanced), *fresh[:BEGINNINGS]]
