@@ -47,7 +47,7 @@ def predict(machine: Machine, moved: tuple[np.ndarray, ...], **changes: object) 
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     configuration = machine.configuration_of(data)
     plant = machine.plant._replace(**changes)
-    return model_of(machine, data, configuration, 1).predict(plant)
+    return model_of(machine, data.inputs, configuration, 1).predict(plant)
 
 
 def by_mujoco(mjcf: str, moved: tuple[np.ndarray, ...]) -> np.ndarray:

@@ -59,7 +59,7 @@ def coupled(
     machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1
 ) -> CoupledModel:
     record = recording(machine, columns)
-    model = model_of(machine, record, machine.configuration_of(record), steps)
+    model = model_of(machine, record.inputs, machine.configuration_of(record), steps)
     assert isinstance(model, CoupledModel)
     return model
 
@@ -255,7 +255,7 @@ def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> 
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
-    model = model_of(machine, record, configuration, configuration.substeps)
+    model = model_of(machine, record.inputs, configuration, configuration.substeps)
     predicted = model.predict(machine.plant)
     for row, signal, noise in zip(machine.rows, predicted, (2e-5, 1e-4), strict=True):
         left = signal - record.column(*row.channel)
@@ -266,7 +266,7 @@ def test_a_search_takes_longer_steps_where_they_change_next_to_nothing(tmp_path:
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
-    model = model_of(machine, record, configuration, 8)
+    model = model_of(machine, record.inputs, configuration, 8)
     thinned, own = model.thin(2.5e-3), model.predict(machine.plant)
     assert thinned is not model
     change = thinned.predict(machine.plant) - own

@@ -95,7 +95,9 @@ def test_a_rotor_behind_a_gear_has_inertia_and_no_weight(tmp_path: Path):
     time = np.arange(4000) * 1e-3
     still = recording_of(machine, np.zeros_like(time), 0.05 * np.cos(time))
     plant = with_parameters(machine.plant, "guide", {"viscous": 0.0})
-    model = JointModel(machine, machine.replays[0], still, machine.configuration_of(still), steps=4)
+    model = JointModel(
+        machine, machine.replays[0], still.inputs, machine.configuration_of(still), steps=4
+    )
     swing = model.predict_true(plant)[0]
     crossings = time[1:][np.diff(np.sign(swing)) != 0]
     expected = np.pi * np.sqrt(joint.inertia / (1.5 * 9.81 * 0.2))

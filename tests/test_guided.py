@@ -132,7 +132,7 @@ def test_a_mass_pushed_against_a_stuck_guide_swings_on_its_mount(tmp_path):
     pushed = {"/command": {"force": np.full(3000, 5.0)}, "/sensor": {"position": np.zeros(3000)}}
     recording = Recording(Path("bench"), machine.name, "", PERIOD, TIME, pushed, {})
     model = JointModel(
-        machine, machine.replays[0], recording, machine.configuration_of(recording), 4
+        machine, machine.replays[0], recording.inputs, machine.configuration_of(recording), 4
     )
     values = {"coulomb": 1e4, "viscous": 0.0, "stiffness": 0.0, "mount_compliance": 1e-3}
     plant = with_parameters(machine.plant, "guide", values)
@@ -211,7 +211,9 @@ def test_a_pushed_joint_moves_as_mujoco_moves_it(tmp_path: Path, sort: str):
     machine = described(tmp_path, sort)
     command = 3.0 * np.sin(2 * np.pi * 0.7 * TIME) + 1.5 * np.sin(2 * np.pi * 2.1 * TIME)
     position = simulated(machine, command)
-    model = model_of(machine, recording_of(machine, command, position), machine.configuration, 20)
+    model = model_of(
+        machine, recording_of(machine, command, position).inputs, machine.configuration, 20
+    )
     assert np.ptp(position) > 0.01
     np.testing.assert_allclose(
         model.predict(machine.plant)[0], position, atol=0.004 * np.ptp(position)
@@ -222,7 +224,7 @@ def test_a_block_slows_down_by_its_friction_and_stays(tmp_path: Path):
     machine = described(tmp_path, "slide")
     plant = machine.plant._replace(guide=Guide(coulomb=4.0))
     recording = recording_of(machine, np.where(TIME < 0.5, 10.0, 0.0), np.zeros(len(TIME)))
-    model = model_of(machine, recording, machine.configuration._replace(plant=plant), 4)
+    model = model_of(machine, recording.inputs, machine.configuration._replace(plant=plant), 4)
     position = model.predict(plant)[0]
     # 2 kg: 3 m/s² for half a second, then −2 m/s² until it rests.
     assert position[-1] == pytest.approx(0.375 + 1.5**2 / 4.0, rel=0.003)
@@ -241,7 +243,7 @@ def test_a_loop_is_closed_by_the_controllers_formula():
         "/sensor": {"position": reference},
     }
     recording = Recording(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
-    model = model_of(machine, recording, machine.configuration, 8)
+    model = model_of(machine, recording.inputs, machine.configuration, 8)
     force = model.predict(machine.plant)[0]
     speed = np.gradient(reference, PERIOD)
     needed = 95.1 * np.gradient(speed, PERIOD) + 203.5 * speed

@@ -50,7 +50,7 @@ def test_predicted_torques_are_those_of_lagrange(tmp_path, moved, toml):
     true = torques(*moved)
     data = recording(moved[0], true, (0.0, 0.0))
     configuration = machine.configuration_of(data)
-    found = model_of(machine, data, configuration, 1).predict(configuration.plant)
+    found = model_of(machine, data.inputs, configuration, 1).predict(configuration.plant)
     assert rms((found - true)[:, INSIDE]) < 2e-3 * rms(true)
 
 
@@ -73,7 +73,7 @@ def test_a_friction_acts_where_it_is(tmp_path, moved, component, values, onto, f
     machine = described_arm(tmp_path, (TOML + COUPLED).replace("band = 25.0", ""))
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     plant = machine.configuration_of(data).plant
-    model = model_of(machine, data, machine.configuration_of(data), 1)
+    model = model_of(machine, data.inputs, machine.configuration_of(data), 1)
     change = model.predict(with_parameters(plant, component, values)) - model.predict(plant)
     wanted = np.outer(onto, force(moved[1]))
     # Where it reverses, a tick early or late is no error of its size.
@@ -87,7 +87,7 @@ def test_a_rotor_turns_with_its_own_coordinate(tmp_path, moved):
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     plant = machine.configuration_of(data).plant
     assert plant.pulley.inertia == 0.04
-    model = model_of(machine, data, machine.configuration_of(data), 1)
+    model = model_of(machine, data.inputs, machine.configuration_of(data), 1)
     change = model.predict(plant) - model.predict(
         with_parameters(plant, "pulley", {"inertia": 0.0})
     )
@@ -116,7 +116,7 @@ def test_a_urdf_is_read_and_its_joints_are_sensed(tmp_path, moved):
     )
     data = recording(moved[0], true, (0.0, 0.0))
     configuration = machine.configuration_of(data)
-    found = model_of(machine, data, configuration, 1).predict(configuration.plant)
+    found = model_of(machine, data.inputs, configuration, 1).predict(configuration.plant)
     assert rms((found - true)[:, INSIDE]) < 2e-3 * rms(true)
 
 
@@ -125,7 +125,7 @@ def test_noise_of_measured_angles_is_carried_into_the_torques(tmp_path, moved):
     true = torques(*moved)
     data = recording(moved[0], true, (1e-4, 0.0))
     configuration = machine.configuration_of(data)
-    model = model_of(machine, data, configuration, 1)
+    model = model_of(machine, data.inputs, configuration, 1)
     plant: Plant = configuration.plant
     carried = model.propagated_noise(plant)
     assert carried is not None
@@ -141,7 +141,7 @@ def test_where_a_joint_rests_its_torque_says_nothing(tmp_path, moved):
     still[1, 2000:] = still[1, 2000]
     machine = described_arm(tmp_path)
     data = recording(still, torques(*moved), (0.0, 0.0))
-    found = MovedModel(machine, machine.replays[0], data).undetermined()
+    found = MovedModel(machine, machine.replays[0], data.inputs).undetermined()
     assert found[1, 2100:-200].all()
     assert not found[0, 2100:-200].all()
 

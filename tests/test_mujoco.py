@@ -60,8 +60,8 @@ def models(machine: Machine, column: dict[str, dict[str, Array]]) -> tuple[Joint
     configuration = machine.configuration_of(recording)
     replay = machine.replays[0]
     return (
-        JointModel(machine, replay, recording, configuration, STEPS),
-        MujocoModel(machine, replay, recording, configuration, STEPS),
+        JointModel(machine, replay, recording.inputs, configuration, STEPS),
+        MujocoModel(machine, replay, recording.inputs, configuration, STEPS),
     )
 
 

@@ -126,7 +126,7 @@ def test_a_loop_is_closed_over_any_sensor_of_position(tmp_path: Path):
         machine = described(tmp_path, toml=toml.replace("[[replays]]", loop))
         wave = 0.02 * np.sin(2 * np.pi * TIME)
         recording = rigtwin.run(machine, lambda _, __, wave=wave: {"goal": wave})
-        model = model_of(machine, recording, machine.configuration_of(recording), 4)
+        model = model_of(machine, recording.inputs, machine.configuration_of(recording), 4)
         found.append((recording["/sensor.position"], model.predict(machine.plant)[0]))
     (ran, replayed), plain = found
     assert np.ptp(ran) > 0.01

@@ -140,7 +140,7 @@ def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
 
 def predict(machine: rigtwin.Machine, recording: Recording) -> dict[str, Array]:
     configuration = machine.configuration_of(recording)
-    model = model_of(machine, recording, configuration, 16)
+    model = model_of(machine, recording.inputs, configuration, 16)
     rows = model.predict(machine.plant)
     return {row.channel[1]: each for row, each in zip(model.rows, rows, strict=True)}
 
@@ -171,7 +171,7 @@ def test_the_joint_alone_goes_as_in_mujoco_and_so_does_its_twin(tmp_path: Path) 
     recording = recorded(text, noise=0.0)
     machine = machine_in(tmp_path, ONE, text)
     (replay,) = machine.replays
-    reference = MujocoModel(machine, replay, recording, machine.configuration, 16)
+    reference = MujocoModel(machine, replay, recording.inputs, machine.configuration, 16)
     found = reference.predict(machine.plant)[0]
     assert np.std(found - recording["/sensor.shoulder"]) < 0.002 * np.std(found)
     demanded = {"shoulder": commanded(recording.time)["shoulder"]}

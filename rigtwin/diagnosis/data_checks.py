@@ -92,7 +92,9 @@ def find_faults(
     if not found:
         found += _check_values(machine, recording)
     if not found:
-        predicted = model_of(machine, recording, configuration, STEPS).predict(configuration.plant)
+        predicted = model_of(machine, recording.inputs, configuration, STEPS).predict(
+            configuration.plant
+        )
         found += _check_alive(machine, recording, predicted)
         if not any(fault.fatal for fault in found):
             found += _check_order(machine, recording, predicted)

@@ -50,7 +50,7 @@ def runs_backwards(
         for topic, signals in recording.columns.items()
     }
     turned = replace(recording, columns=columns)
-    model = model_of(machine, turned, configuration, STEPS)
+    model = model_of(machine, turned.inputs, configuration, STEPS)
     back = _misfits(measured[:, ::-1], model.predict(configuration.plant))
     return bool(np.isfinite(back).all()) and NEARER * rms(back) < rms(forth)
 

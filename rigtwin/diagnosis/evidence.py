@@ -185,7 +185,7 @@ def _model_with_enough_steps(
     """The model with so few integration steps that twice as many change little of what it is held
     to."""
     steps = FEWEST_STEPS
-    model = model_of(machine, recording, configuration, steps)
+    model = model_of(machine, recording.inputs, configuration, steps)
     held = [
         max(
             white_noise(recording.column(*row.channel)),

@@ -11,7 +11,7 @@ from rigtwin.components import measures
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
-from rigtwin.models.demanded import pose_as_recorded
+from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.joint import JointModel
 from rigtwin.models.moved_twin import Moved
 from rigtwin.models.reading import sensors_of
@@ -48,9 +48,9 @@ def carry(
         if components[name].joint == replay.joint.name and channel is not None:
             rows.append(Row(name, measures(getattr(plant, name)), channel, components[name].unit))
     nothing = {row.name: np.zeros(len(demands[mover])) for row in rows}
-    recording = pose_as_recorded(machine, {**nothing, **demands}, period)
+    inputs = inputs_of_test(machine, {**nothing, **demands}, period)
     observed = replace(replay, rows=tuple(rows))
-    model = JointModel(machine, observed, recording, configuration, configuration.substeps)
+    model = JointModel(machine, observed, inputs, configuration, configuration.substeps)
     if measures(getattr(plant, mover)):
         moved = model.prescribe(plant, demands[mover])
     else:

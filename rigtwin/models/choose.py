@@ -19,11 +19,11 @@ from rigtwin.models.model import Form, Model
 from rigtwin.models.moved import MovedModel
 from rigtwin.models.quarter_car import QuarterCarModel
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import Inputs
 
 
 def model_of(
-    machine: Machine, recording: Recording, configuration: Configuration, steps: int
+    machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
 ) -> Model[Any]:
     """The fastest model of a machine.
 
@@ -49,13 +49,13 @@ def model_of(
         If a channel is missing.
     """
     if machine.structure is Structure.QUARTER_CAR:
-        return QuarterCarModel.of(recording, configuration, steps)
+        return QuarterCarModel.of(inputs, configuration, steps)
     if machine.structure is Structure.MOVED:
-        return MovedModel(machine, machine.replays[0], recording)
+        return MovedModel(machine, machine.replays[0], inputs)
     if machine.structure is Structure.COUPLED:
-        return CoupledModel(machine, machine.replays[0], recording, configuration, steps)
+        return CoupledModel(machine, machine.replays[0], inputs, configuration, steps)
     joints = [
-        JointModel(machine, replay, recording, configuration, steps) for replay in machine.replays
+        JointModel(machine, replay, inputs, configuration, steps) for replay in machine.replays
     ]
     return joints[0] if len(joints) == 1 else Joints(joints)
 

@@ -34,7 +34,7 @@ from rigtwin.components.servo import Push, push, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.coupled_motion import Contacts, Inputs, Servos, State, advance
+from rigtwin.models.coupled_motion import Contacts, Servos, State, StepInputs, advance
 from rigtwin.models.coupled_start import CoupledStart, Seen, Sense
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID
@@ -42,7 +42,7 @@ from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_m
 from rigtwin.models.model import Form
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.numerics.arrays import Array, contain, interpolate
-from rigtwin.recording import Recording
+from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
 
 SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
@@ -60,14 +60,14 @@ class CoupledModel:
         self,
         machine: Machine,
         replay: ReplayOf,
-        recording: Recording,
+        inputs: Inputs,
         configuration: Configuration,
         steps: int,
     ) -> None:
         """Raises RigtwinError if a channel is missing."""
-        self._machine, self._replay, self._recording = machine, replay, recording
+        self._machine, self._replay, self._signals = machine, replay, inputs
         self._configuration, self._steps = configuration, steps
-        self._period, self._ticks = recording.period, recording.ticks
+        self._period, self._ticks = inputs.period, inputs.ticks
         self.rows: tuple[Row, ...] = replay.rows
         components = machine.components
         plant = configuration.plant
@@ -101,7 +101,7 @@ class CoupledModel:
             name: self._seen_by(name, kind)
             for name, component in components.items()
             if (kind := measures(getattr(plant, name))) in ("position", "velocity")
-            and component.channel in replay_channels(recording)
+            and component.channel in inputs.channels
             and self._along[name].any()
         }
         self._start = CoupledStart(seen, self._bodies.place(), self._loose, self._period)
@@ -123,16 +123,14 @@ class CoupledModel:
         return self._with_steps(2 * self._steps)
 
     def _with_steps(self, steps: int) -> CoupledModel:
-        return CoupledModel(
-            self._machine, self._replay, self._recording, self._configuration, steps
-        )
+        return CoupledModel(self._machine, self._replay, self._signals, self._configuration, steps)
 
     def thin(self, longest: float) -> CoupledModel:
         """With longer integration steps, as long as they change next to nothing."""
         steps = math.ceil(self._period / longest)
         plant = self._configuration.plant
         own = self.predict(plant)
-        swing = np.std([self._recording.column(*row.channel) for row in self.rows], axis=1)
+        swing = np.std([self._signals.column(*row.channel) for row in self.rows], axis=1)
         while steps < self._steps:
             thinned = self._with_steps(steps)
             change = np.sqrt(np.mean((thinned.predict(plant) - own) ** 2, axis=1))
@@ -144,7 +142,7 @@ class CoupledModel:
     def _column(self, name: str) -> Array:
         channel = self._machine.components[name].channel
         assert channel is not None
-        return self._recording.column(*channel)
+        return self._signals.column(*channel)
 
     def _find_loosest(self) -> Array:
         """The inertia that each guide feels where nothing else holds its joints, at the start."""
@@ -251,11 +249,11 @@ class CoupledModel:
             commands=commands,
         )
 
-    def _inputs(self, plant: Plant, pushes: Array, commands: Array) -> Inputs:
+    def _inputs(self, plant: Plant, pushes: Array, commands: Array) -> StepInputs:
         """What moves it besides measured motions: forces of the force actuators and commands of the
         servos at the steps, shape (actuators, steps) and (servos, steps)."""
         size = self._bodies.coordinates
-        return Inputs(
+        return StepInputs(
             prescribed=self._prescribe(plant, {}),
             pushes=pushes,
             levers=np.array([self._along[name] for name in self._pushers]).reshape(-1, size),
@@ -557,11 +555,6 @@ class CoupledModel:
         if not shifts:
             return None
         return self._true(self.move(plant, shifts=shifts)) - self.predict_true(plant)
-
-
-def replay_channels(recording: Recording) -> set[tuple[str, str]]:
-    """(topic, field) of every column."""
-    return {(topic, name) for topic, names in recording.columns.items() for name in names}
 
 
 def _acts(guide: Guide) -> bool:

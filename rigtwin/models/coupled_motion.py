@@ -77,7 +77,7 @@ class Servos(NamedTuple):
     commands: Array
 
 
-class Inputs(NamedTuple):
+class StepInputs(NamedTuple):
     """prescribed: positions of the coordinates at the steps, shape (coordinates, steps + 1), of
     those that are; pushes, levers: of the actuators: N at the steps, shape (actuators, steps), and
     how they act, shape (actuators, coordinates); besides: another force on each coordinate, N,
@@ -180,7 +180,7 @@ def advance(
     free: np.ndarray,
     held: np.ndarray,
     state: State,
-    inputs: Inputs,
+    inputs: StepInputs,
     h: float,
     steps: int,
     first: int,

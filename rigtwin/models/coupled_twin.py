@@ -16,8 +16,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
 from rigtwin.models.coupled import CoupledModel, begin
-from rigtwin.models.demanded import pose_as_recorded
 from rigtwin.models.demands import list_pushers, list_sensors
+from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.moved_twin import Moved
 from rigtwin.models.multibody import Multibody
 from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
@@ -256,7 +256,7 @@ def _at_start(
         for name, demand in demands.items()
         if measures(getattr(plant, name))
     }
-    recording = pose_as_recorded(machine, {**demands, **found}, period)
+    inputs = inputs_of_test(machine, {**demands, **found}, period)
     unobserved = replace(replay, rows=())
     steps = configuration.substeps
-    return CoupledTwin(machine, unobserved, recording, configuration, steps), found
+    return CoupledTwin(machine, unobserved, inputs, configuration, steps), found

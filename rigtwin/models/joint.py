@@ -40,7 +40,7 @@ from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.model import Form
 from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, contain
-from rigtwin.recording import Recording
+from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import motion_band, smooth, white_noise
 
@@ -92,52 +92,52 @@ class JointModel:
         self,
         machine: Machine,
         replay: ReplayOf,
-        recording: Recording,
+        inputs: Inputs,
         configuration: Configuration,
         steps: int,
         every: int = 1,
     ) -> None:
         """every: ticks from one that is predicted to the next, of a prescribed motion. Raises
         RigtwinError if a channel is missing."""
-        self._machine, self._replay, self._recording, self._steps = (
+        self._machine, self._replay, self._signals, self._steps = (
             machine,
             replay,
-            recording,
+            inputs,
             steps,
         )
         self.every = every
         self._configuration = configuration
-        self._period = recording.period
+        self._period = inputs.period
         self.rows: tuple[Row, ...] = replay.rows
         self._mover = machine.components[replay.moved_by[0]]
         assert self._mover.channel is not None
         topic, name = self._mover.channel
         # Another controller than the described one cannot be run along: what it commanded is taken.
-        closed = replay.closed and OWN not in recording.controller
+        closed = replay.closed and OWN not in inputs.controller
         self._control = control = (
             machine.control if isinstance(machine.control, FormulaControl) and closed else None
         )
-        self._command = np.zeros(recording.ticks)
+        self._command = np.zeros(inputs.ticks)
         self._motion: Array | None = None
         self._error = 0.0
         kind = getattr(machine.plant, self._mover.name)
         self._integrated = measures(kind) == "velocity"
         if measures(kind) in ("position", "velocity"):
-            self._motion, self._error = smooth(recording.column(topic, name), self._period)
+            self._motion, self._error = smooth(inputs.column(topic, name), self._period)
         elif not closed:
-            self._command = recording.column(topic, name)
-        self._inputs = {}
+            self._command = inputs.column(topic, name)
+        self._controller_inputs = {}
         self._program = NO_COMMAND.program
         if control is not None:
             self._program = control.program(configuration.controller._asdict())
-            self._inputs = {name: channel for name, channel in control.inputs.items()}
-            for channel in self._inputs.values():
-                recording.column(*channel)
+            self._controller_inputs = {name: channel for name, channel in control.inputs.items()}
+            for channel in self._controller_inputs.values():
+                inputs.column(*channel)
         self._sensors = [
             name
             for name, component in machine.components.items()
             if component.joint == replay.joint.name
-            and component.channel in self._inputs.values()
+            and component.channel in self._controller_inputs.values()
             and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
         self._last: dict[tuple[object, ...], Array] = {}
@@ -164,11 +164,11 @@ class JointModel:
         moved = self.move(self._configuration.plant)
         inertia = self._parts(self._configuration.plant)[1].mass
         accelerating = inertia * float(np.std(np.gradient(moved[1], self._apart)))
-        measured = float(np.std(self._recording.column(*rows[0].channel)))
+        measured = float(np.std(self._signals.column(*rows[0].channel)))
         if accelerating < INERTIAL * measured:
             return math.inf
         assert self._mover.channel is not None
-        return motion_band(self._recording.column(*self._mover.channel), self._period)
+        return motion_band(self._signals.column(*self._mover.channel), self._period)
 
     def halve_steps(self) -> JointModel:
         return self._with_steps(max(1, self._steps // 2))
@@ -178,7 +178,7 @@ class JointModel:
 
     def _with_steps(self, steps: int) -> JointModel:
         return JointModel(
-            self._machine, self._replay, self._recording, self._configuration, steps, self.every
+            self._machine, self._replay, self._signals, self._configuration, steps, self.every
         )
 
     def thin(self, longest: float) -> JointModel:
@@ -187,7 +187,7 @@ class JointModel:
         if self._motion is None or every == 1:
             return self
         return JointModel(
-            self._machine, self._replay, self._recording, self._configuration, self._steps, every
+            self._machine, self._replay, self._signals, self._configuration, self._steps, every
         )
 
     @property
@@ -208,7 +208,7 @@ class JointModel:
             return None
         channel = components[name].channel
         assert channel is not None
-        start = JointStart(name, kinds[name], self._recording.column(*channel), self._period)
+        start = JointStart(name, kinds[name], self._signals.column(*channel), self._period)
         if name in rows and self._control is None:
             move = self._prepare_pushed(plant, getattr(plant, self._mover.name))
             nominal = getattr(self._machine.plant, name)
@@ -421,9 +421,9 @@ class JointModel:
         """What the controller read, as recorded, shape (ticks, inputs)."""
         control = self._control
         assert control is not None
-        found = np.zeros((self._recording.ticks, len(control.formula.inputs)))
+        found = np.zeros((self._signals.ticks, len(control.formula.inputs)))
         for number, name in enumerate(control.formula.inputs):
-            found[:, number] = self._recording.column(*control.inputs[name])
+            found[:, number] = self._signals.column(*control.inputs[name])
         return found
 
     @cached_property
@@ -507,7 +507,7 @@ class JointModel:
         if row is None or not self._free:
             return None
         if row.name not in self._smoothed:
-            self._smoothed[row.name] = smooth(self._recording.column(*row.channel), self._period)
+            self._smoothed[row.name] = smooth(self._signals.column(*row.channel), self._period)
         measured, error = self._smoothed[row.name]
         sensor, mover = getattr(plant, row.name), getattr(plant, self._mover.name)
         position = recover_motion(sensor, measured, self._period)
@@ -527,7 +527,7 @@ class JointModel:
         channel = self._mover.channel
         assert channel is not None
         # As the actuator got it, in a closed loop too.
-        commanded = np.ascontiguousarray(self._recording.column(*channel))
+        commanded = np.ascontiguousarray(self._signals.column(*channel))
         conditioning = actuator(mover, plant.computer, self._period)
         command = np.zeros(len(position))
         condition_all(conditioning, hold(conditioning, float(commanded[0])), commanded, 1, command)
@@ -540,10 +540,10 @@ class JointModel:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors
         of its command."""
         random = np.random.default_rng(SEED)
-        ticks = self._recording.ticks
+        ticks = self._signals.ticks
         if self._motion is not None and self._error > 0.0 and not self._integrated:
             assert self._mover.channel is not None
-            level = white_noise(self._recording.column(*self._mover.channel))
+            level = white_noise(self._signals.column(*self._mover.channel))
             again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
             shift = (again - self._motion)[:: self.every]
             carried = self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
@@ -552,7 +552,7 @@ class JointModel:
         if control is None or not self._sensors:
             return None
         sensed = [self._machine.components[name].channel for name in self._sensors]
-        columns = [self._recording.column(*channel) for channel in control.channels]
+        columns = [self._signals.column(*channel) for channel in control.channels]
         noise = np.zeros((ticks, len(columns)))
         for number, (channel, column) in enumerate(zip(control.channels, columns, strict=True)):
             if channel in sensed:

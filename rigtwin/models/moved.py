@@ -26,7 +26,7 @@ from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
 from rigtwin.models.model import Form
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import smooth, white_noise
 
@@ -49,14 +49,14 @@ class MovedModel:
         self,
         machine: Machine,
         replay: ReplayOf,
-        recording: Recording,
+        inputs: Inputs,
         every: int = 1,
         like: MovedModel | None = None,
     ) -> None:
         """every: ticks from one that is predicted to the next; like: one of the same recording,
         whose motions were smoothed already. Raises RigtwinError if a channel is missing."""
-        self._machine, self._replay, self._recording = machine, replay, recording
-        self._period = recording.period
+        self._machine, self._replay, self._signals = machine, replay, inputs
+        self._period = inputs.period
         self.every = every
         self.rows: tuple[Row, ...] = replay.rows
         components = machine.components
@@ -107,7 +107,7 @@ class MovedModel:
     def _measured(self, name: str) -> Array:
         channel = self._machine.components[name].channel
         assert channel is not None
-        return self._recording.column(*channel)
+        return self._signals.column(*channel)
 
     def _smooth(self, signal: Array) -> tuple[Array, float]:
         return smooth(signal, self._period)
@@ -123,7 +123,7 @@ class MovedModel:
         every = max(int(longest / self._period), 1)
         if every <= self.every:
             return self
-        return MovedModel(self._machine, self._replay, self._recording, every, self)
+        return MovedModel(self._machine, self._replay, self._signals, every, self)
 
     def _move(self, plant: Plant, shifts: Mapping[str, Array] | None = None) -> Kinematics:
         """How the joints move. shifts: of measured motions, shape (ticks,) of the recording."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
-from rigtwin.models.demanded import pose_as_recorded
+from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.moved import MovedModel
 from rigtwin.numerics.arrays import Array
 
@@ -48,8 +48,8 @@ def move_together(
     found = {
         name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
     }
-    recording = pose_as_recorded(machine, found, period)
-    forces = MovedModel(machine, replay, recording).predict_true(plant)
+    inputs = inputs_of_test(machine, found, period)
+    forces = MovedModel(machine, replay, inputs).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
         found[row.name] = apply_sensor(getattr(plant, row.name), force, period)
     return Moved(found, True)

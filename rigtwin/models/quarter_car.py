@@ -25,7 +25,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form
 from rigtwin.models.quarter_car_motion import Plate, move_carriage, move_plate
 from rigtwin.numerics.arrays import Array, contain
-from rigtwin.recording import Recording
+from rigtwin.recording import Inputs
 from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import (
     initial_deflection,
@@ -101,10 +101,10 @@ class QuarterCarModel:
         self._plates: dict[tuple[object, ...], Plate] = {}
 
     @classmethod
-    def of(cls, recording: Recording, configuration: Configuration, steps: int) -> QuarterCarModel:
+    def of(cls, inputs: Inputs, configuration: Configuration, steps: int) -> QuarterCarModel:
         """Under the commands of a recording. Raises RigtwinError if one is missing."""
         ground, structure, voltage = (
-            recording.column("/command", name) for name in ("ground", "structure", "voltage")
+            inputs.column("/command", name) for name in ("ground", "structure", "voltage")
         )
         return cls(ground, structure, voltage, configuration, steps)
 

@@ -24,6 +24,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.columns import decode_columns
+from rigtwin.recording.inputs import Inputs
 from rigtwin.recording.records import Lost, Messages, read_records, unseal
 from rigtwin.recording.schema import (
     END_RECORD,
@@ -126,20 +127,24 @@ class Recording:
             {name: self[name] for name in self.channels}, index=pandas.Index(self.time, name="time")
         )
 
+    @property
+    def inputs(self) -> Inputs:
+        """The signals and controller settings alone, as models take them."""
+        return Inputs(str(self.path), self.period, self.columns, self.controller)
+
     def has(self, topic: str, name: str) -> bool:
-        return name in self.columns.get(topic, {})
+        """Return whether a channel exists."""
+        return self.inputs.has(topic, name)
 
     def column(self, topic: str, name: str) -> Array:
-        """One channel. Raises RigtwinError naming what is there if it is missing."""
-        try:
-            return self.columns[topic][name]
-        except KeyError:
-            there = (
-                ", ".join(f"{t}.{n}" for t, names in self.columns.items() for n in names) or "none"
-            )
-            raise RigtwinError(
-                f"{self.path}: channel {topic}.{name} is missing; it has {there}"
-            ) from None
+        """Return one channel, shape (ticks,).
+
+        Raises
+        ------
+        RigtwinError
+            If the channel is missing; the message lists those that exist.
+        """
+        return self.inputs.column(topic, name)
 
 
 def load(path: Path) -> Recording:

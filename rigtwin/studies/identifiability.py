@@ -226,7 +226,7 @@ class _Tried:
         self._machine, self.plant = machine, machine.plant
         self._period = recordings[0].period
         self._models: list[Model[Any]] = [
-            model_of(machine, recording, machine.configuration_of(recording), STEPS)
+            model_of(machine, recording.inputs, machine.configuration_of(recording), STEPS)
             for recording in recordings
         ]
         self._swings = swings(machine, recordings)

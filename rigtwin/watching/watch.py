@@ -147,7 +147,7 @@ class Watch:
         still keeps where dry friction holds it."""
         known = window.time >= window.time[0] + WARM
         plant = configuration.plant
-        model = model_of(self.machine, window, configuration, STEPS)
+        model = model_of(self.machine, window.inputs, configuration, STEPS)
         predicted = model.predict(plant)
         measured = [window.column(*row.channel) for row in self.machine.rows]
         held = [
@@ -155,7 +155,7 @@ class Watch:
             for row, signal in zip(self.machine.rows, measured, strict=True)
         ]
         for share in (-KICK, KICK):
-            kicked = model_of(self.machine, _kick(window, share), configuration, STEPS)
+            kicked = model_of(self.machine, _kick(window, share).inputs, configuration, STEPS)
             with np.errstate(invalid="ignore"):
                 apart = np.abs(kicked.predict(plant) - predicted)
             alike = np.all(apart <= SAME * np.array(held)[:, None], axis=0)

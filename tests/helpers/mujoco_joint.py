@@ -158,7 +158,7 @@ class MujocoModel(JointModel):
         """The command of a tick for the joint's position and velocity, as the controller sees
         them."""
         names = self._sensors or self.sensors_of_joint()
-        ticks, columns = self._recording.ticks, self._recording.columns
+        ticks, columns = self._signals.ticks, self._signals.columns
         readings = Readings(plant, names, {}, self._period, ticks)
         rates = {name: measures(getattr(plant, name)) == "velocity" for name in names}
         channel = self._machine.components[self._replay.moved_by[0]].channel
