@@ -23,8 +23,8 @@ from rigtwin.description.catalogue import find
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.settings import Safety, Timing
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.numerics.compiling import kernel, step
+from rigtwin.rig.simulated import simulate_recording
 from rigtwin.simulation.loop import BLOCK, run_compiled
 from rigtwin.simulation.plant import Simulation
 from rigtwin.simulation.runner import record
@@ -150,7 +150,7 @@ def _diagnosed(seconds: float) -> Callable[[], object]:
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
     rig, demands = find("suspension-rig"), imposed.demands(configuration, 0)
     configuration = apply_effects(configuration, ["coulomb@motor=20"])
-    recording = record_on_twin(rig, "imposed", configuration, demands)
+    recording = simulate_recording(rig.name, "imposed", configuration, demands, 1)
     return lambda: diagnose(rig, [recording])
 
 

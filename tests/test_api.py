@@ -216,7 +216,7 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
             lambda rig: rigtwin.run(rig, "drop", controller=wrong(5)),
             "controller 5: expected a function",
         ),
-        (lambda rig: rigtwin.run(rig, "drop", effects_from=1.0), "expected an effect besides"),
+        (lambda rig: rigtwin.run(rig, "drop", effects_from=1.0), "requires `effects`"),
         (
             lambda rig: rigtwin.run(rig, "drop", effects=["coulomb@rail=60"], effects_from=1e9),
             "the test is over at",

@@ -9,8 +9,8 @@ import rigtwin
 from benchmarks import arms
 from rigtwin.cli import main
 from rigtwin.components.body import INERTIAL
+from rigtwin.joints.base_parameters import find_base_parameters
 from rigtwin.models.rigid import RigidBodies
-from rigtwin.studies.base_parameters import find_base_parameters
 from tests.helpers.arm import LENGTH, TOML, described_arm
 
 BODIES = """

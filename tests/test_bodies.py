@@ -20,7 +20,6 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.models.choose import model_of
 from tests.helpers import arm
 from tests.helpers.arm import MJCF, TOML, described_arm, motion, recording, torques
 
@@ -47,7 +46,7 @@ def predict(machine: Machine, moved: tuple[np.ndarray, ...], **changes: object) 
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     configuration = machine.configuration_of(data)
     plant = machine.plant._replace(**changes)
-    return model_of(machine, data.inputs, configuration, 1).predict(plant)
+    return machine.physics.model(machine, data.inputs, configuration, 1).predict(plant)
 
 
 def by_mujoco(mjcf: str, moved: tuple[np.ndarray, ...]) -> np.ndarray:

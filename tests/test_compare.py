@@ -16,10 +16,10 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.compare import compare, compare_recordings
-from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
-from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
+from rigtwin.rig.component_replays import REPLAYS, ComponentReplays, Undetermined
+from rigtwin.rig.simulated import simulate_recording
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import once_a_component, text
 from tests.helpers.recordings import SHIPPED, beside, replace_sensors, shipped
@@ -126,7 +126,7 @@ def test_a_fault_of_the_twin_stands_out_where_it_is(fault):
     faulty = from_assignments(
         experiment.configuration._replace(timing=Timing(duration=10.0)), [fault]
     )
-    recording = record_on_twin(RIG, "imposed", faulty, experiment.demands(faulty, 11), 11)
+    recording = simulate_recording(RIG.name, "imposed", faulty, experiment.demands(faulty, 11), 11)
     replays = ComponentReplays(recording, RIG.configuration_of(recording))
     found = {component: ratio(replays, component) for component in COMPONENTS}
     for component in ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder"):
@@ -224,7 +224,7 @@ def test_a_twin_with_the_effect_explains_a_rig_with_it(name):
     nothing = experiment.configuration._replace(timing=Timing(duration=5.0))
     configuration = apply_effects(nothing, [text(name)])
     demands = experiment.demands(nothing, 5)
-    recording = record_on_twin(RIG, "imposed", configuration, demands, 5)
+    recording = simulate_recording(RIG.name, "imposed", configuration, demands, 5)
     nominal = ComponentReplays(recording, RIG.configuration_of(recording))
     known = ComponentReplays(
         recording, RIG.configuration_of(recording, apply_effects(Configuration(), [text(name)]))

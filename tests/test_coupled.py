@@ -13,10 +13,9 @@ from scipy.integrate import solve_ivp
 import rigtwin
 from rigtwin.components import Guide
 from rigtwin.description.document import load
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.stops import find_cut_commands
 from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
 from rigtwin.models.coupled import CoupledModel
 from tests.helpers.coupled import ARM, ARM_TOML, PERIOD, arm, described, integrate, recording
 
@@ -59,14 +58,14 @@ def coupled(
     machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1
 ) -> CoupledModel:
     record = recording(machine, columns)
-    model = model_of(machine, record.inputs, machine.configuration_of(record), steps)
+    model = machine.physics.model(machine, record.inputs, machine.configuration_of(record), steps)
     assert isinstance(model, CoupledModel)
     return model
 
 
 def test_a_double_pendulum_pushed_at_both_joints_goes_as_lagrange_has_it(tmp_path: Path) -> None:
     machine = arm(tmp_path)
-    assert machine.structure is Structure.COUPLED
+    assert machine.kind == "free joints"
     expected = integrate(TORQUES, (0.3, -0.2), (0.0, 0.0))[0]
     commands = dict(zip(("drive_1", "drive_2"), TORQUES, strict=True))
     angles = dict(zip(("angle_1", "angle_2"), expected, strict=True))
@@ -255,7 +254,7 @@ def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> 
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
-    model = model_of(machine, record.inputs, configuration, configuration.substeps)
+    model = machine.physics.model(machine, record.inputs, configuration, configuration.substeps)
     predicted = model.predict(machine.plant)
     for row, signal, noise in zip(machine.rows, predicted, (2e-5, 1e-4), strict=True):
         left = signal - record.column(*row.channel)
@@ -266,7 +265,7 @@ def test_a_search_takes_longer_steps_where_they_change_next_to_nothing(tmp_path:
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
-    model = model_of(machine, record.inputs, configuration, 8)
+    model = machine.physics.model(machine, record.inputs, configuration, 8)
     thinned, own = model.thin(2.5e-3), model.predict(machine.plant)
     assert thinned is not model
     change = thinned.predict(machine.plant) - own

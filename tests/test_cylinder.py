@@ -14,7 +14,7 @@ from rigtwin.components import Cylinder
 from rigtwin.components.cylinder import closed_loop
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
-from rigtwin.diagnosis.component import replay_cylinder
+from rigtwin.rig.component import replay_cylinder
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.twin import Twin

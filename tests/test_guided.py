@@ -12,7 +12,6 @@ from rigtwin.components import Guide, PositionActuator, with_parameters
 from rigtwin.components.guide import dry_limits, friction, slide
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
-from rigtwin.models.choose import model_of
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import Inertia, inverse_dynamics
 from rigtwin.models.joint import JointModel
@@ -211,7 +210,7 @@ def test_a_pushed_joint_moves_as_mujoco_moves_it(tmp_path: Path, sort: str):
     machine = described(tmp_path, sort)
     command = 3.0 * np.sin(2 * np.pi * 0.7 * TIME) + 1.5 * np.sin(2 * np.pi * 2.1 * TIME)
     position = simulated(machine, command)
-    model = model_of(
+    model = machine.physics.model(
         machine, recording_of(machine, command, position).inputs, machine.configuration, 20
     )
     assert np.ptp(position) > 0.01
@@ -224,7 +223,9 @@ def test_a_block_slows_down_by_its_friction_and_stays(tmp_path: Path):
     machine = described(tmp_path, "slide")
     plant = machine.plant._replace(guide=Guide(coulomb=4.0))
     recording = recording_of(machine, np.where(TIME < 0.5, 10.0, 0.0), np.zeros(len(TIME)))
-    model = model_of(machine, recording.inputs, machine.configuration._replace(plant=plant), 4)
+    model = machine.physics.model(
+        machine, recording.inputs, machine.configuration._replace(plant=plant), 4
+    )
     position = model.predict(plant)[0]
     # 2 kg: 3 m/s² for half a second, then −2 m/s² until it rests.
     assert position[-1] == pytest.approx(0.375 + 1.5**2 / 4.0, rel=0.003)
@@ -243,7 +244,7 @@ def test_a_loop_is_closed_by_the_controllers_formula():
         "/sensor": {"position": reference},
     }
     recording = Recording(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
-    model = model_of(machine, recording.inputs, machine.configuration, 8)
+    model = machine.physics.model(machine, recording.inputs, machine.configuration, 8)
     force = model.predict(machine.plant)[0]
     speed = np.gradient(reference, PERIOD)
     needed = 95.1 * np.gradient(speed, PERIOD) + 203.5 * speed

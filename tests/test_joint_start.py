@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import rigtwin
-from rigtwin.models.choose import model_of
 from rigtwin.recording import Recording
 from tests.helpers.coupled import ARM, arm, described, integrate, recording
 from tests.helpers.reference import swing_dry
@@ -49,7 +48,7 @@ def test_a_swing_that_a_gyro_alone_sees_starts_where_it_did(
 ) -> None:
     machine = described(tmp_path, "fork", PENDULUM, TOML)
     seen = swung(start, 0.0, 0.0)
-    model = model_of(machine, seen.inputs, machine.configuration_of(seen), 8)
+    model = machine.physics.model(machine, seen.inputs, machine.configuration_of(seen), 8)
     rate = model.predict(machine.plant)[0]
     assert np.std(rate - seen.column("/sensor", "rate")) < 3e-3
     assert model.move(machine.plant)[:2, 0] == pytest.approx(start, abs=5e-3)  # type: ignore[attr-defined]
@@ -79,7 +78,7 @@ def test_an_arm_that_gyros_alone_see_starts_where_it_did(tmp_path: Path) -> None
             "/sensor": {"angle_1": rates[0] + noise[0], "angle_2": rates[1] + noise[1]},
         },
     )
-    model = model_of(machine, seen.inputs, machine.configuration_of(seen), 4)
+    model = machine.physics.model(machine, seen.inputs, machine.configuration_of(seen), 4)
     moved = model.move(machine.plant)  # type: ignore[attr-defined]
     assert moved[:2, :, 0] == pytest.approx(np.array(start), abs=2e-2)
     assert np.std(moved[1] - rates) < 5e-3

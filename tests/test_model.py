@@ -15,7 +15,7 @@ from experiments import EXPERIMENTS
 from rigtwin.components import Carriage, Motor, Rail, RigPlant, Tyre
 from rigtwin.components.cylinder import closed_loop
 from rigtwin.description.configuration import Configuration
-from rigtwin.diagnosis.component import replay_carriage
+from rigtwin.rig.component import replay_carriage
 from rigtwin.simulation.mechanics import MECHANICS, SCENE, build
 from tests.helpers.reference import coulomb_carriage
 

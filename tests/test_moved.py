@@ -13,11 +13,9 @@ from rigtwin import import_data, run
 from rigtwin.components import with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.document import examine, load
-from rigtwin.description.machine import Structure
-from rigtwin.description.parts import parts
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
+from rigtwin.joints.parts import parts
 from rigtwin.models.moved import MovedModel
 from tests.helpers.arm import (
     BELT,
@@ -46,11 +44,13 @@ def moved():
 @pytest.mark.parametrize("toml", [TOML, TOML + COUPLED], ids=["alone", "coupled"])
 def test_predicted_torques_are_those_of_lagrange(tmp_path, moved, toml):
     machine = described_arm(tmp_path, toml)
-    assert machine.structure is Structure.MOVED
+    assert machine.kind == "prescribed joints"
     true = torques(*moved)
     data = recording(moved[0], true, (0.0, 0.0))
     configuration = machine.configuration_of(data)
-    found = model_of(machine, data.inputs, configuration, 1).predict(configuration.plant)
+    found = machine.physics.model(machine, data.inputs, configuration, 1).predict(
+        configuration.plant
+    )
     assert rms((found - true)[:, INSIDE]) < 2e-3 * rms(true)
 
 
@@ -73,7 +73,7 @@ def test_a_friction_acts_where_it_is(tmp_path, moved, component, values, onto, f
     machine = described_arm(tmp_path, (TOML + COUPLED).replace("band = 25.0", ""))
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     plant = machine.configuration_of(data).plant
-    model = model_of(machine, data.inputs, machine.configuration_of(data), 1)
+    model = machine.physics.model(machine, data.inputs, machine.configuration_of(data), 1)
     change = model.predict(with_parameters(plant, component, values)) - model.predict(plant)
     wanted = np.outer(onto, force(moved[1]))
     # Where it reverses, a tick early or late is no error of its size.
@@ -87,7 +87,7 @@ def test_a_rotor_turns_with_its_own_coordinate(tmp_path, moved):
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     plant = machine.configuration_of(data).plant
     assert plant.pulley.inertia == 0.04
-    model = model_of(machine, data.inputs, machine.configuration_of(data), 1)
+    model = machine.physics.model(machine, data.inputs, machine.configuration_of(data), 1)
     change = model.predict(plant) - model.predict(
         with_parameters(plant, "pulley", {"inertia": 0.0})
     )
@@ -116,7 +116,9 @@ def test_a_urdf_is_read_and_its_joints_are_sensed(tmp_path, moved):
     )
     data = recording(moved[0], true, (0.0, 0.0))
     configuration = machine.configuration_of(data)
-    found = model_of(machine, data.inputs, configuration, 1).predict(configuration.plant)
+    found = machine.physics.model(machine, data.inputs, configuration, 1).predict(
+        configuration.plant
+    )
     assert rms((found - true)[:, INSIDE]) < 2e-3 * rms(true)
 
 
@@ -125,7 +127,7 @@ def test_noise_of_measured_angles_is_carried_into_the_torques(tmp_path, moved):
     true = torques(*moved)
     data = recording(moved[0], true, (1e-4, 0.0))
     configuration = machine.configuration_of(data)
-    model = model_of(machine, data.inputs, configuration, 1)
+    model = machine.physics.model(machine, data.inputs, configuration, 1)
     plant: Plant = configuration.plant
     carried = model.propagated_noise(plant)
     assert carried is not None

@@ -14,7 +14,6 @@ from rigtwin.description.catalogue import SHIPPED
 from rigtwin.description.document import examine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.space import Space
-from rigtwin.models.choose import model_of
 from tests.helpers.described import TOML, described, recording_of
 
 SHORT = {"timing": {"duration": 3}}
@@ -126,7 +125,9 @@ def test_a_loop_is_closed_over_any_sensor_of_position(tmp_path: Path):
         machine = described(tmp_path, toml=toml.replace("[[replays]]", loop))
         wave = 0.02 * np.sin(2 * np.pi * TIME)
         recording = rigtwin.run(machine, lambda _, __, wave=wave: {"goal": wave})
-        model = model_of(machine, recording.inputs, machine.configuration_of(recording), 4)
+        model = machine.physics.model(
+            machine, recording.inputs, machine.configuration_of(recording), 4
+        )
         found.append((recording["/sensor.position"], model.predict(machine.plant)[0]))
     (ran, replayed), plain = found
     assert np.ptp(ran) > 0.01

@@ -13,7 +13,6 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from tests.helpers.coupled import described
@@ -68,7 +67,7 @@ def test_it_weighs_the_same_after_a_turn(machine: Machine) -> None:
         shaft=machine.plant.shaft._replace(coulomb=COULOMB, viscous=VISCOUS)  # type: ignore[attr-defined]
     )
     beginning = int(4.0 / PERIOD)
-    model = model_of(machine, seen.inputs, machine.configuration_of(seen), 16)
+    model = machine.physics.model(machine, seen.inputs, machine.configuration_of(seen), 16)
     assert np.std((model.predict(plant)[0] - angle)[:beginning]) < 2e-3
 
 
@@ -99,8 +98,8 @@ def test_what_is_prescribed_misses_no_force() -> None:
     columns: dict[str, dict[str, Array]] = {"/sensor": {"displacement": wave, "force": wave}}
     seen = Recording(Path("bench"), machine.name, "", 1e-3, time, columns, {})
     assert (
-        model_of(machine, seen.inputs, machine.configuration_of(seen), 1).missing_force(
-            machine.plant
-        )
+        machine.physics.model(
+            machine, seen.inputs, machine.configuration_of(seen), 1
+        ).missing_force(machine.plant)
         is None
     )

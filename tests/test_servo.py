@@ -15,7 +15,6 @@ from rigtwin.components import Servo
 from rigtwin.components.servo import push, push_law
 from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from tests.helpers.mujoco_joint import MujocoModel
@@ -140,7 +139,7 @@ def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
 
 def predict(machine: rigtwin.Machine, recording: Recording) -> dict[str, Array]:
     configuration = machine.configuration_of(recording)
-    model = model_of(machine, recording.inputs, configuration, 16)
+    model = machine.physics.model(machine, recording.inputs, configuration, 16)
     rows = model.predict(machine.plant)
     return {row.channel[1]: each for row, each in zip(model.rows, rows, strict=True)}
 

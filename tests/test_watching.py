@@ -114,7 +114,7 @@ def test_effects_begin_at_a_time(wrong):
 
 
 def test_effects_of_other_machines_are_there_all_along():
-    with pytest.raises(rigtwin.RigtwinError, match="only of the suspension rig"):
+    with pytest.raises(rigtwin.RigtwinError, match="from the start only"):
         rigtwin.run("emps", "positioning", effects={"coulomb@guide": 20.0}, effects_from=1.0)
 
 

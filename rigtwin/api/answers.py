@@ -14,7 +14,8 @@ from rigtwin.api.machines import (
     twin_of,
 )
 from rigtwin.api.recordings import the_recording
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.components import RigPlant
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
 from rigtwin.diagnosis.compare import Comparison, differences
@@ -206,10 +207,9 @@ def calibrate(recording: Recorded) -> Calibration:
     """
     recording = the_recording(recording)
     of = machine_of(recording)
-    if of.structure is not Structure.QUARTER_CAR:
+    if not isinstance(of.plant, RigPlant):
         raise RigtwinError(
-            f"{recording.path}: it is of machine {of.name!r}; "
-            f"expected {Structure.QUARTER_CAR.value}"
+            f"{recording.path}: it is of machine {of.name!r}; expected a suspension rig"
         )
     configuration = of.configuration_of(recording)
     require_fit(of, recording, configuration)

@@ -16,7 +16,7 @@ from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
 from rigtwin.hardware.daq.calibration import (
@@ -28,12 +28,8 @@ from rigtwin.hardware.daq.calibration import (
 )
 from rigtwin.hardware.daq.card import require_client
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.machine_terminals import MachineTerminals
-from rigtwin.hardware.daq.signals import RIG, signals_of
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, load_table, require_ranges, to_toml
-from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
-from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.table_check import (
     LEAST_STROKE,
@@ -104,12 +100,8 @@ def serve_card(
     on = the_machine(machine)
     configuration = with_changes(on.configuration, settings)
     actual = apply_effects(configuration, effect_texts(effects))
-    if on.structure is Structure.QUARTER_CAR:
-        table = load_table(Path(card))
-        terminals: Wired = Terminals(actual, table, seed)
-    else:
-        table = load_table(Path(card), signals_of(on))
-        terminals = MachineTerminals(on, actual, table, seed)
+    table = load_table(Path(card), on.physics.signals(on))
+    terminals = on.physics.terminals(on, actual, table, seed)
     virtual = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, taken = serve(virtual, port)
     return ServedCard(
@@ -142,7 +134,7 @@ def release_card(card: str | Path, *, machine: Machine | str | Path = DEFAULT_MA
         If the card has no server.
     """
     on = the_machine(machine)
-    table = load_table(Path(card), RIG if on.structure is Structure.QUARTER_CAR else signals_of(on))
+    table = load_table(Path(card), on.physics.signals(on))
     if not table.address:
         raise RigtwinError(
             "card.address is empty: "

@@ -7,10 +7,9 @@ from pathlib import Path
 from rigtwin.api.machines import Settings, described_machine
 from rigtwin.api.recordings import the_recording
 from rigtwin.description.changes import with_changes
-from rigtwin.description.machine import OWN, Machine, Structure
+from rigtwin.description.machine import OWN, Machine
 from rigtwin.recording import reader
 from rigtwin.simulation.energy import EnergyError as EnergyError
-from rigtwin.simulation.energy import measure_energy
 from rigtwin.simulation.experiment import experiments_of
 
 
@@ -46,10 +45,8 @@ def energy_error(
     """
     recording = the_recording(recording)
     found = described_machine(recording, machine)
-    if found.structure is not Structure.QUARTER_CAR:
-        return None
     own = OWN in recording.controller and bool(settings)
     known = experiments_of(found)
     start = known[recording.experiment].configuration if recording.experiment in known else None
     base = with_changes(start or found.configuration, settings)
-    return measure_energy(recording, found.configuration_of(recording, base), own)
+    return found.physics.energy_error(recording, found.configuration_of(recording, base), own)

@@ -13,7 +13,7 @@ from rigtwin.description.changes import POSTERIOR, Changes, read_toml, values_of
 from rigtwin.description.configuration import Configuration, parameters
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.effects import without_effect as take_out
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import Experiment, experiments_of
@@ -138,7 +138,7 @@ def twin_of(
     ):
         group, _, name = key.partition(".")
         own = group in of.plant._fields or (
-            group == "controller" and of.structure is not Structure.QUARTER_CAR
+            group == "controller" and of.physics.compares_controller
         )
         other = key in told or value != described
         if other and not own and (group, name) != ("timing", "timestep"):

@@ -13,14 +13,12 @@ from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, faced
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import keep_apart, recordable
-from rigtwin.models.machine_twin import run_machine
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import Demands, Experiment, find_experiment
 from rigtwin.simulation.loop import TickController
-from rigtwin.simulation.runner import record
 
 Demanding = Callable[[Configuration, int], Demands]
 """An experiment of one's own: what is demanded of the machine for (settings, seed)."""
@@ -76,10 +74,13 @@ def run(
     on = the_machine(on)
     if not 0.0 <= effects_from < math.inf:
         raise RigtwinError(f"effects from {effects_from:g} s: expected 0 s or more")
-    if effects_from and on.structure is not Structure.QUARTER_CAR:
-        raise RigtwinError("effects from a time on: only of the suspension rig")
+    if effects_from and not on.physics.delays_effects:
+        raise RigtwinError(
+            f"{on.name}: `effects_from`: the twin of {on.physics.title} takes effects "
+            "from the start only"
+        )
     if effects_from and not effects:
-        raise RigtwinError(f"effects from {effects_from:g} s on: expected an effect besides")
+        raise RigtwinError(f"`effects_from` = {effects_from:g} s requires `effects`")
     test = _experiment(on, experiment)
     configuration = with_changes(test.configuration, settings)
     if effects_from and effects_from >= configuration.timing.duration:
@@ -134,20 +135,15 @@ def _record(
 ) -> None:
     tick: Any = getattr(controller, "tick", controller)
     demands = test.demands(configuration, seed)
-    if on.structure is Structure.QUARTER_CAR:
-        record(
-            path,
-            test.name,
-            configuration,
-            demands,
-            seed,
-            progress=progress,
-            effects=effects,
-            effects_from=effects_from,
-            machine=on.name,
-            controller=tick,
-        )
-    else:
-        run_machine(
-            path, on, test.name, configuration, demands, seed, effects=effects, controller=tick
-        )
+    on.physics.record(
+        path,
+        on,
+        test.name,
+        configuration,
+        demands,
+        seed,
+        effects=effects,
+        effects_from=effects_from,
+        controller=tick,
+        progress=progress,
+    )

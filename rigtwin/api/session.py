@@ -13,15 +13,13 @@ from pathlib import Path
 from machines import DEFAULT_MACHINE
 from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, load
-from rigtwin.components import RigPlant
 from rigtwin.description.changes import read_toml, with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.limits import require_order
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import recordable
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.signals import signals_of
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.session.dry_run import enter
@@ -34,7 +32,7 @@ from rigtwin.hardware.session.record import (
     record_in_real_time,
 )
 from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.session.test import AnyTest, MachineTest, Test
+from rigtwin.hardware.session.test import AnyTest
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording.owner import open_alone
@@ -125,20 +123,12 @@ def plan_test(
     configuration = check_settings(on, found.configuration, settings)
     own = None if controller is None else own_controller(controller)
     told = tuple(effect_texts(effects))
-    if is_the_rig(on):
-        table = load_table(CARD if card is None else Path(card))
-        demands = found.demands(configuration, seed)
-        return Test(found.name, configuration, demands, seed, table, told, own)
-    if on.structure is Structure.QUARTER_CAR:
-        raise RigtwinError(
-            f"{on.name}: sessions run the nominal suspension rig, or a machine of another structure"
-        )
-    signals = signals_of(on)
-    if card is None:
+    physics = on.physics
+    path = physics.card if card is None else Path(card)
+    if path is None:
         raise RigtwinError(f"{on.name}: no channel table; expected that of the card it is on")
-    table = load_table(Path(card), signals)
-    demands = found.demands(configuration, seed)
-    return MachineTest(on, found.name, configuration, demands, seed, table, told, own)
+    table = load_table(path, physics.signals(on))
+    return physics.plan(on, found, configuration, seed, table, told, own)
 
 
 def check_settings(machine: Machine, base: Configuration, changes: Settings) -> Configuration:
@@ -147,11 +137,6 @@ def check_settings(machine: Machine, base: Configuration, changes: Settings) -> 
     require_order(machine, configuration)
     _ = configuration.ticks, configuration.substeps
     return configuration
-
-
-def is_the_rig(machine: Machine) -> bool:
-    """Whether a machine is the nominal suspension rig."""
-    return machine.plant == RigPlant()
 
 
 def dry_run(
@@ -398,9 +383,9 @@ def run_session(
         return find_experiment(on, name)
 
     def check(test: PlannedTest) -> object:
-        if on.structure is Structure.QUARTER_CAR:
-            return plan_test(test.experiment, seed=test.seed, settings=test.changes)
-        return check_settings(on, find_test(test.experiment).configuration, test.changes)
+        experiment = find_test(test.experiment)
+        configuration = check_settings(on, experiment.configuration, test.changes)
+        return experiment.demands(configuration, test.seed)
 
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
     try:

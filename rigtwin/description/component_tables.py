@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rigtwin import components
-from rigtwin.components import KINDS, UNLIMITED, RigPlant
+from rigtwin.components import KINDS, UNLIMITED
 from rigtwin.components.quantity import Quantity, fields
 from rigtwin.components.sensors import MEASURES
-from rigtwin.description.machine import Component, Structure
+from rigtwin.description.machine import Component, ReplayOf
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.physics import Physics, find_physics
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.recording.schema import NAME as FIELD_NAME
 
@@ -55,12 +56,6 @@ TAKEN = ("computer", "mains", "controller", "safety", "timing")
 """Names of other groups of settings."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-QUARTER_CAR = {
-    name: type(part)
-    for name, part in RigPlant()._asdict().items()
-    if name not in ("computer", "mains")
-}
-"""Components of a quarter car between two cylinders, by name; it may do without a gas spring."""
 
 
 class Components:
@@ -77,13 +72,9 @@ class Components:
         self.sources: dict[str, str] = {}
         self.told: dict[str, str] = {}
 
-    @property
-    def structure(self) -> Structure:
-        """What the components make up."""
-        types = {"gas_spring": components.GasSpring} | {
-            name: type(value) for name, value in self.values.items()
-        }
-        return Structure.QUARTER_CAR if types == QUARTER_CAR else Structure.JOINTS
+    def physics(self, replays: Sequence[ReplayOf] = ()) -> Physics:
+        """Return the physics of the machine that the components make up."""
+        return find_physics({name: type(value) for name, value in self.values.items()}, replays)
 
     def add(self, name: str, table: object) -> None:
         """Reads one component's table."""

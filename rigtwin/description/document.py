@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
-from rigtwin.components import Computer, Mains, RigPlant
-from rigtwin.components.plant import plant_of
+from rigtwin.components import Computer, Mains
 from rigtwin.description.component_tables import MOVING, NAME, Components
 from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
 from rigtwin.description.limits import read_limits
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
-from rigtwin.description.overlooked import overlooked
 from rigtwin.description.prior import PRIORS
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
@@ -96,26 +94,24 @@ class _Reader:
         control = self._control(components)
         reader = Replays(mechanism, components, control, self._mistakes)
         replays = reader.read(self._document.get("replays", []))
-        structure = reader.structure(replays)
+        physics = reader.physics(replays)
         hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
         mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
         experiments = self._experiments()
         limits = read_limits(self._document.get("limits", {}), components.found, self._mistakes)
-        if self._document.get("limits") and structure is Structure.QUARTER_CAR:
-            note("[limits]", "the suspension rig has its own, the settings of safety")
+        if self._document.get("limits") and not physics.declares_limits:
+            note("[limits]", f"{physics.title} has its own, the settings of safety")
         if self._mistakes:
             return None
         reader.tolerate_timing(replays)
         values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
-        rig = structure is Structure.QUARTER_CAR
-        plant: Any = RigPlant(**values) if rig else plant_of(values)
         return Machine(
             name=name,
             title=str(about.get("title", name)),
             path=self._path,
             model=self._model_path(about),
-            plant=plant,
-            structure=structure,
+            plant=physics.assemble(values),
+            kind=physics.name,
             components=components.found,
             tolerances=tuple(components.tolerances),
             replays=replays,
@@ -127,9 +123,7 @@ class _Reader:
             experiments=experiments,
             limits=limits,
             next_tests=self._next_tests(),
-            overlooked=()
-            if structure is Structure.QUARTER_CAR
-            else overlooked(mechanism, components.found, replays),
+            overlooked=physics.list_overlooked(mechanism, components.found, replays),
         )
 
     def _next_tests(self) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
 from rigtwin.description.model_checks import list_files
+from rigtwin.description.physics import Physics, physics_named
 from rigtwin.description.prior import ModelPrior
 from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
@@ -40,15 +40,6 @@ TURNING = {
     "Ns^2/m^2": "Nms^2/rad^2",
 }
 """Unit of a joint that slides → that of one that turns."""
-
-
-class Structure(Enum):
-    """What a machine's components make up, by which its solver is chosen, once."""
-
-    QUARTER_CAR = "a quarter car between two hydraulic cylinders"
-    JOINTS = "joints that do not act on each other"
-    MOVED = "joints that act on each other, each moved as measured"
-    COUPLED = "joints that act on each other, some of them free to move"
 
 
 @dataclass(frozen=True)
@@ -126,7 +117,7 @@ class ReplayOf:
 class Machine:
     """The whole description.
 
-    plant: a NamedTuple of components with their nominal values; structure: what they make up;
+    plant: a NamedTuple of components with their nominal values; kind: name of its physics;
     prior: belief in the nominal values; form: share of a signal that no model is held
     to, None for the usual one; told: `component.parameter` → setting of the recording's controller
     that says its value; experiments: Python module that has them, or tables of the description;
@@ -140,7 +131,7 @@ class Machine:
     path: Path
     model: Path
     plant: Any = field(repr=False)
-    structure: Structure
+    kind: str
     components: Mapping[str, Component]
     tolerances: tuple[Tolerance, ...]
     replays: tuple[ReplayOf, ...]
@@ -155,6 +146,11 @@ class Machine:
     overlooked: tuple[str, ...] = ()
 
     @property
+    def physics(self) -> Physics:
+        """Everything that depends on the kind of machine."""
+        return physics_named(self.kind)
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """What it was read from: the description, the model and what that includes."""
         return (self.path, *list_files(self.model))
@@ -162,13 +158,7 @@ class Machine:
     @property
     def configuration(self) -> Configuration:
         """The settings of its twin as described."""
-        settings = Nothing() if self.control is None else self.control.settings
-        if self.structure is Structure.QUARTER_CAR:
-            return Configuration(plant=self.plant, controller=settings)
-        nothing: Any = Nothing()
-        return Configuration(
-            plant=self.plant, controller=settings, safety=self.limits, road=nothing
-        )
+        return self.physics.configure(self)
 
     def configuration_of(
         self, recording: Recording, base: Configuration | None = None

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from rigtwin.description.component_tables import MOVING, PUSHING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.joined_replays import JoinedReplays
-from rigtwin.description.machine import Joint, ReplayOf, Row, Structure
+from rigtwin.description.machine import Joint, ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.physics import Physics
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 
-TICKS_LATE, LATE_TO_COMMAND = 0.5, 1e-3
-"""Ticks by which a sample may be early or late, and s of that at most where it answers to a
-command: a servo that is late by half a slow tick is late."""
+TICKS_LATE = 0.5
+"""Tolerance of the time of a sample, ticks."""
 
 
 class Replays:
@@ -94,7 +93,7 @@ class Replays:
         ]
         if len(self._mistakes) > before:
             return None
-        quarter_car = self._components.structure is Structure.QUARTER_CAR
+        quarter_car = self._components.physics().replayed_whole
         joint_name = "" if quarter_car else self._components.found[movers[0]].joint
         name = str(table.get("name", f"replay {number}"))
         if not quarter_car and ("free" in table or len(movers) > 1):
@@ -166,10 +165,11 @@ class Replays:
             rotor=at["rotor"][0] if at["rotor"] else None,
         )
 
-    def structure(self, replays: tuple[ReplayOf, ...]) -> Structure:
-        """What the components and their replays make up."""
-        if self._components.structure is Structure.QUARTER_CAR:
-            return Structure.QUARTER_CAR
+    def physics(self, replays: tuple[ReplayOf, ...]) -> Physics:
+        """Return the physics of the machine; note components that do not fit it."""
+        physics = self._components.physics(replays)
+        if physics.replayed_whole:
+            return physics
         together = [replay for replay in replays if replay.free or len(replay.moved_by) > 1]
         if together and len(replays) > 1:
             self._mistakes.note(
@@ -190,9 +190,7 @@ class Replays:
                     f"{kind!r}: where joints {'act' if together else 'do not act'} on each other, "
                     f"expected {'body' if together else 'mass'!r} for what moves",
                 )
-        if together and together[0].free:
-            return Structure.COUPLED
-        return Structure.MOVED if together else Structure.JOINTS
+        return physics
 
     def _closes(self, mover: str) -> bool:
         """Whether the described controller commands it, and can be run along."""
@@ -249,8 +247,7 @@ class Replays:
         declared = {(each.group, each.parameter) for each in self._components.tolerances}
         for replay in replays:
             # Of joints that move together only what is observed is timed: against all of them.
-            structure = self.structure(replays)
-            longest = math.inf if structure is Structure.MOVED else LATE_TO_COMMAND
+            longest = self._components.physics(replays).longest_delay
             for name in (row.name for row in replay.rows if row.kind != "command"):
                 # What is in one loop with the controller was sampled with it.
                 if (name, "delay") not in declared and not replay.closed:

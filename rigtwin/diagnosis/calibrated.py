@@ -6,12 +6,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.components import RigPlant
-from rigtwin.components.cylinder import told_settings
 from rigtwin.components.effect import GROUPS
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration, flatten
-from rigtwin.description.machine import Structure
 from rigtwin.description.posterior import Otherwise, Posterior, format_toml
 from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.finding import Finding
@@ -32,8 +29,9 @@ def toml(diagnosis: Diagnosis) -> str:
         f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
     ]
     lines += format_changes(diagnosis.described.plant, diagnosis.machine.plant)
-    if diagnosis.described.structure is Structure.QUARTER_CAR:
-        lines += _format_told(diagnosis.described.plant, diagnosis.machine.plant)
+    described, corrected = diagnosis.described, diagnosis.machine
+    if advice := described.physics.advise_controller(described.plant, corrected.plant):
+        lines += ["", "[controller]", *(f"{name} = {value!r}" for name, value in advice.items())]
     if answer.effects:
         lines += ["", *format_toml(_posterior(diagnosis))]
     return "\n".join(lines) + "\n"
@@ -60,18 +58,6 @@ def format_changes(described: Plant, corrected: Plant) -> list[str]:
         if own:
             lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in own.items())]
     return lines
-
-
-def _format_told(described: RigPlant, corrected: RigPlant) -> list[str]:
-    """What a controller that compensates the plate's delay is to be told otherwise than before."""
-    before, after = (
-        told_settings(plant.structure_cylinder, plant.computer.delay)
-        for plant in (described, corrected)
-    )
-    own = {name: value for name, value in after.items() if value != before[name]}
-    if not own:
-        return []
-    return ["", "[controller]", *(f"{name} = {value!r}" for name, value in own.items())]
 
 
 def _posterior(diagnosis: Diagnosis) -> Posterior:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import OWN, Machine, Structure
-from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
@@ -67,24 +66,8 @@ def compare(
     notes = (*recording.notes, *(fault.message for fault in faults))
     evidence = Evidence(machine, [recording], [configuration])
     gap = gap_level(evidence, configuration.plant)
-    if machine.structure is not Structure.QUARTER_CAR:
-        return Comparison(signal_residuals(evidence), {}, notes, gap)
-    replays = ComponentReplays(recording, configuration)
-    left_out: dict[str, str] = {}
-    if not recording.controller or OWN in recording.controller:
-        left_out = dict.fromkeys(
-            ("controller", "closed_loop"),
-            "the recording does not say what the controller was told to do",
-        )
-    results: dict[str, Residual] = {}
-    for name, replay in REPLAYS.items():
-        if name not in left_out:
-            progress(name)
-            try:
-                results[name] = replay(replays)
-            except Undetermined as reason:
-                left_out[name] = str(reason)
-    return Comparison(results, left_out, notes, gap)
+    replays, left_out = machine.physics.residuals(evidence, progress)
+    return Comparison(replays, left_out, notes, gap)
 
 
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:

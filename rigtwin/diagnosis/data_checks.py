@@ -14,7 +14,6 @@ from rigtwin.diagnosis.dead_commands import dead_commands
 from rigtwin.diagnosis.direction import runs_backwards
 from rigtwin.diagnosis.units import spell
 from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, smallest_step, white_noise
@@ -92,7 +91,7 @@ def find_faults(
     if not found:
         found += _check_values(machine, recording)
     if not found:
-        predicted = model_of(machine, recording.inputs, configuration, STEPS).predict(
+        predicted = machine.physics.model(machine, recording.inputs, configuration, STEPS).predict(
             configuration.plant
         )
         found += _check_alive(machine, recording, predicted)

@@ -15,8 +15,7 @@ from threadpoolctl import threadpool_limits
 from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import OWN, Machine, Structure
-from rigtwin.description.parts import parts
+from rigtwin.description.machine import OWN, Machine
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
@@ -46,7 +45,6 @@ from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.join import join
 from rigtwin.diagnosis.leftover import leftovers, steps
-from rigtwin.diagnosis.levels import compute_levels
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
@@ -58,7 +56,7 @@ from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.diagnosis.words import enumerate_words
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.simulation.energy import EnergyError, measure_energy
+from rigtwin.simulation.energy import EnergyError
 from rigtwin.simulation.experiment import Experiment
 
 
@@ -162,7 +160,7 @@ def diagnose(
                 started=started,
             )
 
-        found = [diagnose_part(part) for part in parts(machine)]
+        found = [diagnose_part(part) for part in machine.physics.split(machine)]
         if len(found) == 1:
             return _with_notes(found[0], copies)
         apart = Evidence(machine, held_out, others) if held_out else None
@@ -371,12 +369,12 @@ def _places(
 
 
 def _energy(evidence: Evidence) -> dict[str, EnergyError]:
+    physics = evidence.machine.physics
     measured = {
-        recording.path.name: measure_energy(recording, configuration)
+        recording.path.name: physics.energy_error(recording, configuration)
         for recording, configuration in zip(
             evidence.recordings, evidence.configurations, strict=True
         )
-        if evidence.machine.structure is Structure.QUARTER_CAR
     }
     return {name: each for name, each in measured.items() if each is not None}
 
@@ -385,7 +383,7 @@ def _gap(
     evidence: Evidence, plant: Plant, outcome: Validation, sampled: Sequence[SensorProperty]
 ) -> Gap:
     corrected = _correct(evidence.configurations[0], plant, sampled)
-    replays, loop = compute_levels(evidence, plant, corrected)
+    replays, loop = evidence.machine.physics.levels(evidence, plant, corrected)
     return Gap(
         before=gap_level(evidence, evidence.plant),
         after=gap_level(evidence, plant),

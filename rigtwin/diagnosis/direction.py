@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Structure
-from rigtwin.models.choose import model_of
+from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, white_noise
@@ -39,7 +38,7 @@ def runs_backwards(
         False also where it cannot be told: joints that act on each other and are moved as measured
         need the same torques either way.
     """
-    if machine.structure is Structure.MOVED:
+    if machine.physics.reversible:
         return False
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
     forth = _misfits(measured, predicted)
@@ -50,7 +49,7 @@ def runs_backwards(
         for topic, signals in recording.columns.items()
     }
     turned = replace(recording, columns=columns)
-    model = model_of(machine, turned.inputs, configuration, STEPS)
+    model = machine.physics.model(machine, turned.inputs, configuration, STEPS)
     back = _misfits(measured[:, ::-1], model.predict(configuration.plant))
     return bool(np.isfinite(back).all()) and NEARER * rms(back) < rms(forth)
 

@@ -24,7 +24,6 @@ from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.tolerance import Tolerance
-from rigtwin.models.choose import model_of
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -185,7 +184,7 @@ def _model_with_enough_steps(
     """The model with so few integration steps that twice as many change little of what it is held
     to."""
     steps = FEWEST_STEPS
-    model = model_of(machine, recording.inputs, configuration, steps)
+    model = machine.physics.model(machine, recording.inputs, configuration, steps)
     held = [
         max(
             white_noise(recording.column(*row.channel)),

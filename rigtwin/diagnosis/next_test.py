@@ -4,20 +4,13 @@ differently."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-import numpy as np
-
-from controllers import Commands, Measurements
-from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import NextTest
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.space import Space
-from rigtwin.recording import Recording
 from rigtwin.simulation.experiment import Experiment
-from rigtwin.simulation.runner import simulate, without_limits
 
 SEED = 1
 """Of the tests that are tried on the twin, and of the one proposed."""
@@ -25,33 +18,6 @@ LONGEST = 20.0
 """s, to which a test is cut when it is tried."""
 WORTH = 25.0
 """χ² below which a test would separate nothing."""
-
-
-def record_on_twin(
-    machine: Machine,
-    name: str,
-    configuration: Configuration,
-    demands: np.ndarray,
-    seed: int = SEED,
-) -> Recording:
-    """The recording that a test would make on a machine of that configuration. seed: of the
-    sensors' noise."""
-    ran = simulate(without_limits(configuration), demands, seed)
-    columns = {
-        "/command": dict(zip(Commands._fields, ran.commands.T.copy(), strict=True)),
-        "/sensor": dict(zip(Measurements._fields, ran.measurements.T.copy(), strict=True)),
-    }
-    period = configuration.timing.period
-    controller = flatten(configuration)["controller"]
-    return Recording(
-        path=Path(name),
-        machine=machine.name,
-        experiment=name,
-        period=period,
-        time=np.arange(len(ran.commands)) * period,
-        columns=columns,
-        controller=controller,
-    )
 
 
 def propose_test(
@@ -66,7 +32,7 @@ def propose_test(
         name, configuration = test.name, test.configuration
         timing = configuration.timing._replace(duration=min(configuration.timing.duration, LONGEST))
         twin = configuration._replace(plant=fits[0].plant, timing=timing)
-        recording = record_on_twin(machine, name, twin, test.demands(twin, SEED))
+        recording = machine.physics.simulate(machine, name, twin, test.demands(twin, SEED), SEED)
         evidence = Evidence(
             machine, [recording], [configuration._replace(plant=fits[0].plant, timing=timing)]
         )

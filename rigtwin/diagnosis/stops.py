@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.components import PUSHERS, PositionActuator, measures
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.recording import Recording
 
@@ -31,7 +31,7 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
     list of str
         A line for each joint and recording.
     """
-    if machine.structure not in (Structure.MOVED, Structure.COUPLED):
+    if not machine.physics.lacks_stops:
         return []
     model = Mechanism(machine.model).model
     found = []

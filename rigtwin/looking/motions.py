@@ -5,7 +5,6 @@ from __future__ import annotations
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.render.motions import joint_positions
 
 MOTIONS = ("position", "velocity")
 """Kinds of signals that say where a joint stands."""
@@ -47,4 +46,4 @@ def find_positions(
         for row, signal in zip(machine.rows, signals, strict=True):
             if row.kind in MOTIONS:
                 columns[row.channel[0]][row.channel[1]] = signal
-    return joint_positions(machine, columns, period)
+    return machine.physics.joint_positions(machine, columns, period)

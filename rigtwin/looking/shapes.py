@@ -11,11 +11,10 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.skeleton import draw_bones
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.mechanics import SCENE
 
 SHOWN_GROUPS = 3
 """Geoms of groups below this are seen, as in MuJoCo's viewer."""
@@ -54,7 +53,7 @@ class Body:
 
     def __init__(self, machine: Machine) -> None:
         """Raises RigtwinError if its MJCF cannot be compiled."""
-        path = SCENE if machine.structure is Structure.QUARTER_CAR else machine.model
+        path = machine.physics.scene(machine)
         try:
             self._model = mujoco.MjModel.from_xml_path(str(path))
         except ValueError as error:

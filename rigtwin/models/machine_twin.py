@@ -12,7 +12,7 @@ from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.limits import Tripped, find_trip, require_order
-from rigtwin.description.machine import OWN, Machine, Structure
+from rigtwin.description.machine import OWN, Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.models.carried_twin import carry
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
@@ -155,7 +155,7 @@ def simulate_machine(
             moved = move_commanded(machine, replay, configuration, mine, own, command, noise, ticks)
         elif replay.free:
             moved = move_freely(machine, replay, configuration, mine)
-        elif machine.structure is Structure.MOVED:
+        elif len(replay.moved_by) > 1:
             moved = move_together(machine, configuration, mine)
         else:
             moved = carry(machine, replay, configuration, mine)

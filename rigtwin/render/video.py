@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -21,14 +20,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rigtwin.description.machine import OWN, Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
-from rigtwin.render.motions import joint_positions
-from rigtwin.render.plot import ASKED, SENSED, find_stretch
-from rigtwin.simulation.mechanics import SCENE
-from rigtwin.simulation.structure_motion import recorded_wing
+from rigtwin.render.curves import Curve
+from rigtwin.render.plot import find_stretch
 from rigtwin.system import RENDERER
 
 Image = NDArray[np.uint8]
@@ -101,8 +98,8 @@ def film(
     time = recording.time[ticks]
     motions = {name: magnify * values[ticks] for name, values in motions.items()}
     apart = {name: magnify * values[ticks] for name, values in (ghost or {}).items()}
-    traces = _Traces(_curves(recording, machine), recording.time, ticks)
-    beams = _beams(recording, machine)
+    traces = _Traces(machine.physics.curves(machine, recording), recording.time, ticks)
+    beams = machine.physics.deflection(recording)
     bent = None if beams is None else magnify * beams[ticks]
     shown = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     # Rounding may place the last of them behind the end.
@@ -144,54 +141,13 @@ def film(
 
 def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
     """Joint → position at every tick, m or rad, from what was recorded alone."""
-    if machine.structure is Structure.QUARTER_CAR:
-        for needed in ("structure_lvdt", "suspension_lvdt"):
-            recording.column("/sensor", needed)
-    found = joint_positions(machine, recording.columns, recording.period)
+    machine.physics.require_motion(recording)
+    found = machine.physics.joint_positions(machine, recording.columns, recording.period)
     if not found:
         raise RigtwinError(
             f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it"
         )
     return found
-
-
-def _beams(recording: Recording, machine: Machine) -> Array | None:
-    """The beams' heights over their centre, if the structure model was one of beams."""
-    if machine.structure is not Structure.QUARTER_CAR or OWN in recording.controller:
-        return None
-    return recorded_wing(recording)
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A line under the scene. axis: its title; label: in the legend."""
-
-    axis: str
-    label: str
-    colour: str
-    values: Array
-
-
-def _curves(recording: Recording, machine: Machine) -> list[Curve]:
-    """What is drawn under the scene."""
-    if machine.structure is Structure.QUARTER_CAR:
-        wanted = [
-            ("force, N", "measured", SENSED, "/sensor", "load_cell", 1.0),
-            ("force, N", "demanded", ASKED, "/command", "force", 1.0),
-            ("travel, mm", "measured", SENSED, "/sensor", "suspension_lvdt", 1e3),
-        ]
-    else:
-        wanted = []
-        for component in machine.components.values():
-            if component.channel is not None:
-                topic, name = component.channel
-                colour = SENSED if topic == "/sensor" else ASKED
-                wanted.append((f"{name}, {component.unit or '1'}", "", colour, topic, name, 1.0))
-    return [
-        Curve(axis, label, colour, scale * recording.column(topic, name))
-        for axis, label, colour, topic, name, scale in wanted
-        if recording.has(topic, name)
-    ]
 
 
 def _context() -> Any:
@@ -214,8 +170,7 @@ def _renderer(
 ) -> Iterator[Callable[[dict[str, float], Array | None, dict[str, float]], Image]]:
     """A function from joint positions, the beams' heights if there are any, and the ghost's joint
     positions if there is one, to a picture."""
-    quarter_car = machine.structure is Structure.QUARTER_CAR
-    model = mujoco.MjModel.from_xml_path(str(SCENE if quarter_car else machine.model))
+    model = mujoco.MjModel.from_xml_path(str(machine.physics.scene(machine)))
     cameras = [model.camera(number).name for number in range(model.ncam)]
     camera = camera or (cameras[0] if cameras else "free")
     if camera not in (*cameras, "free"):

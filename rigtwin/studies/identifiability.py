@@ -7,44 +7,23 @@ motions at once, can never be told from them: only what they do together is know
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from rigtwin.components import Effect, ForceActuator
+from rigtwin.components import Effect
 from rigtwin.components.effect import Scales, Starts, Swing
 from rigtwin.components.plant import Plant
-from rigtwin.description.machine import Joint, Machine, Structure
-from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.settings import Nothing
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.fit import is_possible, with_values
-from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.diagnosis.swing import swings
-from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
-from rigtwin.models.demands import demanded_channels
-from rigtwin.models.machine_twin import run_machine
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording, reader
-from rigtwin.signals.excitation import multisine
-from rigtwin.simulation.experiment import find_experiment
-from rigtwin.studies.base_parameters import find_base_parameters
+from rigtwin.recording import Recording
 
-SECONDS = 8.0
-"""Of each made-up motion."""
-REACHES = (0.3, 0.08)
-"""rms of the made-up motions, in shares of half a joint's range."""
-BAND = (0.15, 12.0)
-"""Hz, of the made-up motions."""
-SLOPE = 1.0
-"""Their amplitudes fall with this power of the frequency."""
 NOTHING = 1e-7
 """rms of a change, in units of the signals' own rms, below which an effect does nothing."""
 LEFT = 0.01
@@ -62,8 +41,6 @@ RANK = 1e-10
 """Of a set of changes: what is smaller is rounding."""
 EVALUATIONS = 12
 """Of a fit of others to what an effect does."""
-SPARSE = 4e-3
-"""s, from tick to tick of joints that are moved as measured."""
 STEPS = 4
 """Of integration a tick."""
 
@@ -113,8 +90,8 @@ def find_identifiable(machine: Machine) -> Identifiability:
     RigtwinError
         If one of its own experiments cannot be run.
     """
-    sums = find_base_parameters(machine)
-    recordings = list(_make_up(machine))
+    sums = machine.physics.base_parameters(machine)
+    recordings = list(machine.physics.excite(machine))
     if not recordings:
         return Identifiability((), (), {}, (), sums)
     tried = _Tried(machine, recordings)
@@ -135,90 +112,6 @@ def find_identifiable(machine: Machine) -> Identifiability:
     )
 
 
-def _make_up(machine: Machine) -> Iterator[Recording]:
-    """Rich motions within the machine's limits, without noise where it can be had without."""
-    if machine.structure is Structure.QUARTER_CAR:
-        for name in machine.next_tests[:1]:
-            test = find_experiment(machine, name)
-            timing = test.configuration.timing._replace(duration=0.5 * SECONDS)
-            configuration = test.configuration._replace(timing=timing, plant=machine.plant)
-            for seed in (1, 2):
-                demands = test.demands(configuration, seed)
-                yield record_on_twin(machine, name, configuration, demands, seed)
-        return
-    timing = machine.configuration.timing._replace(duration=SECONDS)
-    if machine.structure is Structure.MOVED:
-        # Nothing is integrated from tick to tick.
-        timing = timing._replace(period=max(timing.period, SPARSE))
-    # What its sensors can show does not depend on where a test would have to end.
-    nothing: Any = Nothing()
-    configuration = machine.configuration._replace(timing=timing, safety=nothing)
-    time = np.arange(configuration.ticks) * timing.period
-    with TemporaryDirectory(prefix="rigtwin-") as folder:
-        for number, reach in enumerate(REACHES, 1):
-            random = np.random.default_rng([number, 17])
-            demands = {}
-            for topic, field in demanded_channels(machine):
-                size = _reach(machine, (topic, field))
-                if size is None:
-                    return
-                highest = min(BAND[1], 0.2 / timing.period)
-                wave = multisine(
-                    time,
-                    lowest=BAND[0],
-                    highest=highest,
-                    spacing=BAND[0],
-                    slope=SLOPE,
-                    rms=1.0,
-                    random=random,
-                )
-                middle, half = size
-                demands[f"{topic}.{field}"] = middle + reach * half * wave
-            path = Path(folder) / f"{number}.mcap"
-            try:
-                run_machine(path, machine, f"multisine {number}", configuration, demands, number)
-            except RigtwinError:
-                return
-            yield reader.load(path)
-
-
-def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
-    """(middle, half) of what a channel may demand; None if nothing says it."""
-    if machine.structure in (Structure.MOVED, Structure.COUPLED):
-        mechanism = Mechanism(machine.model)
-        moved = next((c for c in machine.components.values() if c.channel == channel), None)
-        if moved is None:
-            # What a controller is told: how far that may go is not said.
-            return None
-        joint = mechanism.joint(moved.joint or moved.acts_on[0][0])
-        middle, half = _range(joint)
-        if not isinstance(getattr(machine.plant, moved.name), ForceActuator):
-            return middle, half
-        constant = getattr(machine.plant, moved.name).constant
-        lifts = 0.5 * max(np.abs(joint.gravity))
-        return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
-    for replay in machine.replays:
-        joint, mover = replay.joint, machine.components[replay.moved_by[0]]
-        middle, half = _range(joint)
-        if replay.closed and channel != mover.channel:
-            return middle, half
-        if channel == mover.channel:
-            constant = getattr(getattr(machine.plant, mover.name), "constant", None)
-            if constant is None:
-                return middle, half
-            # What moves it to and fro once a second; half of what lifts it, where it hangs.
-            lifts = 0.5 * max(np.abs(joint.gravity))
-            return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
-    return None
-
-
-def _range(joint: Joint) -> tuple[float, float]:
-    """(middle, half) of where a joint goes: its rest, if that lies well inside."""
-    low, high = joint.positions[0], joint.positions[-1]
-    middle = min(max(joint.rest, low), high)
-    return middle, max(min(high - middle, middle - low), 0.25 * (high - low))
-
-
 class _Tried:
     """A machine's model under made-up motions."""
 
@@ -226,7 +119,9 @@ class _Tried:
         self._machine, self.plant = machine, machine.plant
         self._period = recordings[0].period
         self._models: list[Model[Any]] = [
-            model_of(machine, recording.inputs, machine.configuration_of(recording), STEPS)
+            machine.physics.model(
+                machine, recording.inputs, machine.configuration_of(recording), STEPS
+            )
             for recording in recordings
         ]
         self._swings = swings(machine, recordings)

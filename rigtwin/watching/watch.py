@@ -13,7 +13,6 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.errors import RigtwinError
-from rigtwin.models.choose import model_of
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise
 from rigtwin.watching.alarm import Alarm
@@ -147,7 +146,7 @@ class Watch:
         still keeps where dry friction holds it."""
         known = window.time >= window.time[0] + WARM
         plant = configuration.plant
-        model = model_of(self.machine, window.inputs, configuration, STEPS)
+        model = self.machine.physics.model(self.machine, window.inputs, configuration, STEPS)
         predicted = model.predict(plant)
         measured = [window.column(*row.channel) for row in self.machine.rows]
         held = [
@@ -155,7 +154,9 @@ class Watch:
             for row, signal in zip(self.machine.rows, measured, strict=True)
         ]
         for share in (-KICK, KICK):
-            kicked = model_of(self.machine, _kick(window, share).inputs, configuration, STEPS)
+            kicked = self.machine.physics.model(
+                self.machine, _kick(window, share).inputs, configuration, STEPS
+            )
             with np.errstate(invalid="ignore"):
                 apart = np.abs(kicked.predict(plant) - predicted)
             alike = np.all(apart <= SAME * np.array(held)[:, None], axis=0)

@@ -11,9 +11,9 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.next_test import record_on_twin
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.recording import Recording
+from rigtwin.rig.simulated import simulate_recording
 
 RIG = machine_of("suspension-rig")
 
@@ -31,7 +31,9 @@ def recorded(
     configuration = EXPERIMENTS[name].configuration
     configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
     demands = EXPERIMENTS[name].demands(configuration, seed)
-    return record_on_twin(RIG, name, apply_effects(configuration, list(effects)), demands)
+    return simulate_recording(
+        RIG.name, name, apply_effects(configuration, list(effects)), demands, 1
+    )
 
 
 def evidence_of(*recordings: Recording) -> Evidence:

@@ -12,11 +12,8 @@ from matplotlib.figure import Figure
 
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Structure
 from rigtwin.errors import RigtwinError
-from rigtwin.models.machine_twin import run_machine
 from rigtwin.render.plot import save
-from rigtwin.simulation.runner import record
 from rigtwin.studies.tuning import text
 from rigtwin.studies.tuning.evaluation import Comparison
 from rigtwin.studies.tuning.pictures import draw
@@ -93,10 +90,7 @@ def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
     experiment, machine = result.study.experiment, result.study.machine
     configuration = twin._replace(controller=result.settings)
     demands = experiment.demands(configuration, APART)
-    if machine.structure is Structure.QUARTER_CAR:
-        record(path, experiment.name, configuration, demands, APART, machine=machine.name)
-    else:
-        run_machine(path, machine, experiment.name, configuration, demands, APART)
+    machine.physics.record(path, machine, experiment.name, configuration, demands, APART)
 
 
 def _csv(rows: list[list[object]]) -> str:

@@ -13,12 +13,12 @@ from controllers import Commands, Measurements
 from rigtwin.description.catalogue import find
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.limits import largest_reach
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.models.machine_twin import RunsAway, simulate_machine
 from rigtwin.numerics.arrays import RUNAWAY, Array
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
-from rigtwin.simulation.runner import SimulationResult, simulate
+from rigtwin.simulation.runner import SimulationResult
 from rigtwin.simulation.safety import Trip
 from rigtwin.simulation.structure_motion import models_output
 from rigtwin.studies.tuning.measures import Measure, RigTrial, Trial
@@ -82,9 +82,7 @@ def run(job: Run) -> dict[str, float]:
     """
     machine = find_once(job.machine)
     demands = job.experiment.demands(job.configuration, job.seed)
-    if machine.structure is Structure.QUARTER_CAR:
-        return figures(job, simulate(job.configuration, demands, job.seed))
-    return _run_described(machine, job, demands)
+    return machine.physics.figures(machine, job, demands)
 
 
 def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
@@ -112,7 +110,8 @@ def rig_trial(
     return RigTrial(configuration, columns, first)
 
 
-def _run_described(machine: Machine, job: Run, demands: Mapping[str, Array]) -> dict[str, float]:
+def figures_of_joints(machine: Machine, job: Run, demands: Mapping[str, Array]) -> dict[str, float]:
+    """Return name → figure of a run of a machine made of joints, as `run` gives it."""
     try:
         columns, trip = simulate_machine(machine, job.configuration, demands, job.seed)
     except RunsAway:

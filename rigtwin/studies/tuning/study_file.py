@@ -15,11 +15,11 @@ from machines import DEFAULT_MACHINE
 from rigtwin.description.catalogue import find
 from rigtwin.description.changes import override, parse_assignments, read_toml
 from rigtwin.description.configuration import Configuration, groups
-from rigtwin.description.machine import Machine, Structure
+from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import value_of
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import find_experiment
-from rigtwin.studies.tuning.measures import MEASURES, Measure
+from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.own_measures import list_channels, parse_measure
 from rigtwin.studies.tuning.parameter import Parameter
 from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Study, Variation
@@ -163,7 +163,7 @@ def parse_study(
 
 def _known_measures(machine: Machine, table: object) -> dict[str, Measure]:
     """By name: the rig's, and those that the study defines."""
-    known = dict(MEASURES) if machine.structure is Structure.QUARTER_CAR else {}
+    known = machine.physics.measures()
     channels = list_channels(machine)
     for name, own in _table("measures", table, "tables, [measures.NAME]").items():
         if name in known:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from machines import DEFAULT_MACHINE
 from rigtwin.console import table
 from rigtwin.description.configuration import parameters
-from rigtwin.description.machine import Structure
 from rigtwin.studies.tuning.evaluation import Change, Comparison, Spread
 from rigtwin.studies.tuning.result import TUNED_NOMINAL, TuningResult, settings_of
 from rigtwin.studies.tuning.scenario import NOMINAL
@@ -186,8 +186,8 @@ def text(result: TuningResult) -> str:
 
 def command(study: Study, settings: object) -> str:
     """The line that runs a study's experiment with settings of a file."""
-    rig = study.machine.structure is Structure.QUARTER_CAR
-    other = "" if rig else f" --machine {study.machine.path}"
+    shipped = study.machine.name == DEFAULT_MACHINE
+    other = "" if shipped else f" --machine {study.machine.path}"
     return f"rigtwin run {study.experiment.name}{other} --config {settings}"
 
 

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.components import PositionActuator, measures
-from rigtwin.description.machine import Component, Machine, Structure
+from rigtwin.description.machine import Component, Machine
 from rigtwin.numerics.arrays import Array
-
-SMOOTHING = 20.0
-"""Hz; what is shown is filtered forwards and backwards, or the mains hum would shake the rig."""
 
 
 def joint_positions(
@@ -35,16 +31,6 @@ def joint_positions(
         Joint → position at every tick, m or rad: as measured, else as commanded, else as its
         velocity adds up to. Joints that the signals say nothing of are left out.
     """
-    if machine.structure is Structure.QUARTER_CAR:
-        sensed = columns.get("/sensor", {})
-        if not {"structure_lvdt", "suspension_lvdt"} <= set(sensed):
-            return {}
-        structure = _smooth(sensed["structure_lvdt"], period)
-        travel = _smooth(sensed["suspension_lvdt"], period)
-        ground = np.zeros_like(structure)
-        if "ground_lvdt" in sensed:
-            ground = _smooth(sensed["ground_lvdt"], period)
-        return {"ground": ground, "carriage": structure - travel, "structure": structure}
     found: dict[str, Array] = {}
     for wanted in ("position", "command", "velocity"):
         for name, component in machine.components.items():
@@ -72,9 +58,3 @@ def _find_signal(component: Component, columns: Mapping[str, Mapping[str, Array]
         return None
     topic, name = component.channel
     return columns.get(topic, {}).get(name)
-
-
-def _smooth(signal: Array, period: float) -> Array:
-    if 0.45 / period <= SMOOTHING or len(signal) < 50:
-        return signal
-    return sosfiltfilt(butter(2, SMOOTHING, fs=1.0 / period, output="sos"), signal)

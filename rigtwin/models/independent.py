@@ -1,66 +1,20 @@
-"""The model of a machine under one recording's inputs: which one is chosen by the machine's
-structure alone."""
+"""The model of joints that do not act on each other."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
-from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Structure
-from rigtwin.models.coupled import CoupledModel
 from rigtwin.models.joint import JointModel
-from rigtwin.models.model import Form, Model
-from rigtwin.models.moved import MovedModel
-from rigtwin.models.quarter_car import QuarterCarModel
+from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Inputs
 
 
-def model_of(
-    machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
-) -> Model[Any]:
-    """The fastest model of a machine.
-
-    Parameters
-    ----------
-    machine
-        Its description.
-    recording
-        Whose inputs drive it.
-    configuration
-        Its settings on that recording.
-    steps
-        Of integration a tick.
-
-    Returns
-    -------
-    Model
-        That of a quarter car, of one or several joints, or of joints that act on each other.
-
-    Raises
-    ------
-    RigtwinError
-        If a channel is missing.
-    """
-    if machine.structure is Structure.QUARTER_CAR:
-        return QuarterCarModel.of(inputs, configuration, steps)
-    if machine.structure is Structure.MOVED:
-        return MovedModel(machine, machine.replays[0], inputs)
-    if machine.structure is Structure.COUPLED:
-        return CoupledModel(machine, machine.replays[0], inputs, configuration, steps)
-    joints = [
-        JointModel(machine, replay, inputs, configuration, steps) for replay in machine.replays
-    ]
-    return joints[0] if len(joints) == 1 else Joints(joints)
-
-
-class Joints:
+class IndependentModel:
     """All joints of one recording, their rows one after another."""
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
@@ -130,14 +84,14 @@ class Joints:
             ]
         )
 
-    def halve_steps(self) -> Joints:
-        return Joints([each.halve_steps() for each in self._joints])
+    def halve_steps(self) -> IndependentModel:
+        return IndependentModel([each.halve_steps() for each in self._joints])
 
-    def double_steps(self) -> Joints:
-        return Joints([each.double_steps() for each in self._joints])
+    def double_steps(self) -> IndependentModel:
+        return IndependentModel([each.double_steps() for each in self._joints])
 
-    def thin(self, longest: float) -> Joints:
+    def thin(self, longest: float) -> IndependentModel:
         thinned = [each.thin(longest) for each in self._joints]
         # Rows of one recording have ticks in common.
         alike = len({each.every for each in thinned}) == 1
-        return Joints(thinned) if alike else self
+        return IndependentModel(thinned) if alike else self

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rigtwin.description.machine import Component, Machine, Structure
+from rigtwin.description.machine import Component, Machine
 
 
 def parts(machine: Machine) -> tuple[Machine, ...]:
@@ -24,8 +24,6 @@ def parts(machine: Machine) -> tuple[Machine, ...]:
     tuple of Machine
         In the order of their first signals; the machine itself where it does not fall apart.
     """
-    if machine.structure is not Structure.MOVED:
-        return (machine,)
     groups = [{row.name} for row in machine.rows]
     for component in machine.components.values():
         changed = _changes(machine, component)

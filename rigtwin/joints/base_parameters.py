@@ -11,7 +11,7 @@ import numpy as np
 
 from rigtwin.components import Body, Guide, Rotor
 from rigtwin.components.body import INERTIAL
-from rigtwin.description.machine import Component, Machine, Structure
+from rigtwin.description.machine import Component, Machine
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 
@@ -45,7 +45,7 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
     at: dict[type, list[Component]] = {Body: [], Rotor: [], Guide: []}
     for component in components.values():
         at.get(type(getattr(plant, component.name)), []).append(component)
-    if machine.structure is not Structure.MOVED or not at[Body]:
+    if not at[Body]:
         return ()
     (replay,) = machine.replays
     joints = [components[name].joint for name in replay.moved_by]

@@ -15,16 +15,16 @@ from rigtwin.components.sensors import apply_sensor, remove_drift, undo_sensor
 from rigtwin.components.yielding import yield_to_load
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
-from rigtwin.diagnosis.component import (
+from rigtwin.diagnosis.residual import Residual, combine_residuals, compute_residual, rounding
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+from rigtwin.rig.component import (
     Output,
     replay_carriage,
     replay_cylinder,
     replay_mechanics,
     replay_motor,
 )
-from rigtwin.diagnosis.residual import Residual, combine_residuals, compute_residual, rounding
-from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
 from rigtwin.signals.noise import (
     EstimatedMotion,
     band,

@@ -1,0 +1,349 @@
+"""The physics of a kind of machine: everything that depends on what a machine is built of.
+
+A kind is a subclass of `Physics` and one call of `register`. The rest of the package asks
+`machine.physics` and never which kind it is.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rigtwin.description.configuration import Configuration
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Inputs, Recording
+
+if TYPE_CHECKING:
+    from rigtwin.components.plant import Plant
+    from rigtwin.description.machine import Machine, ReplayOf
+    from rigtwin.description.mechanism import Mechanism
+    from rigtwin.diagnosis.evidence import Evidence
+    from rigtwin.diagnosis.finding import Level
+    from rigtwin.diagnosis.residual import Residual
+    from rigtwin.hardware.daq.signals import Signals
+    from rigtwin.hardware.daq.table import ChannelTable
+    from rigtwin.hardware.daq.wired import Wired
+    from rigtwin.hardware.session.own_controller import OwnController
+    from rigtwin.hardware.session.test import AnyTest
+    from rigtwin.models.model import Model
+    from rigtwin.render.curves import Curve
+    from rigtwin.simulation.energy import EnergyError
+    from rigtwin.simulation.experiment import Experiment
+    from rigtwin.simulation.runner import RunResult
+    from rigtwin.studies.tuning.measures import Measure
+    from rigtwin.studies.tuning.run import Run
+
+Columns = Mapping[str, Mapping[str, Array]]
+"""Topic → field → values, shape (ticks,)."""
+
+
+class Physics(ABC):
+    """One kind of machine.
+
+    Attributes
+    ----------
+    name : str
+        Name of the kind, stored with the machine.
+    title : str
+        What such a machine is, for messages.
+    replayed_whole : bool
+        Whether a replay covers the whole machine instead of one joint.
+    declares_limits : bool
+        Whether a description may declare the limits that end a test.
+    delays_effects : bool
+        Whether effects may begin during a test.
+    compares_controller : bool
+        Whether a comparison may change the controller's settings.
+    reversible : bool
+        Whether the model fits a recording equally well when time runs backwards.
+    lacks_stops : bool
+        Whether the model leaves out the stops at the ends of the joints' ranges.
+    longest_delay : float
+        Largest sampling delay of an observed signal, s.
+    card : Path or None
+        Channel table of the card that such a machine is shipped with.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    replayed_whole: ClassVar[bool] = False
+    declares_limits: ClassVar[bool] = True
+    delays_effects: ClassVar[bool] = False
+    compares_controller: ClassVar[bool] = True
+    reversible: ClassVar[bool] = False
+    lacks_stops: ClassVar[bool] = False
+    longest_delay: ClassVar[float] = math.inf
+
+    @property
+    def card(self) -> Path | None:
+        """Channel table of the card that such a machine is shipped with."""
+        return None
+
+    # Description
+
+    @abstractmethod
+    def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
+        """Return whether components of these types, replayed like this, are of this kind.
+
+        Parameters
+        ----------
+        types
+            Name → type of each component.
+        replays
+            Replays of the description; empty before they are read.
+        """
+
+    @abstractmethod
+    def assemble(self, values: Mapping[str, Any]) -> Plant:
+        """Return the plant made of these components. values: name → component."""
+
+    @abstractmethod
+    def configure(self, machine: Machine) -> Configuration:
+        """Return the settings of the machine's twin as described."""
+
+    @abstractmethod
+    def list_overlooked(
+        self, mechanism: Mechanism, components: Mapping[str, Any], replays: Sequence[ReplayOf]
+    ) -> tuple[str, ...]:
+        """Return a line for each feature of the MJCF that the models ignore."""
+
+    def split(self, machine: Machine) -> tuple[Machine, ...]:
+        """Return the machine as parts whose effects change no signal of another part."""
+        return (machine,)
+
+    # Model and twin
+
+    @abstractmethod
+    def model(
+        self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
+    ) -> Model[Any]:
+        """Return the fastest model of the machine under these inputs.
+
+        Parameters
+        ----------
+        machine
+            Machine to model.
+        inputs
+            Signals that drive it.
+        configuration
+            Settings of the test.
+        steps
+            Integration steps per tick.
+        """
+
+    @abstractmethod
+    def record(
+        self,
+        path: Path,
+        machine: Machine,
+        experiment: str,
+        configuration: Configuration,
+        demands: Any,
+        seed: int,
+        *,
+        effects: Sequence[str] = (),
+        effects_from: float = 0.0,
+        controller: Any = None,
+        progress: Callable[[int], object] = lambda _ticks: None,
+    ) -> RunResult:
+        """Run a test on the twin and record it.
+
+        Parameters
+        ----------
+        path
+            File to write.
+        machine
+            Machine to simulate.
+        experiment
+            Name of the test.
+        configuration
+            Settings that the operator knows.
+        demands
+            Demanded signals, see `Experiment`.
+        seed
+            Seed of the sensor noise.
+        effects
+            Hidden effects: simulated, but not stored in the recording's settings.
+        effects_from
+            Time from which the effects act, s.
+        controller
+            Replaces the machine's controller.
+        progress
+            Called with the ticks done since its last call.
+        """
+
+    @abstractmethod
+    def simulate(
+        self, machine: Machine, name: str, configuration: Configuration, demands: Any, seed: int
+    ) -> Recording:
+        """Return the recording that a test without limits would make, in memory."""
+
+    @abstractmethod
+    def excite(self, machine: Machine) -> Iterator[Recording]:
+        """Yield recordings of the twin under rich motions within the joints' ranges."""
+
+    def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
+        """Return the sums of inertial parameters of which only the sum is observable."""
+        return ()
+
+    # Diagnosis
+
+    @abstractmethod
+    def residuals(
+        self, evidence: Evidence, progress: Callable[[str], object]
+    ) -> tuple[dict[str, Residual], dict[str, str]]:
+        """Return the residual of each replay of the first recording, and why others are missing."""
+
+    @abstractmethod
+    def levels(
+        self, evidence: Evidence, plant: Plant, corrected: Configuration
+    ) -> tuple[dict[str, Level], Level | None]:
+        """Return the gap of each replay and of the closed loop before and after a correction.
+
+        Parameters
+        ----------
+        evidence
+            Recordings, about their nominal plant.
+        plant
+            Corrected plant.
+        corrected
+            Settings of the corrected twin.
+        """
+
+    def energy_error(
+        self, recording: Recording, configuration: Configuration, known: bool = False
+    ) -> EnergyError | None:
+        """Return the energy that a hybrid test's loop puts in, or None for other tests.
+
+        Parameters
+        ----------
+        recording
+            Test to judge.
+        configuration
+            Its settings.
+        known
+            Whether the settings hold for a custom controller too.
+        """
+        return None
+
+    def advise_controller(self, described: Plant, corrected: Plant) -> dict[str, Any]:
+        """Return controller settings that the corrected plant asks for."""
+        return {}
+
+    # Card and sessions
+
+    @abstractmethod
+    def signals(self, machine: Machine) -> Signals:
+        """Return the signals that a card's channel table connects."""
+
+    @abstractmethod
+    def terminals(
+        self, machine: Machine, configuration: Configuration, table: ChannelTable, seed: int
+    ) -> Wired:
+        """Return the twin wired to the terminals of the virtual card."""
+
+    @abstractmethod
+    def plan(
+        self,
+        machine: Machine,
+        experiment: Experiment,
+        configuration: Configuration,
+        seed: int,
+        table: ChannelTable,
+        effects: Sequence[str],
+        own: OwnController | None,
+    ) -> AnyTest:
+        """Return the test of a session.
+
+        Parameters
+        ----------
+        machine
+            Machine under test.
+        experiment
+            What is demanded.
+        configuration
+            Settings of the test.
+        seed
+            Seed of the excitation and of the twin's noise.
+        table
+            Channel table of the card.
+        effects
+            Effects of the twin on the virtual card.
+        own
+            Custom controller.
+        """
+
+    # Pictures
+
+    def scene(self, machine: Machine) -> Path:
+        """Return the MJCF to draw."""
+        return machine.model
+
+    @abstractmethod
+    def joint_positions(
+        self, machine: Machine, columns: Columns, period: float
+    ) -> dict[str, Array]:
+        """Return joint → position at every tick, m or rad; joints without a signal are left out."""
+
+    def require_motion(self, recording: Recording) -> None:  # noqa: B027
+        """Raise RigtwinError if a channel that pictures need is missing."""
+
+    def deflection(self, recording: Recording) -> Array | None:
+        """Return the shape of flexible parts at every tick, or None if there are none."""
+        return None
+
+    @abstractmethod
+    def curves(self, machine: Machine, recording: Recording) -> list[Curve]:
+        """Return the curves to draw under the scene."""
+
+    # Tuning
+
+    def measures(self) -> dict[str, Measure]:
+        """Return the measures that every study of such a machine knows, by name."""
+        return {}
+
+    @abstractmethod
+    def figures(self, machine: Machine, job: Run, demands: Any) -> dict[str, float]:
+        """Return the measures of one run of a tuning study, by name."""
+
+
+BUILT_IN = (
+    "rigtwin.rig.physics:SuspensionRig",
+    "rigtwin.joints.physics:FreeJoints",
+    "rigtwin.joints.physics:PrescribedJoints",
+    "rigtwin.joints.physics:IndependentJoints",
+)
+"""Kinds that are shipped, the most specific first. They stand above this module, which therefore
+names them instead of importing them."""
+_registered: list[Physics] = []
+
+
+def register(physics: Physics) -> None:
+    """Add a kind of machine. Later registrations are asked first."""
+    _registered.insert(0, physics)
+
+
+@cache
+def _load(entry: str) -> Physics:
+    module, _, name = entry.partition(":")
+    return getattr(import_module(module), name)()
+
+
+def _kinds() -> Iterator[Physics]:
+    yield from _registered
+    yield from map(_load, BUILT_IN)
+
+
+def find_physics(types: Mapping[str, type], replays: Sequence[ReplayOf]) -> Physics:
+    """Return the first kind that claims a machine, see `Physics.claims`."""
+    return next(kind for kind in _kinds() if kind.claims(types, replays))
+
+
+def physics_named(name: str) -> Physics:
+    """Return the kind of a name."""
+    return next(kind for kind in _kinds() if kind.name == name)

@@ -1,0 +1,111 @@
+"""Rich motions of a machine's joints within their ranges, simulated by its twin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from rigtwin.components import ForceActuator
+from rigtwin.description.machine import Joint, Machine
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.errors import RigtwinError
+from rigtwin.models.demands import demanded_channels
+from rigtwin.recording import Recording
+from rigtwin.signals.excitation import multisine
+
+SECONDS = 8.0
+"""Duration of each motion, s."""
+REACHES = (0.3, 0.08)
+"""rms of the motions, as shares of half a joint's range."""
+BAND = (0.15, 12.0)
+"""Frequency band of the motions, Hz."""
+SLOPE = 1.0
+"""Power of the frequency with which the amplitudes fall."""
+Reach = tuple[float, float]
+"""Middle and half width of a range, SI."""
+
+
+def excite(
+    machine: Machine,
+    reach: Callable[[Machine, tuple[str, str]], Reach | None],
+    least_period: float,
+) -> Iterator[Recording]:
+    """Yield recordings of multisines, without limits; none where a range is unknown.
+
+    Parameters
+    ----------
+    machine
+        Machine to simulate.
+    reach
+        Range of what may be demanded of a channel.
+    least_period
+        Least time from tick to tick, s.
+    """
+    timing = machine.configuration.timing._replace(duration=SECONDS)
+    timing = timing._replace(period=max(timing.period, least_period))
+    configuration = machine.configuration._replace(timing=timing)
+    time = np.arange(configuration.ticks) * timing.period
+    for number, share in enumerate(REACHES, 1):
+        random = np.random.default_rng([number, 17])
+        demands = {}
+        for channel in demanded_channels(machine):
+            size = reach(machine, channel)
+            if size is None:
+                return
+            wave = multisine(
+                time,
+                lowest=BAND[0],
+                highest=min(BAND[1], 0.2 / timing.period),
+                spacing=BAND[0],
+                slope=SLOPE,
+                rms=1.0,
+                random=random,
+            )
+            middle, half = size
+            demands[".".join(channel)] = middle + share * half * wave
+        name = f"multisine {number}"
+        try:
+            yield machine.physics.simulate(machine, name, configuration, demands, number)
+        except RigtwinError:
+            return
+
+
+def reach_of_component(machine: Machine, channel: tuple[str, str]) -> Reach | None:
+    """Return the range of the joint that the component of a channel acts on, or of its force."""
+    moved = next((c for c in machine.components.values() if c.channel == channel), None)
+    if moved is None:
+        # The description does not say how far a controller's other inputs go.
+        return None
+    joint = Mechanism(machine.model).joint(moved.joint or moved.acts_on[0][0])
+    actuator = getattr(machine.plant, moved.name)
+    if not isinstance(actuator, ForceActuator):
+        return _range(joint)
+    return 0.0, _gentle_force(joint) / actuator.constant
+
+
+def reach_of_replay(machine: Machine, channel: tuple[str, str]) -> Reach | None:
+    """Return the range of the joint whose replay is moved by a channel, or of its force."""
+    for replay in machine.replays:
+        joint, mover = replay.joint, machine.components[replay.moved_by[0]]
+        if channel == mover.channel:
+            constant = getattr(getattr(machine.plant, mover.name), "constant", None)
+            return _range(joint) if constant is None else (0.0, _gentle_force(joint) / constant)
+        if replay.closed:
+            return _range(joint)
+    return None
+
+
+def _gentle_force(joint: Joint) -> float:
+    """Return half the weight, or what moves the joint to and fro once a second, N or Nm."""
+    _, half = _range(joint)
+    weight = 0.5 * max(np.abs(joint.gravity))
+    return weight or joint.inertia * (2.0 * math.pi) ** 2 * half
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    """Return middle and half width of a joint's range, about its rest if that lies well inside."""
+    low, high = joint.positions[0], joint.positions[-1]
+    middle = min(max(joint.rest, low), high)
+    return middle, max(min(high - middle, middle - low), 0.25 * (high - low))
