@@ -328,6 +328,11 @@ def register(physics: Physics) -> None:
     _registered.insert(0, physics)
 
 
+def unregister(physics: Physics) -> None:
+    """Remove a kind that was registered."""
+    _registered.remove(physics)
+
+
 @cache
 def _load(entry: str) -> Physics:
     module, _, name = entry.partition(":")

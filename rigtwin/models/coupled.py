@@ -39,7 +39,7 @@ from rigtwin.models.coupled_start import CoupledStart, Seen, Sense
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
-from rigtwin.models.model import Form
+from rigtwin.models.model import Form, Model
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.numerics.arrays import Array, contain, interpolate
 from rigtwin.recording import Inputs
@@ -51,10 +51,8 @@ THINNED = 5e-3
 """Share of a signal's own swing that longer steps may change for a search."""
 
 
-class CoupledModel:
+class CoupledModel(Model[Plant]):
     """All joints of one recording."""
-
-    every = 1
 
     def __init__(
         self,
@@ -110,11 +108,6 @@ class CoupledModel:
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Array] = {}
         self._judge_start()
-
-    @property
-    def band(self) -> float:
-        """Infinite."""
-        return math.inf
 
     def halve_steps(self) -> CoupledModel:
         return self._with_steps(max(1, self._steps // 2))
@@ -535,12 +528,6 @@ class CoupledModel:
     def motion(self, component: str, plant: Plant) -> Motion:
         known = component if component in self._along else self.rows[0].name
         return Motion(*self._passage(known, plant))
-
-    def undetermined(self) -> None:
-        """None: joints that go by themselves are judged at rest too."""
-
-    def missing_force(self, plant: Plant) -> None:
-        """None: joints that act on each other are searched from what they are told."""
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of the measured motions makes of what is observed."""

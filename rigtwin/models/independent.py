@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,21 +9,16 @@ import numpy as np
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
 from rigtwin.models.joint import JointModel
-from rigtwin.models.model import Form
+from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 
 
-class IndependentModel:
+class IndependentModel(Model[Plant]):
     """All joints of one recording, their rows one after another."""
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)
         self.every = joints[0].every
-
-    @property
-    def band(self) -> float:
-        """Infinite."""
-        return math.inf
 
     def predict(self, plant: Plant) -> Array:
         return np.concatenate([each.predict(plant) for each in self._joints])
@@ -62,9 +56,6 @@ class IndependentModel:
 
     def motion(self, component: str, plant: Plant) -> Motion:
         return self._joints[self._index_of(component)].motion(component, plant)
-
-    def undetermined(self) -> None:
-        """None, as of each."""
 
     def missing_force(self, plant: Plant) -> Array | None:
         parts = [each.missing_force(plant) for each in self._joints]

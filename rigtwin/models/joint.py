@@ -37,7 +37,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
 from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.joint_start import AT_REST, JointStart
-from rigtwin.models.model import Form
+from rigtwin.models.model import Form, Model
 from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Inputs
@@ -85,7 +85,7 @@ def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
     return (remove_drift(sensor, signal, period) - sensor.offset) / sensor.gain
 
 
-class JointModel:
+class JointModel(Model[Plant]):
     """One replay of one recording."""
 
     def __init__(
@@ -532,9 +532,6 @@ class JointModel:
         command = np.zeros(len(position))
         condition_all(conditioning, hold(conditioning, float(commanded[0])), commanded, 1, command)
         return taken - push_all(push_law(mover), command, position, velocity)
-
-    def undetermined(self) -> None:
-        """None: a joint alone is judged at rest too."""
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """What the noise of a measured motion makes of the force, or that of a controller's sensors

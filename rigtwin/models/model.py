@@ -1,11 +1,12 @@
-"""What a diagnosis asks of a machine's model: the signals that a recording should hold, for any
-plant."""
+"""The interface through which a diagnosis asks for predictions, whatever the machine."""
 
 from __future__ import annotations
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,78 +20,101 @@ P = TypeVar("P", bound=Plant, contravariant=True)
 
 @dataclass(frozen=True)
 class Form:
-    """One way to disturb a component freely. entry: where it enters, as `predict_disturbed` takes
-    it; signal: shape (ticks,)."""
+    """One shape of an unmodelled disturbance of a component.
+
+    Attributes
+    ----------
+    name : str
+        Description of the shape.
+    entry : str
+        Place where it enters, as `Model.predict_disturbed` takes it.
+    signal : Array
+        The shape over time, shape (ticks,).
+    """
 
     name: str
     entry: str
     signal: Array
 
 
-class Model(Protocol[P]):
-    """A machine's model under one recording's inputs. Rows are the machine's observed signals, in
-    their order."""
+class Model(ABC, Generic[P]):
+    """A machine's model under the inputs of one recording.
 
-    every: int
-    """Ticks of the recording from one that is predicted to the next."""
+    A kind of machine implements `predict`, `predict_true` and `motion`; everything else has a
+    default. Rows of predictions are the machine's observed signals, in their order.
+    """
+
+    every: int = 1
+    """Ticks of the recording from one predicted tick to the next."""
 
     @property
     def band(self) -> float:
-        """Hz, up to which signals are predicted and judged; infinite for all."""
-        ...
+        """Highest frequency at which signals are predicted and judged, Hz."""
+        return math.inf
 
+    @abstractmethod
     def predict(self, plant: P) -> Array:
-        """What the signals should be, noise apart, shape (rows, ticks)."""
-        ...
+        """Return the signals without noise, shape (rows, ticks)."""
 
+    @abstractmethod
     def predict_true(self, plant: P) -> Array:
-        """What ideal sensors would read, shape (rows, ticks)."""
-        ...
+        """Return what ideal sensors would read, shape (rows, ticks)."""
 
-    def predict_disturbed(self, plant: P, entry: str, amount: Array) -> Array:
-        """The same as `predict` with a disturbance, shape (ticks,), entering somewhere."""
-        ...
+    @abstractmethod
+    def motion(self, component: str, plant: P) -> Motion:
+        """Return the motion that a component goes through."""
 
     def components(self) -> Sequence[str]:
-        """Components that can be disturbed freely."""
-        ...
+        """Return the components on which a free disturbance may act."""
+        return ()
 
     def forms(self, component: str, plant: P) -> list[Form]:
-        """Ways to disturb one of them."""
-        ...
+        """Return the shapes of a free disturbance of one component."""
+        return []
+
+    def predict_disturbed(self, plant: P, entry: str, amount: Array) -> Array:
+        """Return `predict` with a disturbance, shape (ticks,), that enters at `entry`."""
+        raise NotImplementedError(f"{type(self).__name__} has no disturbances")
 
     def disturbance_size(self, entry: str) -> float:
-        """rms of a disturbance that is small there."""
-        ...
-
-    def motion(self, component: str, plant: P) -> Motion:
-        """What a component goes through."""
-        ...
+        """Return the rms of a disturbance that counts as small at `entry`."""
+        return 1.0
 
     def propagated_noise(self, plant: P) -> Array | None:
-        """What the noise of the signals that drive the model makes of the observed ones, shape
-        (rows, ticks); None if they are known exactly."""
-        ...
+        """Return what the noise of the inputs adds to the predictions, shape (rows, ticks).
+
+        None if the inputs are known exactly.
+        """
+        return None
 
     def undetermined(self) -> NDArray[np.bool_] | None:
-        """Ticks at which the inputs do not determine what is observed, whatever the plant, shape
-        (rows, ticks); None if there are none."""
-        ...
+        """Return the ticks at which the inputs do not determine the signals, shape (rows, ticks).
+
+        None if there are none.
+        """
+        return None
 
     def missing_force(self, plant: P) -> Array | None:
-        """What would have to act besides on a joint for it to go as it was measured to, N, shape
-        (ticks,); None where nothing that goes by itself is observed."""
-        ...
+        """Return the residual force required to reproduce the measured motion, N, shape (ticks,).
 
-    def halve_steps(self) -> Model[P]:
-        """With half the integration steps, if it can be."""
-        ...
+        None where no free motion is observed.
+        """
+        return None
 
-    def double_steps(self) -> Model[P]:
-        """With twice the integration steps."""
-        ...
+    def halve_steps(self) -> Model[Any]:
+        """Return the model with half the integration steps, or itself if it integrates nothing."""
+        return self
 
-    def thin(self, longest: float) -> Model[P]:
-        """For a search: with ticks left out where nothing is integrated from one to the next, or
-        with longer steps of integration; either at most so many s apart."""
-        ...
+    def double_steps(self) -> Model[Any]:
+        """Return the model with twice the integration steps, or itself if it integrates nothing."""
+        return self
+
+    def thin(self, longest: float) -> Model[Any]:
+        """Return a coarser model for a search.
+
+        Parameters
+        ----------
+        longest
+            Longest time from one predicted tick or integration step to the next, s.
+        """
+        return self

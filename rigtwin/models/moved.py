@@ -23,7 +23,7 @@ from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.guided import resist, resist_at_once
 from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
-from rigtwin.models.model import Form
+from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
@@ -42,7 +42,7 @@ Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
 
 
-class MovedModel:
+class MovedModel(Model[Plant]):
     """All joints of one recording."""
 
     def __init__(
@@ -111,13 +111,6 @@ class MovedModel:
 
     def _smooth(self, signal: Array) -> tuple[Array, float]:
         return smooth(signal, self._period)
-
-    def halve_steps(self) -> MovedModel:
-        """The same: nothing is integrated."""
-        return self
-
-    def double_steps(self) -> MovedModel:
-        return self
 
     def thin(self, longest: float) -> MovedModel:
         every = max(int(longest / self._period), 1)
@@ -296,9 +289,6 @@ class MovedModel:
             component = self.rows[0].name
         (position, speed, _), _, force = self._passage(component, plant)
         return Motion(position, speed, force)
-
-    def missing_force(self, plant: Plant) -> None:
-        """None: nothing goes by itself."""
 
     def undetermined(self) -> NDArray[np.bool_]:
         """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both

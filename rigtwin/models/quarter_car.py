@@ -10,7 +10,6 @@ How it moves is in `quarter_car_motion`.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from rigtwin.components.effect import Motion
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.model import Form
+from rigtwin.models.model import Form, Model
 from rigtwin.models.quarter_car_motion import Plate, move_carriage, move_plate
 from rigtwin.numerics.arrays import Array, contain
 from rigtwin.recording import Inputs
@@ -72,11 +71,9 @@ class Disturbances(NamedTuple):
     force: Array
 
 
-class QuarterCarModel:
+class QuarterCarModel(Model[RigPlant]):
     """The plant under the commands of one test. Plates' motions are kept: most candidates leave
     them as they are."""
-
-    every = 1
 
     def __init__(
         self,
@@ -123,10 +120,6 @@ class QuarterCarModel:
         return QuarterCarModel(
             self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
         )
-
-    def thin(self, longest: float) -> QuarterCarModel:  # noqa: ARG002
-        """The same: it is integrated from tick to tick."""
-        return self
 
     def _plate(
         self,
@@ -255,21 +248,6 @@ class QuarterCarModel:
         else:
             position = true[1] - true[2]
         return Motion(position, np.gradient(position, self._period), true[3])
-
-    @property
-    def band(self) -> float:
-        """Infinite."""
-        return math.inf
-
-    def undetermined(self) -> None:
-        """None: what moves the wheel is known throughout."""
-
-    def missing_force(self, plant: RigPlant) -> None:
-        """None: what it is made of is known well."""
-
-    def propagated_noise(self, plant: RigPlant) -> None:
-        """Sensors' noise reaches the plant only through recorded commands, which are known
-        exactly."""
 
     def predict(self, plant: RigPlant) -> Array:
         """The same through the plant's sensors, noise and quantisation apart."""
