@@ -8,7 +8,8 @@ have it, from where the sensors see it start.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -47,6 +48,10 @@ from rigtwin.signals.noise import smooth, white_noise
 
 SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
 """Parameters of a guide that alone do nothing."""
+COMMANDED = "/command"
+"""Topic whose signals are held from tick to tick."""
+COARSER = 2.0
+"""Times as long steps as others search with: each is checked against the exact prediction."""
 THINNED = 5e-3
 """Share of a signal's own swing that longer steps may change for a search."""
 
@@ -61,8 +66,26 @@ class CoupledModel(Model[Plant]):
         inputs: Inputs,
         configuration: Configuration,
         steps: int,
+        every: int = 1,
+        quick: bool = False,
     ) -> None:
-        """Raises RigtwinError if a channel is missing."""
+        """Prepare the model.
+
+        Parameters
+        ----------
+        machine, replay, inputs, configuration, steps
+            As `Physics.model` takes them.
+        every
+            Ticks of the recording for each tick of `inputs`.
+        quick
+            Whether errors of the start are linear nuisance parameters instead of being fitted.
+
+        Raises
+        ------
+        RigtwinError
+            If a channel is missing.
+        """
+        self.every, self._quick = every, quick
         self._machine, self._replay, self._signals = machine, replay, inputs
         self._configuration, self._steps = configuration, steps
         self._period, self._ticks = inputs.period, inputs.ticks
@@ -116,21 +139,49 @@ class CoupledModel(Model[Plant]):
         return self._with_steps(2 * self._steps)
 
     def _with_steps(self, steps: int) -> CoupledModel:
-        return CoupledModel(self._machine, self._replay, self._signals, self._configuration, steps)
+        return CoupledModel(
+            self._machine,
+            self._replay,
+            self._signals,
+            self._configuration,
+            steps,
+            self.every,
+            self._quick,
+        )
 
     def thin(self, longest: float) -> CoupledModel:
-        """With longer integration steps, as long as they change next to nothing."""
-        steps = math.ceil(self._period / longest)
+        """Return a coarser model for a search: fewer ticks and longer integration steps, as long
+        as they change next to nothing, and errors of the start taken as linear."""
         plant = self._configuration.plant
-        own = self.predict(plant)
-        swing = np.std([self._signals.column(*row.channel) for row in self.rows], axis=1)
-        while steps < self._steps:
-            thinned = self._with_steps(steps)
-            change = np.sqrt(np.mean((thinned.predict(plant) - own) ** 2, axis=1))
-            if bool(np.all(change <= THINNED * swing)):
-                return thinned
-            steps *= 2
+        exact = self.predict(plant)
+        swing = np.std(exact, axis=1)
+        quick = self._start.fitted and self._start.linear
+        for every, steps in self._list_grids(COARSER * longest):
+            if (every, steps, quick) == (1, self._steps, False):
+                break
+            coarser = CoupledModel(
+                self._machine,
+                self._replay,
+                _average_commands(self._signals, every),
+                self._configuration,
+                steps,
+                every,
+                quick,
+            )
+            change = coarser.predict(plant) - exact[:, ::every]
+            if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= THINNED * swing)):
+                return coarser
         return self
+
+    def _list_grids(self, longest: float) -> Iterator[tuple[int, int]]:
+        """Yield ticks that make one, and integration steps per such tick, the cheapest first."""
+        # What is prescribed is smoothed from all its samples.
+        most = 1 if self._leaders else max(int(longest / self._period), 1)
+        for every in range(most, 0, -1):
+            steps = math.ceil(every * self._period / longest)
+            while steps <= self._steps * every:
+                yield every, steps
+                steps *= 2
 
     def _column(self, name: str) -> Array:
         channel = self._machine.components[name].channel
@@ -293,7 +344,7 @@ class CoupledModel(Model[Plant]):
 
     def _start_of(self, plant: Plant) -> Array:
         """Positions and velocities, shape (2, coordinates)."""
-        if not self._start.fitted:
+        if self._quick or not self._start.fitted:
             return self._start.read(plant)
         key = self._key(plant)
         if key not in self._starts:
@@ -447,7 +498,8 @@ class CoupledModel(Model[Plant]):
         return self._true(self.move(plant))
 
     def predict(self, plant: Plant) -> Array:
-        return self._sense(plant, self.move(plant))
+        predicted = self._sense(plant, self.move(plant))
+        return self._start.correct(predicted) if self._quick else predicted
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         besides, on = self._no_force()
@@ -542,6 +594,22 @@ class CoupledModel(Model[Plant]):
         if not shifts:
             return None
         return self._true(self.move(plant, shifts=shifts)) - self.predict_true(plant)
+
+
+def _average_commands(inputs: Inputs, every: int) -> Inputs:
+    """Return every n-th tick of the readings, and the means of the commands in between."""
+    if every == 1:
+        return inputs
+    starts = np.arange(0, inputs.ticks, every)
+    counts = np.diff(np.append(starts, inputs.ticks))
+    columns = {
+        topic: {
+            name: np.add.reduceat(signal, starts) / counts if topic == COMMANDED else signal[starts]
+            for name, signal in names.items()
+        }
+        for topic, names in inputs.columns.items()
+    }
+    return replace(inputs, period=every * inputs.period, columns=columns)
 
 
 def _acts(guide: Guide) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from rigtwin.components.plant import Plant
 from rigtwin.models.joint_start import FORGOTTEN, SHOWS, guess_place
-from rigtwin.models.start import ERRORS, find_slopes, fit_start, read_start, start_error
+from rigtwin.models.start import ERRORS, LIKELY, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import smallest_step, white_noise
 
@@ -37,7 +37,8 @@ class Seen:
 class Judged:
     """How a start is fitted. rows: to which of those observed; held: to what each is predicted at
     best; errors: of the start as it is read, shape (2 · free joints,); slopes: of the rows by each
-    error, of the nominal machine: near enough for others; ticks: for which it is remembered."""
+    error, of the nominal machine: near enough for others; ticks: for which it is remembered;
+    responses: what each error changes in all rows, shape (all rows, all ticks, errors)."""
 
     rows: tuple[int, ...]
     measured: Array
@@ -45,6 +46,7 @@ class Judged:
     errors: Array
     slopes: Array
     ticks: int
+    responses: Array
 
 
 class CoupledStart:
@@ -127,9 +129,12 @@ class CoupledStart:
         ticks = len(next(iter(rows.values()))[0].measured)
         errors = self._find_errors([each for each, _ in rows.values()], noises, ticks)
         start, numbers = self.read(plant), list(rows)
-        predict, first = self._from(start, numbers, sense, ticks), self._free(start)
-        slopes = find_slopes(predict, first, errors, predict(first))
-        by_row = slopes.reshape(len(rows), ticks, -1)
+        whole = sense(start, ticks)
+        every_row = range(len(whole))
+        predict, first = self._from(start, every_row, sense, ticks), self._free(start)
+        responses = find_slopes(predict, first, errors, whole.ravel())
+        responses = responses.reshape(len(whole), ticks, -1)
+        by_row = responses[numbers]
         size = np.max(np.abs(by_row) / held[:, None, None], axis=(0, 2))
         if float(np.sum(size**2)) <= SHOWS:
             return
@@ -139,9 +144,44 @@ class CoupledStart:
             measured=np.stack([each.measured[:remembered] for each, _ in rows.values()]),
             held=held,
             errors=errors,
-            slopes=by_row[:, :remembered].reshape(-1, slopes.shape[1]),
+            slopes=by_row[:, :remembered].reshape(-1, len(errors)),
             ticks=remembered,
+            responses=responses,
         )
+
+    @property
+    def linear(self) -> bool:
+        """Whether `correct` may stand for `find`: a joint whose place no sensor sees may start far
+        from where it is read."""
+        return not self._unplaced[: self._loose].any()
+
+    def correct(self, predicted: Array) -> Array:
+        """Add what errors of the start change in a prediction that begins where it is read.
+
+        The errors are linear nuisance parameters θ with a prior of LIKELY standard errors: with S
+        the responses and r the residual, θ = (Sᵀ S + I / LIKELY²)⁻¹ Sᵀ r. One integration instead
+        of several, good enough to search by.
+
+        Parameters
+        ----------
+        predicted
+            Prediction of all rows, shape (rows, ticks).
+
+        Returns
+        -------
+        array
+            Shape (rows, ticks).
+        """
+        judged = self._judged
+        if judged is None:
+            return predicted
+        residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
+        # A model that is far off elsewhere too is no reason to start otherwise.
+        held = np.maximum(judged.held, np.sqrt(np.mean(residual**2, axis=1)))
+        columns = judged.slopes / np.repeat(held, judged.ticks)[:, None]
+        normal = columns.T @ columns + np.eye(columns.shape[1]) / LIKELY**2
+        errors = np.linalg.solve(normal, columns.T @ (residual / held[:, None]).ravel())
+        return predicted + judged.responses @ errors
 
     def find(self, plant: Plant, sense: Sense) -> Array:
         """The start as the sensors have it, shape (2, coordinates).
