@@ -1,0 +1,115 @@
+"""Quantities that a column of a log can hold, and the words by which columns name them."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Quantity(Enum):
+    """Quantity of one joint, as a column can hold it."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    FORCE = "force"
+    CURRENT = "current"
+    COMMAND = "command"
+    """Command of the joint's actuator: a position, or a force, as the actuator takes it."""
+    FORCE_COMMAND = "force command"
+    """Command that says itself that it is a force or a torque."""
+    OTHER = "other"
+    """Quantity that no test needs, such as an acceleration or a temperature."""
+
+
+WORDS: dict[Quantity, frozenset[str]] = {
+    Quantity.POSITION: frozenset(
+        "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
+        "travel coordinate jointpos rotation location place qm".split()
+    ),
+    Quantity.VELOCITY: frozenset(
+        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm "
+        "jointvel".split()
+    ),
+    Quantity.FORCE: frozenset(
+        "tau torque torques force forces effort efforts trq tq frc moment loadcell".split()
+    ),
+    Quantity.CURRENT: frozenset("current currents cur curr amps amperage".split()),
+    Quantity.OTHER: frozenset(
+        "acc accel acceleration ddq qdd qacc temp temperature voltage volt volts error err status "
+        "mode flag index episode frame task imu gyro quat id seq count".split()
+    ),
+}
+"""Quantity → words that name it."""
+COMMANDED = frozenset(
+    "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
+    "set qref qdes qcmd action actions demand demanded ctrl control u sp input".split()
+)
+"""Words that say that a column was commanded and not measured."""
+MEASURED = frozenset(
+    "measured meas actual act present read reading feedback fb observation obs state real data "
+    "raw value joint joints motor actuator servo axis link j m sensor of the".split()
+)
+"""Words that say nothing more."""
+UNIT_WORDS = {
+    "deg": "deg",
+    "degs": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "rad": "rad",
+    "rads": "rad",
+    "radians": "rad",
+    "mrad": "mrad",
+    "mm": "mm",
+    "cm": "cm",
+    "meters": "m",
+    "metres": "m",
+    "nm": "Nm",
+    "mnm": "mNm",
+    "newton": "N",
+    "amp": "A",
+    "amps": "A",
+    "ma": "mA",
+    "rpm": "rpm",
+    "dps": "deg/s",
+    "rps": "rev/s",
+}
+"""Word in a column's name → unit that it states."""
+TIME = frozenset("t time timestamp timestamps stamp clock elapsed seconds secs sec".split())
+"""Words that name the time."""
+TIME_UNITS = {
+    "s": "s",
+    "sec": "s",
+    "secs": "s",
+    "seconds": "s",
+    "ms": "ms",
+    "msec": "ms",
+    "millis": "ms",
+    "us": "us",
+    "usec": "us",
+    "micros": "us",
+    "ns": "ns",
+    "nsec": "ns",
+    "nanos": "ns",
+}
+"""Word in the time column's name → unit that it states."""
+SI = {
+    Quantity.POSITION: ("m", "rad"),
+    Quantity.VELOCITY: ("m/s", "rad/s"),
+    Quantity.FORCE: ("N", "Nm"),
+    Quantity.FORCE_COMMAND: ("N", "Nm"),
+    Quantity.CURRENT: ("A", "A"),
+}
+"""Quantity → SI unit where the joint slides, and where it turns."""
+
+
+def quantity_of_unit(unit: str) -> Quantity | None:
+    """Return the quantity that an SI unit belongs to; None if it is no joint's.
+
+    Parameters
+    ----------
+    unit
+        SI unit, such as "rad".
+    """
+    for quantity in (Quantity.POSITION, Quantity.VELOCITY, Quantity.FORCE, Quantity.CURRENT):
+        if unit in SI[quantity]:
+            return quantity
+    return None
