@@ -49,6 +49,7 @@ COMMANDS = (
     "video",
     "export",
     "import",
+    "describe",
     "calibrate",
     "compare",
     "diagnose",

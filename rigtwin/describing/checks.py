@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt, welch
 
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.numerics.arrays import Array
@@ -22,6 +22,11 @@ EXPLAINED = 0.25
 """Share of a force's variance that its inertia and gravity must explain to show its sign."""
 MAGNITUDE_REVERSALS = 4
 """Reversals of a joint after which a force that never changes its sign is a magnitude."""
+POWER, HARMONICS = 0.9, 8.0
+"""Share of the power of a joint's speed, and the multiple of the frequency below which that lies:
+dry friction has the odd harmonics of a motion."""
+LOWEST_BAND, HIGHEST_BAND = 5.0, 150.0
+"""Hz, bounds of a band."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,32 @@ def follows(command: Array, position: Array) -> float:
     if np.ptp(command) == 0.0 or np.ptp(position) == 0.0:
         return 0.0
     return float(np.corrcoef(command, position)[0, 1])
+
+
+def motion_band(time: Array, positions: Mapping[str, Array]) -> float:
+    """Return the frequency up to which forces are worth judging, Hz.
+
+    It is a multiple of the frequency below which most power of the joints' speeds lies, in the
+    median of the joints.
+
+    Parameters
+    ----------
+    time
+        s, shape (rows,).
+    positions
+        Joint → position, SI, shape (rows,).
+    """
+    step = float(np.median(np.diff(time)))
+    ticks = np.arange(time[0], time[-1], step)
+    frequencies = []
+    for values in positions.values():
+        speed = np.gradient(np.interp(ticks, time, values), step)
+        length = min(len(speed), max(int(4.0 / step), 8))
+        frequency, power = welch(speed, 1.0 / step, nperseg=length)
+        share = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
+        frequencies.append(float(frequency[int(np.searchsorted(share, POWER))]))
+    band = HARMONICS * float(np.median(frequencies))
+    return float(f"{min(max(band, LOWEST_BAND), HIGHEST_BAND):.2g}")
 
 
 def force_slopes(

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.describing.heading import split_words
-from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.quantity import TIME, TIME_UNITS
+from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.timing import JITTER, find_period

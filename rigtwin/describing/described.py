@@ -150,9 +150,11 @@ class Described:
             "  " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
             for row in self.rows
         ]
-        notes = [] if self.reading.clock.resample is None else [
-            f"rows are uneven in time; resampled to {self.reading.clock.resample:g} s"
-        ]
+        notes = (
+            []
+            if self.reading.clock.resample is None
+            else [f"rows are uneven in time; resampled to {self.reading.clock.resample:g} s"]
+        )
         lines += [f"  note: {note}" for note in (*notes, *self.reading.notes)]
         return "\n".join(lines)
 

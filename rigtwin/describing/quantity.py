@@ -20,33 +20,36 @@ class Quantity(Enum):
     """Quantity that no test needs, such as an acceleration or a temperature."""
 
 
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
 WORDS: dict[Quantity, frozenset[str]] = {
-    Quantity.POSITION: frozenset(
+    Quantity.POSITION: _words(
         "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
-        "travel coordinate jointpos rotation location place qm".split()
+        "travel coordinate jointpos rotation location place qm"
     ),
-    Quantity.VELOCITY: frozenset(
-        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm "
-        "jointvel".split()
+    Quantity.VELOCITY: _words(
+        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm jointvel"
     ),
-    Quantity.FORCE: frozenset(
-        "tau torque torques force forces effort efforts trq tq frc moment loadcell".split()
+    Quantity.FORCE: _words(
+        "tau torque torques force forces effort efforts trq tq frc moment loadcell"
     ),
-    Quantity.CURRENT: frozenset("current currents cur curr amps amperage".split()),
-    Quantity.OTHER: frozenset(
+    Quantity.CURRENT: _words("current currents cur curr amps amperage"),
+    Quantity.OTHER: _words(
         "acc accel acceleration ddq qdd qacc temp temperature voltage volt volts error err status "
-        "mode flag index episode frame task imu gyro quat id seq count".split()
+        "mode flag index episode frame task imu gyro quat id seq count"
     ),
 }
 """Quantity → words that name it."""
-COMMANDED = frozenset(
+COMMANDED = _words(
     "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
-    "set qref qdes qcmd action actions demand demanded ctrl control u sp input".split()
+    "set qref qdes qcmd action actions demand demanded ctrl control u sp input"
 )
 """Words that say that a column was commanded and not measured."""
-MEASURED = frozenset(
+MEASURED = _words(
     "measured meas actual act present read reading feedback fb observation obs state real data "
-    "raw value joint joints motor actuator servo axis link j m sensor of the".split()
+    "raw value states joint joints motor actuator servo axis link j m sensor of the"
 )
 """Words that say nothing more."""
 UNIT_WORDS = {
@@ -73,7 +76,7 @@ UNIT_WORDS = {
     "rps": "rev/s",
 }
 """Word in a column's name → unit that it states."""
-TIME = frozenset("t time timestamp timestamps stamp clock elapsed seconds secs sec".split())
+TIME = _words("t time timestamp timestamps stamp clock elapsed seconds secs sec")
 """Words that name the time."""
 TIME_UNITS = {
     "s": "s",

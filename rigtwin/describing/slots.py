@@ -83,4 +83,6 @@ class Slots:
 
     def _is_si(self, column: str, quantity: Quantity) -> bool:
         unit = self._columns.units.get(column, "")
-        return is_unit(unit) and unit_of(unit)[0] in SI.get(quantity, ()) and unit_of(unit)[1] == 1.0
+        return (
+            is_unit(unit) and unit_of(unit)[0] in SI.get(quantity, ()) and unit_of(unit)[1] == 1.0
+        )

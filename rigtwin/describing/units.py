@@ -11,7 +11,7 @@ import numpy as np
 
 from rigtwin.describing.heading import split_words, stated_unit
 from rigtwin.describing.quantity import SI, Quantity
-from rigtwin.describing.question import ask, enumerate_names, option
+from rigtwin.describing.question import ask, option
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
@@ -166,7 +166,7 @@ def _common_unit(
     si, small = ("rad", "deg") if turns else ("m", "mm")
     worst = {joint: _extremes(columns.values[positions[joint]]) for joint in joints}
     largest = max(max(abs(low), abs(high)) for low, high in worst.values())
-    answers = [option(f"*.position", f"[{unit}]") for unit in (si, small)]
+    answers = [option("*.position", f"[{unit}]") for unit in (si, small)]
     beyond = next((j for j in joints if not _within(mechanism, j, worst[j], 1.0, turns)), None)
     percent = largest <= LARGEST_PERCENT and all(
         split_words(positions[j])[-1] == "pos" and "." in positions[j] for j in joints
@@ -195,8 +195,7 @@ def _common_unit(
         raise ask(f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers)
     if not turns and not _limited(mechanism, beyond) and largest < SURELY_MILLIMETRES:
         raise ask(f"{reach}, and joint {beyond} has no range; are these m or mm?", *answers)
-    names = enumerate_names([j for j in joints if not _within(mechanism, j, worst[j], 1.0, turns)])
-    return Unit(small, f"{small} by its range (in {si} {names} would be out of reach)")
+    return Unit(small, f"{small} by its range, as {beyond} cannot be there in {si}")
 
 
 def _extremes(values: Array) -> tuple[float, float]:

@@ -9,7 +9,6 @@ from rigtwin.describing.formulas import read_formula
 from rigtwin.describing.quantity import Quantity
 from rigtwin.describing.reading import Reading
 from rigtwin.describing.signal import Signal
-from rigtwin.description.coupling import act_on_each_other
 from rigtwin.description.implied import (
     FORCES,
     INVERSE,
@@ -57,6 +56,7 @@ def write_description(
         Name of the log, for a comment.
     """
     kind = reading.kind
+    others = ", ".join(test for test in TESTS if test != kind.test)
     lines = [
         f"# {name}, described from its model and the log {log}. docs/machines.md lists all keys.",
         "",
@@ -67,19 +67,24 @@ def write_description(
         "",
         "[[replays]]",
         f"test = {_quote(kind.test)}      # {TESTS[kind.test]}",
-        f"# because {kind.why}; or one of: {', '.join(each for each in TESTS if each != kind.test)}",
+        f"# because {kind.why}; also possible: {others}",
     ]
     if list(reading.joints) != movable_joints(mechanism):
         lines.append(f"joints = [{', '.join(map(_quote, reading.joints))}]")
-    if kind.test == INVERSE and act_on_each_other(mechanism, reading.joints):
-        lines.append("# band = 20.0           # Hz; above it forces are ripple or noise")
+    if reading.band is not None:
+        lines.append(
+            f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"
+        )
     for joint in reading.idle:
         lines += [
             "",
             f"[components.{actuator_name(mechanism, joint)}]",
             "effects = []           # its command is 0 throughout",
         ]
-    lines += ["", "# Components follow from the test. A table of a component states what differs, e.g.:"]
+    lines += [
+        "",
+        "# Components follow from the test. A table of a component states what differs, e.g.:",
+    ]
     lines += _examples(mechanism, reading)
     return "\n".join(lines) + "\n"
 
@@ -87,13 +92,14 @@ def write_description(
 def _examples(mechanism: Mechanism, reading: Reading) -> list[str]:
     """Commented tables of components, of the first joint."""
     joint = reading.joints[0]
-    unit = "Nm" if mechanism.turns(joint) else "N"
+    turns = mechanism.turns(joint)
+    unit, damping = ("Nm", "Nms/rad") if turns else ("N", "Ns/m")
     lines = []
     if reading.kind.test == INVERSE:
         force = sensor_name(mechanism, joint, "force")
         lines += [
             f"# [components.{identifier(joint)}]",
-            f'# viscous = {{ value = 0.0, tolerance = 0.1 }}    # {unit}s/{"rad" if unit == "Nm" else "m"}',
+            f"# viscous = {{ value = 0.0, tolerance = 0.1 }}    # {damping}",
             f"# [components.{force}]",
             f"# white = 0.01           # {unit} rms, noise",
         ]
@@ -114,9 +120,7 @@ def _examples(mechanism: Mechanism, reading: Reading) -> list[str]:
     return lines
 
 
-def write_map(
-    mechanism: Mechanism, columns: Columns, reading: Reading, name: str, log: str
-) -> str:
+def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: str, log: str) -> str:
     """Return the text of the map of a log.
 
     Parameters
@@ -170,9 +174,7 @@ def _source(signal: Signal, columns: Columns) -> tuple[str, dict[str, str]]:
         stated = read_formula(signal.formula, columns.values)
         if stated.constant is not None:
             return f"{{ constant = {stated.constant!r} }}", {}
-        used = {
-            plain: f"{{ column = {_quote(column)} }}" for plain, column in stated.names.items()
-        }
+        used = {plain: f"{{ column = {_quote(column)} }}" for plain, column in stated.names.items()}
         return f"{{ formula = {_quote(stated.text)} }}", used
     keys = [f"column = {_quote(signal.column)}", f"unit = {_quote(signal.unit)}"]
     keys += ["sign = -1"] if signal.sign < 0.0 else []

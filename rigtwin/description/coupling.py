@@ -16,9 +16,9 @@ POSES, SHARE = 7, 1e-6
 def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     """Return whether any two of the joints act on each other.
 
-    The mass matrix M(q) is evaluated at several poses within the ranges of the joints. Joints i and j
-    act on each other where M_ij is not zero, or where the gravity load of i depends on the position
-    of j. Tendons and equalities that span two of the joints couple them too.
+    The mass matrix M(q) is evaluated at several poses within the ranges of the joints. Joints i and
+    j act on each other where M_ij is not zero, or where the gravity load of i depends on the
+    position of j. Tendons and equalities that span two of the joints couple them too.
 
     Parameters
     ----------

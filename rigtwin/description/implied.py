@@ -145,7 +145,9 @@ def _expand_replay(
         return
     unknown = [joint for joint in joints if joint not in known]
     if unknown:
-        mistakes.note(where, f"joints: {unknown[0]!r} is no hinge or slide; {near(unknown[0], known)}")
+        mistakes.note(
+            where, f"joints: {unknown[0]!r} is no hinge or slide; {near(unknown[0], known)}"
+        )
         return
     for key in ("moved_by", "observe", "free"):
         if key in table:
@@ -186,6 +188,7 @@ def _add_group(
             for joint, name in zip(joints, forces, strict=True):
                 add[identifier(joint)]["effects"] = RUBBING
                 add[name]["effects"] = ["gain"]
+            _add_tendons(mechanism, joints, add)
         else:
             _add_mass(mechanism, joints[0], add)
         implied.replays.append({**rest, "moved_by": positions, "observe": forces})
@@ -213,6 +216,16 @@ def _add_group(
 def _sensor(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:
     known = sensor_on(mechanism, joint, measured)
     return {"sensor": known} if known else {"joint": joint, "type": f"{measured} sensor"}
+
+
+def _add_tendons(
+    mechanism: Mechanism, joints: Sequence[str], add: dict[str, dict[str, Any]]
+) -> None:
+    """Add the fixed tendons along which joints rub together, such as those of a coupled wrist."""
+    for tendon in mechanism.names("tendon"):
+        along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
+        if along and set(along) <= set(joints):
+            add[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
 
 
 def _add_mass(mechanism: Mechanism, joint: str, add: dict[str, dict[str, Any]]) -> None:
