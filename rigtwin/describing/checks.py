@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from scipy.signal import butter, sosfiltfilt, welch
 
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.numerics.arrays import Array
@@ -101,6 +100,8 @@ def motion_band(time: Array, positions: Mapping[str, Array]) -> float:
     positions
         Joint → position, SI, shape (rows,).
     """
+    from scipy.signal import welch  # Late: it takes a second.
+
     step = float(np.median(np.diff(time)))
     ticks = np.arange(time[0], time[-1], step)
     frequencies = []
@@ -138,6 +139,8 @@ def force_slopes(
     dict
         Joint → regression; without joints whose regression is not possible.
     """
+    from scipy.signal import butter, sosfiltfilt  # Late, as above.
+
     ticks = np.linspace(time[0], time[-1], min(len(time), 20 * SAMPLES))
     step = float(ticks[1] - ticks[0])
     if len(ticks) < 200 or step <= 0.0:
@@ -170,7 +173,7 @@ def _inverse(
     model = mechanism.model
     data = mujoco.MjData(model)
     numbers = {joint: mechanism.number("joint", joint) for joint in places}
-    needed = {joint: np.zeros(len(rows)) for joint in places}
+    needed: dict[str, Array] = {joint: np.zeros(len(rows)) for joint in places}
     flags = int(model.opt.disableflags)
     model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     try:

@@ -103,7 +103,7 @@ def read_corrections(
         owner, dot, name = key.rpartition(".")
         if not dot or name not in KEYS:
             known = [TIME, *(f"JOINT.{each}" for each in KEYS)]
-            raise RigtwinError(f"{where}: {near(key, known)}")
+            raise RigtwinError(f"{where}: {key!r} cannot be stated; {near(key, known)}")
         quantity = KEYS[name]
         if owner == ANY:
             units[quantity] = _unit(where, text)
@@ -157,5 +157,5 @@ def _source(where: str, text: str, columns: Columns) -> Stated:
     else:
         return Stated("", body, unit, 1.0)
     if not any(name in body for name in columns.values):
-        raise RigtwinError(f"{where}: {near(body, columns.values)}")
+        raise RigtwinError(f"{where}: no column {body!r}; {near(body, columns.values)}")
     return Stated("", body, unit, 1.0)

@@ -42,7 +42,7 @@ class Implied:
     """Tables as they are implied. components: name → table; replays: their tables."""
 
     components: dict[str, dict[str, Any]] = field(default_factory=dict)
-    replays: list[dict[str, Any]] = field(default_factory=list)
+    replays: list[Mapping[str, Any]] = field(default_factory=list)
 
 
 def expand(
