@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from rigtwin.describing.clock import find_clock
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import (
     name_machine,
@@ -23,7 +24,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import keep_apart, write_whole
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.convert import read_channels, read_columns
-from rigtwin.importing.mapping import parse
+from rigtwin.importing.mapping import Map, parse
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
@@ -91,7 +92,10 @@ class Described:
             If the log lacks a column, or holds no numbers where they are needed.
         """
         files = tuple(log) or self.log
-        imported = read_channels(files, parse(self.mapping, "map"))
+        wanted, notes = parse(self.mapping, "map"), self.assumptions
+        if files != self.log:
+            wanted, notes = self._resampled(wanted, files)
+        imported = read_channels(files, wanted)
         columns: dict[str, dict[str, Array]] = {}
         for (topic, name), values in imported.channels.items():
             columns.setdefault(topic, {})[name] = values
@@ -103,8 +107,17 @@ class Described:
             time=np.arange(len(imported.time)) * imported.period,
             columns=columns,
             controller={},
-            notes=self.assumptions if files == self.log else (),
+            notes=notes,
         )
+
+    def _resampled(self, wanted: Map, log: Sequence[Path]) -> tuple[Map, tuple[str, ...]]:
+        """The map for another log, whose rows can be uneven in time; and a note if they are."""
+        clock = self.reading.clock
+        if not clock.column:
+            return wanted, ()
+        other = find_clock(read_columns(log), f"{clock.column} [{clock.unit}]")
+        note = f"rows are uneven in time; resampled to {other.resample or 0.0:g} s"
+        return replace(wanted, resample=other.resample), (note,) if other.resample else ()
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write the description and the map, files to be edited.
@@ -156,6 +169,7 @@ class Described:
             else [f"rows are uneven in time; resampled to {self.reading.clock.resample:g} s"]
         )
         lines += [f"  note: {note}" for note in (*notes, *self.reading.notes)]
+        lines += [f"  not taken into account: {line}" for line in self.machine.overlooked]
         return "\n".join(lines)
 
 

@@ -130,6 +130,14 @@ def _question(
             f"{enumerate_names(list(joints))}",
             *answers,
         )
+    pulling = [
+        a for a in mechanism.names("actuator") if mechanism.tendon_of("actuator", a) is not None
+    ]
+    if pulling and not measured:
+        return RigtwinError(
+            f"actuator {pulling[0]} pulls a tendon; such a machine needs a written description, "
+            "docs/machines.md, joints that are free"
+        )
     if commanded and not measured:
         missing = [j for j in commanded if actuator_on(mechanism, j) is None]
         if missing:
