@@ -114,7 +114,8 @@ def _by_alias(
         elif meaning.commanded:
             quantity = _commanded(quantity)
         elif quantity is None:
-            quantity = Quantity.POSITION
+            measured = alias.quantity not in (None, Quantity.COMMAND)
+            quantity = alias.quantity if measured else Quantity.POSITION
         if len(meaning.unknown) > len(alias.words):
             continue
         quality = (-len(meaning.unknown), len(alias.words), float(exact))

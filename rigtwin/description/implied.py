@@ -33,8 +33,13 @@ KEYS = ("test", "joints")
 """Keys of a replay whose components are implied."""
 RUBBING = ["coulomb", "viscous", "offset", "asymmetry", "stribeck", "load_friction", "drag"]
 """Effects at joints that act on each other and all move as measured."""
-FREE = ["coulomb", "viscous", "asymmetry", "drag", "offset", "stiffness"]
+FREE = {
+    FORCES: ["coulomb", "viscous", "offset", "stiffness"],
+    SERVOS: ["coulomb", "viscous", "offset"],
+}
 """Effects at joints that act on each other and are free to move: every one costs integrations."""
+FREE_SERVO = ["position_gain", "damping_gain", "delay", "lag"]
+"""Effects of servos that move such joints."""
 
 
 @dataclass
@@ -209,7 +214,9 @@ def _add_group(
     elif test in (SERVOS, FORCES):
         replay["free"] = list(joints)
         for joint in joints:
-            add[identifier(joint)]["effects"] = FREE
+            add[identifier(joint)]["effects"] = FREE[test]
+        for name in movers if test == SERVOS else ():
+            add[name]["effects"] = FREE_SERVO
     implied.replays.append(replay)
 
 
