@@ -64,7 +64,9 @@ NAMINGS = {
 
 
 @pytest.mark.parametrize("names", NAMINGS.values(), ids=list(NAMINGS))
-def test_joints_are_matched_by_many_namings(tmp_path: Path, motion: Columns, names: tuple[str]):
+def test_joints_are_matched_by_many_namings(
+    tmp_path: Path, motion: Columns, names: tuple[str, ...]
+):
     answer = described(tmp_path, renamed(motion, dict(zip(PLAIN, names, strict=True))))
     assert answer.reading.kind.test == "inverse dynamics"
     assert sources(answer) == {

@@ -9,7 +9,7 @@ import pytest
 
 import rigtwin
 from rigtwin.describing.matching import match_columns
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
@@ -162,7 +162,9 @@ def test_a_lerobot_row_is_matched(tmp_path: Path):
         Mechanism(write_arm(tmp_path, SERVOS)), columns, skipped=["timestamp"]
     )
     assert {(m.joint, m.quantity) for m in matches} == {
-        (joint, quantity) for joint in JOINTS for quantity in (Quantity.POSITION, Quantity.COMMAND)
+        (joint, quantity)
+        for joint in JOINTS
+        for quantity in (JointQuantity.POSITION, JointQuantity.COMMAND)
     }
     assert list(unused) == ["frame_index"]
 

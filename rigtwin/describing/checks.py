@@ -197,13 +197,13 @@ def _regress(measured: Array, needed: Array, speed: Array) -> Slope | None:
     if scale == 0.0 or np.std(measured) == 0.0 or np.std(needed) == 0.0:
         return None
     friction = np.column_stack([np.tanh(speed / (0.1 * scale)), speed / scale, np.ones(len(speed))])
-    left, model = (
+    residual, model = (
         values - friction @ np.linalg.lstsq(friction, values, rcond=None)[0]
         for values in (measured, needed)
     )
     power = float(model @ model)
     if power <= 1e-12 * float(needed @ needed):
         return None
-    slope = float(left @ model) / power
-    explained = slope**2 * power / max(float(left @ left), 1e-300)
+    slope = float(residual @ model) / power
+    explained = slope**2 * power / max(float(residual @ residual), 1e-300)
     return Slope(slope, min(explained, 1.0))

@@ -111,7 +111,7 @@ def _find_column(columns: Columns) -> str:
     if named:
         return named[0][1]
     raise ask(
-        "no column is named as the time; which is it, or what is the period of the rows in s?",
+        "no column is named as the time; which is it, or what is the period of the rows in s",
         option("time", "COLUMN"),
         option("time", "0.002"),
     )

@@ -8,9 +8,9 @@ from dataclasses import replace
 from rigtwin.describing.checks import follows
 from rigtwin.describing.force_signals import force_signal
 from rigtwin.describing.log import STATED, Log
-from rigtwin.describing.quantity import SI, Quantity
+from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, option
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, command_unit
 from rigtwin.description.implied import actuator_on
 from rigtwin.numerics.arrays import Array
@@ -19,7 +19,7 @@ OPPOSED = -0.5
 """Correlation of a command and a position below which the command's sign is turned."""
 
 
-def position_command(log: Log, joint: str, position: Array) -> Signal | None:
+def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
     """Return the command of a position actuator; None where a question is open.
 
     Parameters
@@ -32,18 +32,18 @@ def position_command(log: Log, joint: str, position: Array) -> Signal | None:
         Position of the joint, SI, shape (rows,).
     """
     key = f"{joint}.command"
-    if not log.slots.has(joint, Quantity.COMMAND):
+    if not log.slots.has(joint, JointQuantity.COMMAND):
         log.questions.append(
             f"no column is the command of joint {joint}; say {option(key, 'COLUMN')}"
         )
         return None
-    source = log.slots.stated(joint, Quantity.COMMAND)
+    source = log.slots.stated(joint, JointQuantity.COMMAND)
     if source is not None and (source.formula or source.unit):
-        return log.stated_signal(joint, Quantity.COMMAND)
+        return log.stated_signal(joint, JointQuantity.COMMAND)
     try:
-        column, why, sign = _source(log, joint, Quantity.COMMAND)
-        general = log.stated.units.get(Quantity.COMMAND)
-        si = SI[Quantity.POSITION][log.mechanism.turns(joint)]
+        column, why, sign = _source(log, joint, JointQuantity.COMMAND)
+        general = log.stated.units.get(JointQuantity.COMMAND)
+        si = SI[JointQuantity.POSITION][log.mechanism.turns(joint)]
         unit = (
             Unit(general)
             if general is not None
@@ -56,9 +56,9 @@ def position_command(log: Log, joint: str, position: Array) -> Signal | None:
     if source is None and follows(log.columns.values[column], position) < OPPOSED:
         sign = -1.0
         assumed.append("sign turned, as the position goes against it")
-    return Signal(
+    return LogSignal(
         joint=joint,
-        quantity=Quantity.COMMAND,
+        quantity=JointQuantity.COMMAND,
         column=column,
         formula="",
         unit=unit.name,
@@ -68,7 +68,7 @@ def position_command(log: Log, joint: str, position: Array) -> Signal | None:
     )
 
 
-def force_command(log: Log, joint: str, measured: Collection[str]) -> Signal | None:
+def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal | None:
     """Return the command of an actuator that pushes, as the actuator takes it.
 
     Parameters
@@ -80,11 +80,11 @@ def force_command(log: Log, joint: str, measured: Collection[str]) -> Signal | N
     measured
         Joints whose measured force can take the place of a command.
     """
-    for quantity in (Quantity.FORCE_COMMAND, Quantity.COMMAND):
+    for quantity in (JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND):
         if log.slots.has(joint, quantity):
             return _control(log, joint, quantity)
     if joint in measured and (signal := force_signal(log, joint)) is not None:
-        return replace(_as_control(log, signal), quantity=Quantity.FORCE_COMMAND)
+        return replace(_as_control(log, signal), quantity=JointQuantity.FORCE_COMMAND)
     log.questions.append(
         f"no column is the command of joint {joint}; say "
         f"{option(f'{joint}.command', 'COLUMN')} or {option(f'{joint}.command', '0')}"
@@ -92,7 +92,7 @@ def force_command(log: Log, joint: str, measured: Collection[str]) -> Signal | N
     return None
 
 
-def _source(log: Log, joint: str, quantity: Quantity) -> tuple[str, str, float]:
+def _source(log: Log, joint: str, quantity: JointQuantity) -> tuple[str, str, float]:
     """Column, reason and sign of a command."""
     source = log.slots.stated(joint, quantity)
     if source is not None:
@@ -101,7 +101,7 @@ def _source(log: Log, joint: str, quantity: Quantity) -> tuple[str, str, float]:
     return match.column, match.why, 1.0
 
 
-def _control(log: Log, joint: str, quantity: Quantity) -> Signal | None:
+def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
     """A command column: a force where its unit says so, else in the actuator's own unit."""
     source = log.slots.stated(joint, quantity)
     if source is not None and source.formula:
@@ -112,7 +112,7 @@ def _control(log: Log, joint: str, quantity: Quantity) -> Signal | None:
         log.questions.append(str(question))
         return None
     unit = (source.unit if source else "") or log.columns.units.get(column, "")
-    signal = Signal(
+    signal = LogSignal(
         joint=joint,
         quantity=quantity,
         column=column,
@@ -125,7 +125,7 @@ def _control(log: Log, joint: str, quantity: Quantity) -> Signal | None:
     return _as_control(log, signal)
 
 
-def _as_control(log: Log, signal: Signal) -> Signal:
+def _as_control(log: Log, signal: LogSignal) -> LogSignal:
     """A force as the control that makes the actuator give it."""
     constant = actuator_constant(log.mechanism, actuator_on(log.mechanism, signal.joint) or "")
     if constant in (0.0, 1.0) or signal.unit == "1" or signal.formula:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import near
@@ -20,13 +20,13 @@ TIME = "time"
 ANY = "*"
 """Stands for every joint: `*.position=[deg]` states the unit of all positions."""
 KEYS = {
-    "position": Quantity.POSITION,
-    "velocity": Quantity.VELOCITY,
-    "force": Quantity.FORCE,
-    "torque": Quantity.FORCE,
-    "command": Quantity.COMMAND,
+    "position": JointQuantity.POSITION,
+    "velocity": JointQuantity.VELOCITY,
+    "force": JointQuantity.FORCE,
+    "torque": JointQuantity.FORCE,
+    "command": JointQuantity.COMMAND,
 }
-Slot = tuple[str, Quantity]
+Slot = tuple[str, JointQuantity]
 """Joint and quantity."""
 
 
@@ -68,7 +68,7 @@ class Corrections:
 
     time: str = ""
     slots: Mapping[Slot, Stated] = field(default_factory=dict)
-    units: Mapping[Quantity, str] = field(default_factory=dict)
+    units: Mapping[JointQuantity, str] = field(default_factory=dict)
 
 
 def read_corrections(

@@ -43,7 +43,7 @@ class Described:
     machine
         The machine; its components follow from the model and the kind of the test.
     reading
-        What was concluded from the log.
+        Conclusions from the log.
     log
         Files of the log, put side by side.
     description
@@ -115,9 +115,9 @@ class Described:
         clock = self.reading.clock
         if not clock.column:
             return wanted, ()
-        other = find_clock(read_columns(log), f"{clock.column} [{clock.unit}]")
-        note = f"rows are uneven in time; resampled to {other.resample or 0.0:g} s"
-        return replace(wanted, resample=other.resample), (note,) if other.resample else ()
+        second = find_clock(read_columns(log), f"{clock.column} [{clock.unit}]")
+        note = f"rows are uneven in time; resampled to {second.resample or 0.0:g} s"
+        return replace(wanted, resample=second.resample), (note,) if second.resample else ()
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write the description and the map, files to be edited.
@@ -189,7 +189,7 @@ def describe_log(
     log
         Files of the log, put side by side row by row.
     stated
-        What the owner of the log states: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
+        Statements of the log's owner: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
     test
         Kind of the test; empty to conclude it.
 

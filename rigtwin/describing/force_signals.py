@@ -9,9 +9,9 @@ import numpy as np
 
 from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
 from rigtwin.describing.log import STATED, Log
-from rigtwin.describing.quantity import SI, Quantity
+from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.implied import actuator_on
 from rigtwin.numerics.arrays import Array
@@ -26,7 +26,7 @@ SUGGESTED = 3
 
 def force_signals(
     log: Log, positions: Mapping[str, Array]
-) -> tuple[dict[str, Signal], tuple[str, ...]]:
+) -> tuple[dict[str, LogSignal], tuple[str, ...]]:
     """Return the measured forces that have a sign, and the joints whose force is zero throughout.
 
     Parameters
@@ -36,10 +36,10 @@ def force_signals(
     positions
         Joint → position, SI, shape (rows,).
     """
-    forces: dict[str, Signal] = {}
+    forces: dict[str, LogSignal] = {}
     still: list[str] = []
     for joint in positions:
-        if not log.slots.has(joint, Quantity.FORCE):
+        if not log.slots.has(joint, JointQuantity.FORCE):
             continue
         signal = force_signal(log, joint)
         if signal is None:
@@ -59,7 +59,7 @@ def force_signals(
     return forces, tuple(still)
 
 
-def force_signal(log: Log, joint: str) -> Signal | None:
+def force_signal(log: Log, joint: str) -> LogSignal | None:
     """Return the force at a joint as the log has it; None where a question is open.
 
     Parameters
@@ -69,22 +69,22 @@ def force_signal(log: Log, joint: str) -> Signal | None:
     joint
         Joint whose force it offers.
     """
-    if log.slots.stated(joint, Quantity.FORCE) is not None:
-        return log.stated_signal(joint, Quantity.FORCE)
+    if log.slots.stated(joint, JointQuantity.FORCE) is not None:
+        return log.stated_signal(joint, JointQuantity.FORCE)
     try:
-        match = log.slots.match(joint, Quantity.FORCE)
+        match = log.slots.match(joint, JointQuantity.FORCE)
     except Question as question:
         log.questions.append(str(question))
         return None
-    general = log.stated.units.get(Quantity.FORCE)
+    general = log.stated.units.get(JointQuantity.FORCE)
     unit = (
         Unit(general)
         if general is not None
         else force_unit(log.mechanism, log.columns, match.column, joint)
     )
-    return Signal(
+    return LogSignal(
         joint=joint,
-        quantity=Quantity.FORCE,
+        quantity=JointQuantity.FORCE,
         column=match.column,
         formula="",
         unit=unit.name,
@@ -95,8 +95,8 @@ def force_signal(log: Log, joint: str) -> Signal | None:
 
 
 def check_forces(
-    log: Log, signals: Sequence[Signal], positions: Mapping[str, Array]
-) -> list[Signal]:
+    log: Log, signals: Sequence[LogSignal], positions: Mapping[str, Array]
+) -> list[LogSignal]:
     """Return signals with the signs of forces as the model's inverse dynamics have them.
 
     Parameters
@@ -108,12 +108,12 @@ def check_forces(
     positions
         Joint → position, SI, shape (rows,).
     """
-    values = {s.joint: log.values(s) for s in signals if s.quantity is not Quantity.POSITION}
+    values = {s.joint: log.values(s) for s in signals if s.quantity is not JointQuantity.POSITION}
     values = {joint: each for joint, each in values.items() if np.any(each)}
     slopes = force_slopes(log.mechanism, log.time(), positions, values)
     return [
         signal
-        if signal.quantity is Quantity.POSITION or signal.joint not in slopes
+        if signal.quantity is JointQuantity.POSITION or signal.joint not in slopes
         else _check_force(log, signal, slopes[signal.joint])
         for signal in signals
     ]
@@ -123,7 +123,7 @@ def suggest_forces(
     log: Log,
     joints: Sequence[str],
     positions: Mapping[str, Array],
-    forces: Mapping[str, Signal],
+    forces: Mapping[str, LogSignal],
 ) -> None:
     """Ask whether currents, or columns without a meaning, are the forces that are missing.
 
@@ -139,7 +139,7 @@ def suggest_forces(
         Forces that are known.
     """
     lacking = [joint for joint in joints if joint not in forces]
-    currents = {joint: log.slots.columns(joint, Quantity.CURRENT) for joint in lacking}
+    currents = {joint: log.slots.columns(joint, JointQuantity.CURRENT) for joint in lacking}
     offers = {joint: names for joint, names in currents.items() if names}
     if len(joints) == 1 and lacking and not offers:
         offers = {joints[0]: [name for name, why in log.unused.items() if "fits no joint" in why]}
@@ -149,7 +149,7 @@ def suggest_forces(
             slope = _slope(log, joint, positions, log.columns.values[name])
             if slope is not None and slope.explained > SHOWN:
                 factor = f"{1.0 / slope.slope:.4g}"
-                unit = SI[Quantity.FORCE][log.mechanism.turns(joint)]
+                unit = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
                 log.questions.append(
                     f"column {name!r} explains {100.0 * slope.explained:.0f} % of the force that "
                     f"the model needs at {joint}, with {factor} {unit} a unit: is it that force? "
@@ -168,7 +168,9 @@ def suggest_forces(
         )
 
 
-def _are_magnitudes(log: Log, forces: Mapping[str, Signal], positions: Mapping[str, Array]) -> bool:
+def _are_magnitudes(
+    log: Log, forces: Mapping[str, LogSignal], positions: Mapping[str, Array]
+) -> bool:
     """Whether the logger writes forces without their signs: all of them, if none is stated."""
     if any(signal.why == STATED for signal in forces.values()):
         return False
@@ -186,7 +188,7 @@ def _slope(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -
     return force_slopes(log.mechanism, log.time(), positions, {joint: force}).get(joint)
 
 
-def _check_force(log: Log, signal: Signal, slope: Slope) -> Signal:
+def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     """The signal with its sign checked; a question is added where its scale is in doubt."""
     stated = signal.why == STATED
     if slope.explained < SHOWN:
@@ -194,7 +196,7 @@ def _check_force(log: Log, signal: Signal, slope: Slope) -> Signal:
         text = f"sign and scale not confirmed: the model explains {share} of it"
         return replace(signal, assumed=(*signal.assumed, text))
     constant = 1.0
-    if signal.quantity is not Quantity.FORCE:
+    if signal.quantity is not JointQuantity.FORCE:
         actuator = actuator_on(log.mechanism, signal.joint) or ""
         constant = actuator_constant(log.mechanism, actuator) or 1.0
     ratio = slope.slope * constant

@@ -74,7 +74,7 @@ def formula_values(stated: ColumnFormula, columns: Columns, period: float, where
     period
         Period of the rows, s.
     where
-        What the formula stands for, for an error.
+        Name of the quantity, for an error.
     """
     if stated.constant is not None:
         return np.full(columns.rows, stated.constant)

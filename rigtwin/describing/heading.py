@@ -10,7 +10,7 @@ from rigtwin.describing.quantity import (
     MEASURED,
     UNIT_WORDS,
     WORDS,
-    Quantity,
+    JointQuantity,
     quantity_of_unit,
 )
 from rigtwin.errors import RigtwinError
@@ -19,11 +19,11 @@ from rigtwin.importing.units import unit_of
 GREEK = {"θ": "theta", "τ": "tau", "φ": "phi", "ω": "omega", "ϕ": "phi"}
 """Letters that columns are named by."""
 PRECEDENCE = (
-    Quantity.OTHER,
-    Quantity.CURRENT,
-    Quantity.FORCE,
-    Quantity.VELOCITY,
-    Quantity.POSITION,
+    JointQuantity.OTHER,
+    JointQuantity.CURRENT,
+    JointQuantity.FORCE,
+    JointQuantity.VELOCITY,
+    JointQuantity.POSITION,
 )
 """Order in which the words of quantities decide: a "position error" is no position."""
 
@@ -42,7 +42,7 @@ class Meaning:
         Words without a meaning here.
     """
 
-    quantity: Quantity | None
+    quantity: JointQuantity | None
     commanded: bool
     unknown: tuple[str, ...]
 
@@ -77,9 +77,9 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     commanded = any(word in COMMANDED for word in words)
     quantity = None
     if "dot" in words:
-        quantity = Quantity.VELOCITY
+        quantity = JointQuantity.VELOCITY
     elif "ddot" in words:
-        quantity = Quantity.OTHER
+        quantity = JointQuantity.OTHER
     else:
         quantity = next((q for q in PRECEDENCE if WORDS[q] & set(words)), None)
     if quantity is None:
@@ -101,7 +101,7 @@ def stated_unit(words: tuple[str, ...]) -> str:
     return next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), "")
 
 
-def _quantity_by_unit(words: tuple[str, ...], unit: str) -> Quantity | None:
+def _quantity_by_unit(words: tuple[str, ...], unit: str) -> JointQuantity | None:
     text = unit or stated_unit(words)
     if not text:
         return None

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rigtwin.describing.heading import split_words
-from rigtwin.describing.quantity import COMMANDED, MEASURED, WORDS, Quantity
+from rigtwin.describing.quantity import COMMANDED, MEASURED, WORDS, JointQuantity
 from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
 
 QUANTITY_WORDS = frozenset().union(*WORDS.values())
 MEASURES = {
-    "position": Quantity.POSITION,
-    "velocity": Quantity.VELOCITY,
-    "force": Quantity.FORCE,
+    "position": JointQuantity.POSITION,
+    "velocity": JointQuantity.VELOCITY,
+    "force": JointQuantity.FORCE,
 }
 """Measure of an MJCF's sensor → quantity."""
 
@@ -36,7 +36,7 @@ class Alias:
 
     joint: str
     words: tuple[str, ...]
-    quantity: Quantity | None
+    quantity: JointQuantity | None
     name: str
 
 
@@ -52,9 +52,9 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         The compiled MJCF or URDF.
     """
     joints = movable_joints(mechanism)
-    named: list[tuple[str, str, Quantity | None]] = [(joint, joint, None) for joint in joints]
+    named: list[tuple[str, str, JointQuantity | None]] = [(joint, joint, None) for joint in joints]
     for actuator in mechanism.names("actuator"):
-        named.append((mechanism.joint_of("actuator", actuator), actuator, Quantity.COMMAND))
+        named.append((mechanism.joint_of("actuator", actuator), actuator, JointQuantity.COMMAND))
     for sensor in mechanism.names("sensor"):
         quantity = MEASURES.get(mechanism.measures(sensor))
         if quantity is not None:

@@ -9,8 +9,8 @@ import numpy as np
 from rigtwin.describing.clock import Clock
 from rigtwin.describing.corrections import Corrections
 from rigtwin.describing.formulas import formula_values, read_formula
-from rigtwin.describing.quantity import SI, Quantity
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.quantity import SI, JointQuantity
+from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -33,7 +33,7 @@ class Log:
     columns
         Columns of the log.
     stated
-        What the owner of the log states.
+        Statements of the log's owner.
     slots
         Columns that are offered for the joints.
     clock
@@ -67,7 +67,7 @@ class Log:
             return self.clock.period * np.arange(self.columns.rows)
         return unit_of(self.clock.unit)[1] * self.columns.values[self.clock.column]
 
-    def values(self, signal: Signal) -> Array:
+    def values(self, signal: LogSignal) -> Array:
         """Values of a signal in SI, shape (rows,); cells that hold no number are bridged."""
         period = self.clock.period if self.clock is not None else 1.0
         if signal.formula:
@@ -85,11 +85,11 @@ class Log:
             values = np.interp(rows, rows[known], values[known])
         return signal.sign * signal.scale * values
 
-    def stated_signal(self, joint: str, quantity: Quantity) -> Signal:
+    def stated_signal(self, joint: str, quantity: JointQuantity) -> LogSignal:
         """The signal of a slot whose source the owner of the log states."""
         source = self.slots.stated(joint, quantity)
         assert source is not None
-        si = SI[Quantity.POSITION if quantity is Quantity.COMMAND else quantity]
+        si = SI[JointQuantity.POSITION if quantity is JointQuantity.COMMAND else quantity]
         unit = source.unit or self.stated.units.get(quantity, "")
         assumed = ()
         if not unit and source.column:
@@ -97,7 +97,7 @@ class Log:
             if not unit:
                 unit = si[self.mechanism.turns(joint)]
                 assumed = (f"{unit}, as nothing states another unit",)
-        return Signal(
+        return LogSignal(
             joint=joint,
             quantity=quantity,
             column=source.column,

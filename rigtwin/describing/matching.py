@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
-from rigtwin.describing.quantity import MEASURED, Quantity
+from rigtwin.describing.quantity import MEASURED, JointQuantity
 from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
@@ -25,7 +25,7 @@ class Match:
     joint
         Name of the joint.
     quantity
-        What the column holds.
+        Quantity that the column holds.
     why
         Reason, for people.
     rank
@@ -34,7 +34,7 @@ class Match:
 
     column: str
     joint: str
-    quantity: Quantity
+    quantity: JointQuantity
     why: str
     rank: float
 
@@ -81,9 +81,9 @@ def match_columns(
         matches += matched
         unused |= {column: reason for column in family} if reason else {}
     for match in matches:
-        if match.quantity is Quantity.OTHER:
+        if match.quantity is JointQuantity.OTHER:
             unused[match.column] = "no test needs this quantity"
-    return [match for match in matches if match.quantity is not Quantity.OTHER], unused
+    return [match for match in matches if match.quantity is not JointQuantity.OTHER], unused
 
 
 def _distinct(columns: Columns) -> list[str]:
@@ -114,8 +114,9 @@ def _by_alias(
         elif meaning.commanded:
             quantity = _commanded(quantity)
         elif quantity is None:
-            measured = alias.quantity not in (None, Quantity.COMMAND)
-            quantity = alias.quantity if measured else Quantity.POSITION
+            quantity = alias.quantity or JointQuantity.POSITION
+            if quantity is JointQuantity.COMMAND:
+                quantity = JointQuantity.POSITION
         if len(meaning.unknown) > len(alias.words):
             continue
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
@@ -128,12 +129,12 @@ def _by_alias(
     return None if best is None or tied else best[1]
 
 
-def _commanded(quantity: Quantity | None) -> Quantity:
-    if quantity is Quantity.FORCE:
-        return Quantity.FORCE_COMMAND
-    if quantity in (None, Quantity.POSITION):
-        return Quantity.COMMAND
-    return Quantity.OTHER
+def _commanded(quantity: JointQuantity | None) -> JointQuantity:
+    if quantity is JointQuantity.FORCE:
+        return JointQuantity.FORCE_COMMAND
+    if quantity in (None, JointQuantity.POSITION):
+        return JointQuantity.COMMAND
+    return JointQuantity.OTHER
 
 
 def _place(inner: tuple[str, ...], outer: tuple[str, ...]) -> int | None:
@@ -176,7 +177,7 @@ def _by_number(
     meaning = read_words(rest, units.get(first, ""))
     quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
     if quantity is None and not meaning.unknown and set(rest) <= MEASURED:
-        quantity = Quantity.POSITION
+        quantity = JointQuantity.POSITION
     if quantity is None or len(meaning.unknown) > 1:
         return [], "its name fits no joint"
     if order is None:
@@ -195,9 +196,9 @@ def _number(words: Sequence[str]) -> int:
 
 def _order(numbers: Sequence[int], joints: Sequence[str]) -> dict[int, str] | None:
     """Number of a column → joint; None if there are not as many joints."""
-    own = [[int(w) for w in split_words(joint) if w.isdigit()] for joint in joints]
-    if all(len(each) == 1 for each in own):
-        by_name = {each[0]: joint for each, joint in zip(own, joints, strict=True)}
+    digits = [[int(w) for w in split_words(joint) if w.isdigit()] for joint in joints]
+    if all(len(each) == 1 for each in digits):
+        by_name = {each[0]: joint for each, joint in zip(digits, joints, strict=True)}
         if len(by_name) == len(joints) and set(numbers) <= set(by_name):
             return by_name
     if len(numbers) != len(joints) or list(numbers) not in (

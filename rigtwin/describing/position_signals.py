@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigtwin.describing.log import STATED, Log
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, position_units
 from rigtwin.description.implied import movable_joints
 from rigtwin.errors import RigtwinError
@@ -33,7 +33,7 @@ def ask_positions(log: Log) -> None:
     log.questions.append(str(question))
 
 
-def position_signals(log: Log, joints: Sequence[str]) -> dict[str, Signal] | None:
+def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | None:
     """Return the positions of joints; None where a question is open.
 
     Parameters
@@ -43,17 +43,17 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, Signal] | Non
     joints
         Joints whose position it offers.
     """
-    signals: dict[str, Signal] = {}
+    signals: dict[str, LogSignal] = {}
     matched: dict[str, tuple[str, float, str]] = {}
     for joint in joints:
-        source = log.slots.stated(joint, Quantity.POSITION)
+        source = log.slots.stated(joint, JointQuantity.POSITION)
         if source is not None and (source.formula or source.unit):
-            signals[joint] = log.stated_signal(joint, Quantity.POSITION)
+            signals[joint] = log.stated_signal(joint, JointQuantity.POSITION)
         elif source is not None:
             matched[joint] = source.column, source.sign, STATED
         else:
             try:
-                match = log.slots.match(joint, Quantity.POSITION)
+                match = log.slots.match(joint, JointQuantity.POSITION)
             except Question as question:
                 log.questions.append(str(question))
                 continue
@@ -62,9 +62,9 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, Signal] | Non
     if units is None or len(signals) + len(matched) < len(joints):
         return None
     for joint, (column, sign, why) in matched.items():
-        signals[joint] = Signal(
+        signals[joint] = LogSignal(
             joint=joint,
-            quantity=Quantity.POSITION,
+            quantity=JointQuantity.POSITION,
             column=column,
             formula="",
             unit=units[joint].name,
@@ -76,7 +76,7 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, Signal] | Non
 
 
 def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
-    general = log.stated.units.get(Quantity.POSITION)
+    general = log.stated.units.get(JointQuantity.POSITION)
     if general is not None:
         return dict.fromkeys(columns, Unit(general))
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 
-class Quantity(Enum):
+class JointQuantity(Enum):
     """Quantity of one joint, as a column can hold it."""
 
     POSITION = "position"
@@ -24,19 +24,19 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-WORDS: dict[Quantity, frozenset[str]] = {
-    Quantity.POSITION: _words(
+WORDS: dict[JointQuantity, frozenset[str]] = {
+    JointQuantity.POSITION: _words(
         "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
         "travel coordinate jointpos rotation location place qm"
     ),
-    Quantity.VELOCITY: _words(
+    JointQuantity.VELOCITY: _words(
         "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm jointvel"
     ),
-    Quantity.FORCE: _words(
+    JointQuantity.FORCE: _words(
         "tau torque torques force forces effort efforts trq tq frc moment loadcell"
     ),
-    Quantity.CURRENT: _words("current currents cur curr amps amperage"),
-    Quantity.OTHER: _words(
+    JointQuantity.CURRENT: _words("current currents cur curr amps amperage"),
+    JointQuantity.OTHER: _words(
         "acc accel acceleration ddq qdd qacc temp temperature voltage volt volts error err status "
         "mode flag index episode frame task imu gyro quat id seq count"
     ),
@@ -95,16 +95,16 @@ TIME_UNITS = {
 }
 """Word in the time column's name → unit that it states."""
 SI = {
-    Quantity.POSITION: ("m", "rad"),
-    Quantity.VELOCITY: ("m/s", "rad/s"),
-    Quantity.FORCE: ("N", "Nm"),
-    Quantity.FORCE_COMMAND: ("N", "Nm"),
-    Quantity.CURRENT: ("A", "A"),
+    JointQuantity.POSITION: ("m", "rad"),
+    JointQuantity.VELOCITY: ("m/s", "rad/s"),
+    JointQuantity.FORCE: ("N", "Nm"),
+    JointQuantity.FORCE_COMMAND: ("N", "Nm"),
+    JointQuantity.CURRENT: ("A", "A"),
 }
 """Quantity → SI unit where the joint slides, and where it turns."""
 
 
-def quantity_of_unit(unit: str) -> Quantity | None:
+def quantity_of_unit(unit: str) -> JointQuantity | None:
     """Return the quantity that an SI unit belongs to; None if it is no joint's.
 
     Parameters
@@ -112,7 +112,12 @@ def quantity_of_unit(unit: str) -> Quantity | None:
     unit
         SI unit, such as "rad".
     """
-    for quantity in (Quantity.POSITION, Quantity.VELOCITY, Quantity.FORCE, Quantity.CURRENT):
+    for quantity in (
+        JointQuantity.POSITION,
+        JointQuantity.VELOCITY,
+        JointQuantity.FORCE,
+        JointQuantity.CURRENT,
+    ):
         if unit in SI[quantity]:
             return quantity
     return None

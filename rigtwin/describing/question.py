@@ -20,7 +20,7 @@ def ask(problem: str, *answers: str) -> Question:
     Parameters
     ----------
     problem
-        What was found, and what is asked.
+        Problem and question, a sentence.
     *answers
         Options of the command line that answer it, one for each possible reading.
     """

@@ -16,10 +16,10 @@ from rigtwin.describing.formulas import read_formula
 from rigtwin.describing.log import Log
 from rigtwin.describing.matching import Match, match_columns
 from rigtwin.describing.position_signals import ask_positions, position_signals
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import act_on_each_other
 from rigtwin.description.implied import FORCES, INVERSE, actuator_on, movable_joints
@@ -55,7 +55,7 @@ class Reading:
     clock: Clock
     kind: ReplayKind
     joints: tuple[str, ...]
-    signals: tuple[Signal, ...]
+    signals: tuple[LogSignal, ...]
     unused: Mapping[str, str]
     notes: tuple[str, ...] = ()
     idle: tuple[str, ...] = ()
@@ -74,7 +74,7 @@ def read_log(
     columns
         Columns of the log.
     stated
-        What the owner of the log states, see `read_corrections`.
+        Statements of the log's owner, see `read_corrections`.
     test
         Kind of the test as the owner states it; empty to conclude it.
 
@@ -84,7 +84,7 @@ def read_log(
         If two readings are possible; all questions at once.
     """
     log, matches = _open(mechanism, columns, stated)
-    joints = log.slots.joints(Quantity.POSITION, movable_joints(mechanism))
+    joints = log.slots.joints(JointQuantity.POSITION, movable_joints(mechanism))
     if not joints:
         ask_positions(log)
         raise _all_questions(log, ())
@@ -92,32 +92,15 @@ def read_log(
     if positions is None:
         raise _all_questions(log, ())
     values = {joint: log.values(signal) for joint, signal in positions.items()}
-    forces, still = force_signals(log, values)
-    try:
-        kind = choose_kind(mechanism, log.slots, joints, list(forces), still, test)
-    except Question as question:
-        before = len(log.questions)
-        suggest_forces(log, joints, values, forces)
-        if len(log.questions) == before:
-            log.questions.append(str(question))
-        raise _all_questions(log, list(positions.values())) from None
-    movers = _movers(log, kind.test, values, forces, still)
-    if log.questions:
-        raise _all_questions(log, list(positions.values()))
-    signals = [*positions.values(), *movers.values()]
+    kind, movers = _choose_movers(log, test, list(positions.values()), values)
+    signals = [*positions.values(), *movers]
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
-        if log.questions:
-            raise _all_questions(log, signals)
-    assert log.clock is not None
+    if log.questions or log.clock is None:
+        raise _all_questions(log, signals)
+    _note_resting(log, joints)
+    idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
     band = _band(log, kind.test, values)
-    resting = [joint for joint in movable_joints(mechanism) if joint not in joints]
-    if resting:
-        log.notes.append(
-            f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
-            "has it"
-        )
-    idle = [signal.joint for signal in movers.values() if not np.any(log.values(signal))]
     return Reading(
         clock=log.clock,
         kind=kind,
@@ -128,6 +111,36 @@ def read_log(
         idle=tuple(idle) if kind.test == FORCES else (),
         band=band,
     )
+
+
+def _choose_movers(
+    log: Log, test: str, signals: Sequence[LogSignal], positions: Mapping[str, Array]
+) -> tuple[ReplayKind, list[LogSignal]]:
+    """The kind of the test, and the forces or commands that it needs."""
+    joints = list(positions)
+    forces, still = force_signals(log, positions)
+    try:
+        kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, test)
+    except Question as question:
+        before = len(log.questions)
+        suggest_forces(log, joints, positions, forces)
+        if len(log.questions) == before:
+            log.questions.append(str(question))
+        raise _all_questions(log, signals) from None
+    movers = _movers(log, kind.test, positions, forces, still)
+    if log.questions:
+        raise _all_questions(log, signals)
+    return kind, list(movers.values())
+
+
+def _note_resting(log: Log, joints: Sequence[str]) -> None:
+    """Note the joints whose position no column holds."""
+    resting = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
+    if resting:
+        log.notes.append(
+            f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
+            "has it"
+        )
 
 
 def _open(
@@ -147,7 +160,7 @@ def _open(
     return log, matches
 
 
-def _all_questions(log: Log, signals: Sequence[Signal]) -> Question:
+def _all_questions(log: Log, signals: Sequence[LogSignal]) -> Question:
     """All open questions in one, with what was assumed so far."""
     text = "; and ".join(dict.fromkeys(log.questions))
     assumed = [f"{s.key} from {s.column}, {s.assumed[0]}" for s in signals if s.assumed]
@@ -158,13 +171,13 @@ def _movers(
     log: Log,
     test: str,
     positions: Mapping[str, Array],
-    forces: Mapping[str, Signal],
+    forces: Mapping[str, LogSignal],
     still: Sequence[str],
-) -> dict[str, Signal]:
+) -> dict[str, LogSignal]:
     """Forces or commands that the test needs, by joint."""
-    movers: dict[str, Signal] = {}
+    movers: dict[str, LogSignal] = {}
     for joint, position in positions.items():
-        mover: Signal | None = None
+        mover: LogSignal | None = None
         if test == INVERSE:
             mover = forces.get(joint)
             if mover is None:
@@ -191,7 +204,7 @@ def _band(log: Log, test: str, positions: Mapping[str, Array]) -> float | None:
     return band
 
 
-def _unused(log: Log, signals: Sequence[Signal], matches: Sequence[Match]) -> dict[str, str]:
+def _unused(log: Log, signals: Sequence[LogSignal], matches: Sequence[Match]) -> dict[str, str]:
     """Columns that are not used, and why."""
     used = {log.time_column}
     for signal in signals:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
 from rigtwin.description.implied import (
@@ -73,7 +73,7 @@ def choose_kind(
             raise RigtwinError(f"--test {stated}: {near(stated, TESTS)}")
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
-    commanded = slots.joints(Quantity.COMMAND, joints)
+    commanded = slots.joints(JointQuantity.COMMAND, joints)
     if len(measured) == len(joints):
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
@@ -86,7 +86,7 @@ def choose_kind(
         and (
             joint in measured
             or joint in still
-            or slots.has(joint, Quantity.FORCE_COMMAND)
+            or slots.has(joint, JointQuantity.FORCE_COMMAND)
             or (joint in commanded and joint not in positions)
         )
     ]

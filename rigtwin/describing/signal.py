@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 
 
 @dataclass(frozen=True)
-class Signal:
+class LogSignal:
     """Source of a quantity of a joint, and what was assumed about it.
 
     Parameters
@@ -16,7 +16,7 @@ class Signal:
     joint
         Name of the joint.
     quantity
-        What is read.
+        Quantity that is read.
     column
         Column of the log; empty where a formula gives the values.
     formula
@@ -37,7 +37,7 @@ class Signal:
     """
 
     joint: str
-    quantity: Quantity
+    quantity: JointQuantity
     column: str
     formula: str
     unit: str
@@ -51,7 +51,7 @@ class Signal:
     def key(self) -> str:
         """Name by which the signal can be corrected, such as elbow.position."""
         quantity = self.quantity
-        name = "command" if quantity is Quantity.FORCE_COMMAND else quantity.value
+        name = "command" if quantity is JointQuantity.FORCE_COMMAND else quantity.value
         return f"{self.joint}.{name}"
 
     @property

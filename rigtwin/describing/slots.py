@@ -8,7 +8,7 @@ import numpy as np
 
 from rigtwin.describing.corrections import Corrections, Slot, Stated
 from rigtwin.describing.matching import Match
-from rigtwin.describing.quantity import SI, Quantity
+from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
@@ -39,22 +39,22 @@ class Slots:
             if match.column not in used:
                 self._matches.setdefault((match.joint, match.quantity), []).append(match)
 
-    def has(self, joint: str, quantity: Quantity) -> bool:
+    def has(self, joint: str, quantity: JointQuantity) -> bool:
         """Whether the log offers a quantity of a joint."""
         stated = self._stated.slots.get((joint, quantity))
         if stated is not None:
             return bool(stated.column or stated.formula)
         return (joint, quantity) in self._matches
 
-    def joints(self, quantity: Quantity, among: Sequence[str]) -> list[str]:
+    def joints(self, quantity: JointQuantity, among: Sequence[str]) -> list[str]:
         """Joints among those named of which the log offers a quantity."""
         return [joint for joint in among if self.has(joint, quantity)]
 
-    def stated(self, joint: str, quantity: Quantity) -> Stated | None:
+    def stated(self, joint: str, quantity: JointQuantity) -> Stated | None:
         """Source that the owner of the log states; None without one."""
         return self._stated.slots.get((joint, quantity))
 
-    def match(self, joint: str, quantity: Quantity) -> Match:
+    def match(self, joint: str, quantity: JointQuantity) -> Match:
         """Return the column that was matched for a quantity of a joint.
 
         Raises
@@ -77,11 +77,11 @@ class Slots:
             *(option(key, name) for name in names[:3]),
         )
 
-    def columns(self, joint: str, quantity: Quantity) -> list[str]:
+    def columns(self, joint: str, quantity: JointQuantity) -> list[str]:
         """Columns that were matched for a quantity of a joint."""
         return [each.column for each in self._matches.get((joint, quantity), ())]
 
-    def _is_si(self, column: str, quantity: Quantity) -> bool:
+    def _is_si(self, column: str, quantity: JointQuantity) -> bool:
         unit = self._columns.units.get(column, "")
         return (
             is_unit(unit) and unit_of(unit)[0] in SI.get(quantity, ()) and unit_of(unit)[1] == 1.0

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from rigtwin.describing.heading import split_words, stated_unit
-from rigtwin.describing.quantity import SI, Quantity
+from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import ask, option
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
@@ -99,7 +99,7 @@ def position_units(
     open_joints: dict[bool, list[str]] = {True: [], False: []}
     for joint, column in positions.items():
         turns = mechanism.turns(joint)
-        known = known_unit(columns, column, SI[Quantity.POSITION][turns])
+        known = known_unit(columns, column, SI[JointQuantity.POSITION][turns])
         if known is not None:
             units[joint] = known
         else:
@@ -234,7 +234,7 @@ def force_unit(mechanism: Mechanism, columns: Columns, column: str, joint: str) 
     joint
         Joint that the force acts on.
     """
-    si = SI[Quantity.FORCE][mechanism.turns(joint)]
+    si = SI[JointQuantity.FORCE][mechanism.turns(joint)]
     return known_unit(columns, column, si) or Unit(si, f"{si}, as nothing states another unit")
 
 

@@ -6,9 +6,9 @@ import json
 from collections.abc import Sequence
 
 from rigtwin.describing.formulas import read_formula
-from rigtwin.describing.quantity import Quantity
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.reading import Reading
-from rigtwin.describing.signal import Signal
+from rigtwin.describing.signal import LogSignal
 from rigtwin.description.implied import (
     FORCES,
     INVERSE,
@@ -22,7 +22,7 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 
 
-def channel_of(mechanism: Mechanism, signal: Signal) -> str:
+def channel_of(mechanism: Mechanism, signal: LogSignal) -> str:
     """Return the channel that holds a signal in recordings.
 
     Parameters
@@ -30,9 +30,9 @@ def channel_of(mechanism: Mechanism, signal: Signal) -> str:
     mechanism
         The compiled MJCF or URDF.
     signal
-        Signal of a log.
+        LogSignal of a log.
     """
-    if signal.quantity in (Quantity.POSITION, Quantity.FORCE):
+    if signal.quantity in (JointQuantity.POSITION, JointQuantity.FORCE):
         return f"/sensor.{sensor_name(mechanism, signal.joint, signal.quantity.value)}"
     return f"/command.{actuator_name(mechanism, signal.joint)}"
 
@@ -47,7 +47,7 @@ def write_description(
     mechanism
         The compiled MJCF or URDF.
     reading
-        What was concluded from the log.
+        Conclusions from the log.
     name
         Name of the machine.
     model
@@ -56,7 +56,7 @@ def write_description(
         Name of the log, for a comment.
     """
     kind = reading.kind
-    others = ", ".join(test for test in TESTS if test != kind.test)
+    alternatives = ", ".join(test for test in TESTS if test != kind.test)
     lines = [
         f"# {name}, described from its model and the log {log}. docs/machines.md lists all keys.",
         "",
@@ -67,7 +67,7 @@ def write_description(
         "",
         "[[replays]]",
         f"test = {_quote(kind.test)}      # {TESTS[kind.test]}",
-        f"# because {kind.why}; also possible: {others}",
+        f"# because {kind.why}; also possible: {alternatives}",
     ]
     if list(reading.joints) != movable_joints(mechanism):
         lines.append(f"joints = [{', '.join(map(_quote, reading.joints))}]")
@@ -130,7 +130,7 @@ def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: st
     columns
         Columns of the log.
     reading
-        What was concluded from the log.
+        Conclusions from the log.
     name
         Name of the machine.
     log
@@ -168,7 +168,7 @@ def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: st
     return "\n".join(lines) + "\n"
 
 
-def _source(signal: Signal, columns: Columns) -> tuple[str, dict[str, str]]:
+def _source(signal: LogSignal, columns: Columns) -> tuple[str, dict[str, str]]:
     """The table of a channel, and the columns that its formula names."""
     if signal.formula:
         stated = read_formula(signal.formula, columns.values)
@@ -211,7 +211,7 @@ def table_rows(mechanism: Mechanism, reading: Reading) -> list[Sequence[str]]:
     mechanism
         The compiled MJCF or URDF.
     reading
-        What was concluded from the log.
+        Conclusions from the log.
     """
     clock = reading.clock
     rows: list[Sequence[str]] = [("what", "read from", "unit", "as channel", "because")]

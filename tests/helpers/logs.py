@@ -69,7 +69,7 @@ def arm_motion(coulomb: Mapping[str, float] = COULOMB) -> dict[str, Array]:
     noise = np.random.default_rng(3)
     torque += 0.02 * noise.standard_normal(torque.shape)
     place = np.round(place / 1e-5) * 1e-5
-    columns = {"time": time}
+    columns: dict[str, Array] = {"time": time}
     for number in range(2):
         columns[f"q{number + 1}"] = place[number]
         columns[f"dq{number + 1}"] = speed[number]
