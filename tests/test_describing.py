@@ -146,6 +146,24 @@ def test_a_log_without_a_time_asks_for_it_and_takes_a_period(tmp_path: Path, mot
     assert answer.record().period == PERIOD
 
 
+def test_several_runs_in_one_file_are_refused(tmp_path: Path, motion: Columns):
+    with pytest.raises(RigtwinError, match="goes back in row 1002; several runs"):
+        described(tmp_path, {**motion, "time": motion["time"] % (1001 * PERIOD)})
+
+
+def test_a_column_of_another_quantity_is_asked_about(tmp_path: Path, motion: Columns):
+    columns = {"time": motion["time"], "q1": motion["q1"], "q2": motion["q2"]}
+    columns |= {"tau1 [V]": motion["tau1"], "tau2 [V]": motion["tau2"]}
+    with pytest.raises(RigtwinError, match=r"'tau1' is in V, .* how much is one V\?"):
+        described(tmp_path, columns)
+
+
+def test_a_name_that_fits_two_joints_is_not_taken(tmp_path: Path, motion: Columns):
+    columns = {**motion, "shoulder_elbow": motion["q1"]}
+    answer = described(tmp_path, columns)
+    assert answer.reading.unused["shoulder_elbow"] == "its name fits joints shoulder, elbow alike"
+
+
 def test_uneven_rows_are_resampled_and_that_is_said(tmp_path: Path, motion: Columns):
     rows = np.delete(np.arange(len(motion["time"])), [300, 301, 302])
     answer = described(tmp_path, {name: values[rows] for name, values in motion.items()})

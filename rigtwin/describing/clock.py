@@ -95,12 +95,15 @@ def _split(stated: str) -> tuple[str, str]:
 
 
 def _find_column(columns: Columns) -> str:
-    named = []
+    named, falling = [], []
     for column, values in columns.values.items():
         words = split_words(column)
         telling = [word for word in words if word not in TIME_UNITS or word in TIME]
-        if telling and set(words) & TIME and _rises(values):
-            named.append((len(telling), column))
+        if telling and set(words) & TIME:
+            if _rises(values):
+                named.append((len(telling), column))
+            elif len(words) == len(telling) == 1:
+                falling.append(column)
     named.sort()
     if len(named) > 1 and named[0][0] == named[1][0]:
         names = [column for _, column in named]
@@ -110,6 +113,13 @@ def _find_column(columns: Columns) -> str:
         )
     if named:
         return named[0][1]
+    if falling:
+        steps = np.diff(columns.values[falling[0]])
+        row = int(np.argmax(steps < 0.0)) + 2
+        raise RigtwinError(
+            f"time column {falling[0]!r} goes back in row {row}; several runs in one file? "
+            "expected one run"
+        )
     raise ask(
         "no column is named as the time; which is it, or what is the period of the rows in s",
         option("time", "COLUMN"),

@@ -71,17 +71,17 @@ def force_signal(log: Log, joint: str) -> LogSignal | None:
     """
     if log.slots.stated(joint, JointQuantity.FORCE) is not None:
         return log.stated_signal(joint, JointQuantity.FORCE)
+    general = log.stated.units.get(JointQuantity.FORCE)
     try:
         match = log.slots.match(joint, JointQuantity.FORCE)
+        unit = (
+            Unit(general)
+            if general is not None
+            else force_unit(log.mechanism, log.columns, match.column, joint)
+        )
     except Question as question:
         log.questions.append(str(question))
         return None
-    general = log.stated.units.get(JointQuantity.FORCE)
-    unit = (
-        Unit(general)
-        if general is not None
-        else force_unit(log.mechanism, log.columns, match.column, joint)
-    )
     return LogSignal(
         joint=joint,
         quantity=JointQuantity.FORCE,

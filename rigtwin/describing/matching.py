@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
 from rigtwin.describing.quantity import MEASURED, JointQuantity
+from rigtwin.describing.question import enumerate_names
 from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
@@ -68,8 +69,12 @@ def match_columns(
         if column in skipped:
             continue
         words, unit = split_words(column), columns.units.get(column, "")
-        if (match := _by_alias(column, words, unit, aliases)) is not None:
-            matches.append(match)
+        named = _by_alias(column, words, unit, aliases)
+        if len(named) == 1:
+            matches += named
+        elif named:
+            owners = enumerate_names([match.joint for match in named])
+            unused[column] = f"its name fits joints {owners} alike"
         elif sum(word.isdigit() for word in words) == 1:
             numbered[column] = words
         elif len(joints) == 1 and (match := _alone(column, words, unit, joints[0])) is not None:
@@ -98,10 +103,11 @@ def _distinct(columns: Columns) -> list[str]:
 
 def _by_alias(
     column: str, words: tuple[str, ...], unit: str, aliases: Sequence[Alias]
-) -> Match | None:
-    """The best match by a name of a joint, an actuator or a sensor within the column's name."""
-    best: tuple[tuple[float, ...], Match] | None = None
-    tied = False
+) -> list[Match]:
+    """Best matches by a name of a joint, an actuator or a sensor within the column's name; several
+    of different joints where they are equally good."""
+    best: tuple[float, ...] = ()
+    matches: dict[str, Match] = {}
     for alias in aliases:
         at = _place(alias.words, words)
         exact = alias.words == words
@@ -122,11 +128,11 @@ def _by_alias(
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
         rank = 2.0 + exact - 0.1 * len(meaning.unknown)
         match = Match(column, alias.joint, quantity, f"named as {alias.name}", rank)
-        if best is None or quality > best[0]:
-            best, tied = (quality, match), False
-        elif quality == best[0] and match.joint != best[1].joint:
-            tied = True
-    return None if best is None or tied else best[1]
+        if quality > best:
+            best, matches = quality, {match.joint: match}
+        elif quality == best:
+            matches.setdefault(match.joint, match)
+    return list(matches.values())
 
 
 def _commanded(quantity: JointQuantity | None) -> JointQuantity:

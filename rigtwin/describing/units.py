@@ -52,7 +52,7 @@ class Unit:
         return unit_of(self.name)[1]
 
 
-def known_unit(columns: Columns, column: str, si: str) -> Unit | None:
+def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
     """Return the unit that the file or a column's name states; None if neither does.
 
     Parameters
@@ -62,11 +62,24 @@ def known_unit(columns: Columns, column: str, si: str) -> Unit | None:
     column
         Name of the column.
     si
-        SI unit of the quantity. Units of other quantities do not count.
+        SI unit of the quantity.
+    key
+        Name of the quantity, for a question.
+
+    Raises
+    ------
+    Question
+        If the file states the unit of another quantity.
     """
     written = columns.units.get(column, "")
-    if written and is_unit(written) and unit_of(written)[0] == si:
-        return Unit(written)
+    if written and is_unit(written) and unit_of(written)[0] != "1":
+        if unit_of(written)[0] == si:
+            return Unit(written)
+        raise ask(
+            f"column {column!r} is in {written}, and {key} is in {si}; how much is one {written}?",
+            option(key, f"FACTOR * {column}"),
+            option(key, "COLUMN"),
+        )
     word = stated_unit(split_words(column))
     if word and unit_of(word)[0] == si:
         return Unit(word, f"{word} by its name")
@@ -99,7 +112,7 @@ def position_units(
     open_joints: dict[bool, list[str]] = {True: [], False: []}
     for joint, column in positions.items():
         turns = mechanism.turns(joint)
-        known = known_unit(columns, column, SI[JointQuantity.POSITION][turns])
+        known = known_unit(columns, column, SI[JointQuantity.POSITION][turns], f"{joint}.position")
         if known is not None:
             units[joint] = known
         else:
@@ -132,7 +145,7 @@ def command_unit(columns: Columns, column: str, position: Array, si: str, key: s
     Question
         If no unit makes the strokes alike.
     """
-    known = known_unit(columns, column, si)
+    known = known_unit(columns, column, si, key)
     if known is not None:
         return known
     small = {"rad": "deg", "m": "mm"}[si]
@@ -235,7 +248,8 @@ def force_unit(mechanism: Mechanism, columns: Columns, column: str, joint: str) 
         Joint that the force acts on.
     """
     si = SI[JointQuantity.FORCE][mechanism.turns(joint)]
-    return known_unit(columns, column, si) or Unit(si, f"{si}, as nothing states another unit")
+    known = known_unit(columns, column, si, f"{joint}.force")
+    return known or Unit(si, f"{si}, as nothing states another unit")
 
 
 def actuator_constant(mechanism: Mechanism, actuator: str) -> float:
