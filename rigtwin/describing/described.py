@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.describing.clock import find_clock
+from rigtwin.describing.matching import NUMBERED
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import (
     name_machine,
@@ -70,11 +71,10 @@ class Described:
         if clock.resample is not None:
             lines.append(f"rows are uneven in time; resampled to {clock.resample:g} s")
         lines.append(f"test of {self.reading.kind.test}: {self.reading.kind.why}")
-        lines += [
-            f"{signal.key} from {signal.source}: {'; '.join(signal.assumed)}"
-            for signal in self.reading.signals
-            if signal.assumed
-        ]
+        for signal in self.reading.signals:
+            reasons = (signal.why,) if signal.why == NUMBERED else ()
+            if remarks := (*reasons, *signal.assumed):
+                lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
         return (*lines, *self.reading.notes)
 
     def record(self, log: Sequence[Path] = ()) -> Recording:

@@ -14,6 +14,9 @@ from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 
+NUMBERED = "numbered in the order of the model's joints"
+"""Reason of a match by number, which is an assumption."""
+
 
 @dataclass(frozen=True)
 class Match:
@@ -114,20 +117,21 @@ def _by_alias(
         if at is None or (not exact and alias.quantity and set(alias.words) <= QUANTITY_WORDS):
             continue  # A sensor that is named "force" is meant by "force" alone.
         meaning = read_words(words[:at] + words[at + len(alias.words) :], unit)
-        quantity = meaning.quantity
+        quantity, why = meaning.quantity, f"named as {alias.name}"
         if exact and alias.quantity is not None and not meaning.commanded:
             quantity = alias.quantity
         elif meaning.commanded:
             quantity = _commanded(quantity)
         elif quantity is None:
             quantity = alias.quantity or JointQuantity.POSITION
-            if quantity is JointQuantity.COMMAND:
+            if alias.quantity in (None, JointQuantity.COMMAND):
                 quantity = JointQuantity.POSITION
+                why += ", taken as the position"
         if len(meaning.unknown) > len(alias.words):
             continue
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
         rank = 2.0 + exact - 0.1 * len(meaning.unknown)
-        match = Match(column, alias.joint, quantity, f"named as {alias.name}", rank)
+        match = Match(column, alias.joint, quantity, why, rank)
         if quality > best:
             best, matches = quality, {match.joint: match}
         elif quality == best:
@@ -189,10 +193,9 @@ def _by_number(
     if order is None:
         listed = ", ".join(map(str, sorted(numbers.values())))
         return [], f"numbered {listed}, and the model has {len(joints)} joints"
-    why = "numbered in the order of the model's joints"
     rank = 1.0 - 0.1 * len(meaning.unknown)
     return [
-        Match(column, order[number], quantity, why, rank) for column, number in numbers.items()
+        Match(column, order[number], quantity, NUMBERED, rank) for column, number in numbers.items()
     ], ""
 
 

@@ -99,6 +99,8 @@ def read_log(
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
     _note_resting(log, joints)
+    if kind.test != INVERSE:
+        log.notes.append("positions have the signs of the log")
     idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
     band = _band(log, kind.test, values)
     return Reading(
