@@ -146,6 +146,20 @@ def test_a_log_without_a_time_asks_for_it_and_takes_a_period(tmp_path: Path, mot
     assert answer.record().period == PERIOD
 
 
+def test_a_log_that_says_nothing_is_refused_in_one_line(tmp_path: Path, motion: Columns):
+    short = {name: values[:3] for name, values in motion.items()}
+    with pytest.raises(RigtwinError, match="it has 3 rows; expected at least 50"):
+        described(tmp_path, short)
+    broken = {**motion, "time": motion["time"].copy()}
+    broken["time"][5] = np.nan
+    with pytest.raises(RigtwinError, match="time column 'time' is not a number in row 6"):
+        described(tmp_path, broken)
+    still = {name: np.full_like(values, 0.3) for name, values in motion.items()}
+    answer = described(tmp_path, {**still, "time": motion["time"]})
+    with pytest.raises(RigtwinError, match="it is a recording already"):
+        rigtwin.describe(tmp_path / "arm.xml", answer.record())  # type: ignore[arg-type]
+
+
 def test_several_runs_in_one_file_are_refused(tmp_path: Path, motion: Columns):
     with pytest.raises(RigtwinError, match="goes back in row 1002; several runs"):
         described(tmp_path, {**motion, "time": motion["time"] % (1001 * PERIOD)})

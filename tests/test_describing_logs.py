@@ -102,6 +102,8 @@ def test_an_arm_with_gears_is_asked_about_once_and_read_by_formulas():
     answer = rigtwin.describe(XML / "tx40.xml", log, columns=stated)
     assert answer.reading.kind.test == "inverse dynamics"
     assert answer.machine.components["wrist"].element == "tendon"
+    # A factor that the owner states is believed.
+    assert answer.machine.components["torque_1"].kinds == frozenset()
     beside = "+".join(map(str, log))
     assert rigtwin.describe(XML / "tx40.xml", beside, columns=stated).log == tuple(log)
 

@@ -71,7 +71,7 @@ def is_model(machine: object) -> bool:
     return isinstance(machine, str | Path) and Path(machine).suffix.lower() in MODELS
 
 
-def log_files(log: Log) -> tuple[Path, ...]:
+def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     """Return the files of a log.
 
     Parameters
@@ -79,6 +79,11 @@ def log_files(log: Log) -> tuple[Path, ...]:
     log
         A log, or several files of one.
     """
+    if isinstance(log, reader.Recording):
+        raise RigtwinError(
+            f"{log.path}: it is a recording already; expected a log beside a model, or a "
+            "description of its machine"
+        )
     if not isinstance(log, str | Path):
         return tuple(Path(each) for each in log)
     path = Path(log)
@@ -99,9 +104,4 @@ def record_log(described: Described, log: Log | reader.Recording) -> Recording:
     log
         A log with the same columns.
     """
-    if isinstance(log, reader.Recording):
-        raise RigtwinError(
-            f"{log.path}: it is a recording already; expected a log beside a model, or a "
-            "description of its machine"
-        )
     return faced(described.record(log_files(log)), described.machine)

@@ -102,16 +102,18 @@ def motion_band(time: Array, positions: Mapping[str, Array]) -> float:
     """
     from scipy.signal import welch  # Late: it takes a second.
 
-    step = float(np.median(np.diff(time)))
+    steps = np.diff(time)
+    step = float(np.median(steps[steps > 0.0]))
     ticks = np.arange(time[0], time[-1], step)
     frequencies = []
     for values in positions.values():
         speed = np.gradient(np.interp(ticks, time, values), step)
         length = min(len(speed), max(int(4.0 / step), 8))
         frequency, power = welch(speed, 1.0 / step, nperseg=length)
-        share = np.cumsum(power) / max(float(np.sum(power)), 1e-300)
-        frequencies.append(float(frequency[int(np.searchsorted(share, POWER))]))
-    band = HARMONICS * float(np.median(frequencies))
+        if np.sum(power) > 0.0:
+            share = np.cumsum(power) / np.sum(power)
+            frequencies.append(float(frequency[int(np.searchsorted(share, POWER))]))
+    band = HARMONICS * float(np.median(frequencies)) if frequencies else HIGHEST_BAND
     return float(f"{min(max(band, LOWEST_BAND), HIGHEST_BAND):.2g}")
 
 

@@ -77,6 +77,10 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
         raise RigtwinError(
             f"--column time={stated}: no column {column!r}; there are {', '.join(columns.values)}"
         )
+    broken = ~np.isfinite(columns.values[column])
+    if broken.any():
+        where = columns.wrong.get(column) or f"row {int(np.argmax(broken)) + 1}"
+        raise RigtwinError(f"time column {column!r} is not a number in {where}")
     steps = _steps(column, columns.values[column])
     unit, why, assumed = _unit(column, unit, columns, steps)
     factor = unit_of(unit)[1]
@@ -113,8 +117,8 @@ def _find_column(columns: Columns) -> str:
         )
     if named:
         return named[0][1]
-    if falling:
-        steps = np.diff(columns.values[falling[0]])
+    steps = np.diff(columns.values[falling[0]]) if falling else np.zeros(0)
+    if (steps < 0.0).any():
         row = int(np.argmax(steps < 0.0)) + 2
         raise RigtwinError(
             f"time column {falling[0]!r} goes back in row {row}; several runs in one file? "

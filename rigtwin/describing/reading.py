@@ -24,8 +24,12 @@ from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import act_on_each_other
 from rigtwin.description.implied import FORCES, INVERSE, actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
+from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
 from rigtwin.numerics.arrays import Array
+
+FEWEST = 50
+"""Rows of a log from which anything can be concluded."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,8 @@ def read_log(
     Question
         If two readings are possible; all questions at once.
     """
+    if columns.rows < FEWEST:
+        raise RigtwinError(f"it has {columns.rows} rows; expected at least {FEWEST}")
     log, matches = _open(mechanism, columns, stated)
     joints = log.slots.joints(JointQuantity.POSITION, movable_joints(mechanism))
     if not joints:

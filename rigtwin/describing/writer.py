@@ -75,12 +75,18 @@ def write_description(
         lines.append(
             f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"
         )
-    for joint in reading.idle:
-        lines += [
-            "",
-            f"[components.{actuator_name(mechanism, joint)}]",
-            "effects = []           # its command is 0 throughout",
-        ]
+    believed = [
+        f"{actuator_name(mechanism, joint)} = {{ effects = [] }}    # its command is 0 throughout"
+        for joint in reading.idle
+    ]
+    believed += [
+        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ effects = [] }}    "
+        "# its factor was stated"
+        for signal in reading.signals
+        if signal.quantity is JointQuantity.FORCE and signal.formula
+    ]
+    if believed:
+        lines += ["", "[components]", *believed]
     lines += [
         "",
         "# Components follow from the test. A table of a component states what differs, e.g.:",
