@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         serve_card,
         write_table,
     )
+    from rigtwin.api.describing import Described, describe
     from rigtwin.api.each import Answered, diagnose_each
     from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
@@ -92,6 +93,7 @@ __all__ = [
     "Changes",
     "Comparison",
     "Configuration",
+    "Described",
     "Diagnosis",
     "DryRun",
     "Effect",
@@ -120,6 +122,7 @@ __all__ = [
     "check_card",
     "compare",
     "compare_recordings",
+    "describe",
     "diagnose",
     "diagnose_each",
     "dry_run",
@@ -181,6 +184,7 @@ _MODULES = {
         "diagnose",
         "what_changed",
     ),
+    "describing": ("Described", "describe"),
     "each": ("Answered", "diagnose_each"),
     "card": (
         "ServedCard",

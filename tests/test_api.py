@@ -277,6 +277,7 @@ FUNCTIONS = {
     "watch": ("watch",),
     "export": ("Recording.export",),
     "import": ("import_data",),
+    "describe": ("describe",),
     "calibrate": ("calibrate",),
     "compare": ("compare", "compare_recordings"),
     "diagnose": ("diagnose", "Diagnosis.report"),

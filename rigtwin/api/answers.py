@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from rigtwin.api.describing import describe, is_model, record_log
 from rigtwin.api.machines import (
     Effects,
     Settings,
@@ -44,15 +45,19 @@ def diagnose(
     without: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     first_look: Callable[[FirstLook], object] = lambda _: None,
+    columns: Mapping[str, str] | None = None,
+    test: str = "",
 ) -> Diagnosis:
     """Says why recordings of one machine and its twin disagree.
 
     Parameters
     ----------
     recordings
-        One, or several that are explained together; or their paths.
+        One, or several that are explained together; or their paths. Logs of other programs where
+        `machine` is a model.
     machine
-        That they are of; by default the one that they name.
+        That they are of; by default the one that they name. An MJCF or URDF is described from the
+        first log, see `describe`; what was assumed is in the notes of the answer.
     held_out
         Recordings of the same machine that the correction is judged on and not fitted to.
     settings
@@ -64,6 +69,8 @@ def diagnose(
     first_look
         Called after a second or two with what the gap is and which effects may be behind it, while
         the judgement goes on.
+    columns, test
+        What a log does not state, see `describe`; for a machine that is a model.
 
     Returns
     -------
@@ -75,6 +82,16 @@ def diagnose(
     RigtwinError
         If the recordings' settings are unknown, or held-out data are not fit to be compared.
     """
+    if is_model(machine):
+        logs = _logs(recordings)
+        if not logs:
+            raise RigtwinError("no recording to diagnose")
+        described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
+        recordings = [record_log(described, log) for log in logs]
+        held_out = [record_log(described, log) for log in _logs(held_out)]
+        machine = described.machine
+    elif columns or test:
+        raise RigtwinError("columns and test describe a log; expected a model as the machine")
     several = list(_several(recordings))
     apart = list(_several(held_out))
     paths = [each.path.resolve() for each in (*several, *apart) if each.path.exists()]
@@ -220,6 +237,13 @@ def calibrate(recording: Recorded) -> Calibration:
             "reverses often, such as friction-road, without compensation"
         )
     return found
+
+
+def _logs(given: Recorded | Sequence[Recorded]) -> list[Recorded]:
+    """Logs, or recordings, as a list."""
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return list(given)
+    return [given]
 
 
 def _several(given: Recorded | Sequence[Recorded]) -> Iterator[reader.Recording]:

@@ -34,6 +34,7 @@ a first session:
 
 on the real rig: docs/rig.md
 your own machine: docs/tutorial.md
+a model and a log, nothing else: rigtwin diagnose log.csv --machine arm.xml, docs/your_robot.md
 """
 
 
@@ -49,6 +50,7 @@ COMMANDS = (
     "video",
     "export",
     "import",
+    "describe",
     "calibrate",
     "compare",
     "diagnose",

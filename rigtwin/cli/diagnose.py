@@ -6,25 +6,33 @@ import argparse
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rigtwin.cli.options import (
+    add_columns,
     add_json,
     add_machine,
     add_settings,
     add_workers,
+    columns_of,
     counting_bar,
     settings_of,
 )
 from rigtwin.console import writable, write_json
 
+if TYPE_CHECKING:
+    import rigtwin
+
 SUMMARY = "say why recordings of one machine and the twin disagree"
 MORE = """\
 Checks the data, fits every effect that the twin knows, and says which explains the gap, how sure
 that is, where it lies, and how far the gap shrinks on data that were not fitted; or that there is
-no gap, or none that it knows.
+no gap, or none that it knows. With a model (MJCF or URDF) as the machine, the recordings are logs
+of other programs; what is taken for what is printed first, and --column corrects it.
 
 examples:
   rigtwin diagnose rig.mcap --html report.html --save-twin calibrated.toml
+  rigtwin diagnose log.csv --machine arm.xml
   rigtwin diagnose monday.mcap tuesday.mcap --held-out wednesday.mcap
   rigtwin diagnose monday.mcap friday.mcap --changed
   rigtwin diagnose tests/*.mcap --each answers
@@ -89,6 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_workers(parser)
     add_machine(parser)
+    add_columns(parser)
     add_settings(parser)
 
 
@@ -120,8 +129,7 @@ def execute(parsed: argparse.Namespace) -> int:
             if out.suffix.lower() != ending:
                 raise RigtwinError(f"--{name} {out}: expected a name that ends in {ending}")
             find_browser()
-    recordings = [rigtwin.load(path, parsed.machine) for path in parsed.recordings]
-    held_out = [rigtwin.load(path, parsed.machine) for path in parsed.held_out]
+    recordings, held_out = _recordings(parsed)
     with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
 
         def progress(stage: str, steps: int) -> None:
@@ -170,6 +178,26 @@ def execute(parsed: argparse.Namespace) -> int:
         said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
     print("\n".join(said))
     return 1 if diagnosis.verdict == "unusable" else 0
+
+
+def _recordings(
+    parsed: argparse.Namespace,
+) -> tuple[list[rigtwin.Recording], list[rigtwin.Recording]]:
+    """Recordings that are diagnosed, and those held out; a model's logs are described first."""
+    import rigtwin
+    from rigtwin.api.describing import is_model, record_log
+    from rigtwin.errors import RigtwinError
+
+    stated = columns_of(parsed)
+    paths, apart = parsed.recordings, parsed.held_out
+    if not is_model(parsed.machine):
+        if stated or parsed.test:
+            raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
+        load = rigtwin.load
+        return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in apart]
+    described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
+    print(described, file=sys.stderr)
+    return [record_log(described, p) for p in paths], [record_log(described, p) for p in apart]
 
 
 def _diagnose_each(parsed: argparse.Namespace) -> int:

@@ -53,6 +53,37 @@ def add_machine(
     )
 
 
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--column",
+        action="append",
+        default=[],
+        metavar="KEY=SOURCE",
+        help="what a log does not state, e.g. elbow.position=q2, 'elbow.force=-tau2 [Nm]', "
+        "'*.position=[deg]', 'time=t [ms]', time=0.002",
+    )
+    parser.add_argument(
+        "--test",
+        default="",
+        metavar="KIND",
+        help="kind of the test: 'inverse dynamics', 'position commands', servos or "
+        "'force commands' (default: concluded from the log)",
+    )
+
+
+def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
+    """What --column states. Raises RigtwinError for a text without a source."""
+    from rigtwin.errors import RigtwinError
+
+    stated: dict[str, str] = {}
+    for text in parsed.column:
+        key, equals, source = text.partition("=")
+        if not equals or not key.strip():
+            raise RigtwinError(f"--column {text}: expected KEY=SOURCE, such as elbow.position=q2")
+        stated[key.strip()] = source.strip()
+    return stated
+
+
 def add_workers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",

@@ -29,6 +29,11 @@ def find(name: str) -> Machine:
     if name in shipped():
         return _load_once(shipped()[name])
     path = Path(name)
+    if path.suffix.lower() in (".xml", ".mjcf", ".urdf"):
+        raise RigtwinError(
+            f"{name}: it is a model without a description; rigtwin describe {name} --log LOG "
+            "--out FOLDER writes one, and rigtwin diagnose LOG takes a model as it is"
+        )
     if path.suffix == ".toml" or path.exists():
         return load(path)
     raise RigtwinError(

@@ -13,6 +13,7 @@ from controllers.formula import Formula, formula
 from rigtwin.components import Computer, Mains
 from rigtwin.description.component_tables import MOVING, NAME, Components
 from rigtwin.description.control import PYTHON, Channel, Control, FormulaControl
+from rigtwin.description.implied import expand
 from rigtwin.description.limits import read_limits
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
@@ -41,11 +42,28 @@ def load(path: Path) -> Machine:
 def examine(path: Path) -> tuple[Machine | None, list[str]]:
     """The machine of a description, and all mistakes in it, one line each; no machine if there are
     any."""
-    mistakes = Mistakes()
     try:
-        document = parse_toml(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
+    except ValueError as error:
+        return None, [f"it is not valid TOML: {error}"]
+    return examine_text(text, path)
+
+
+def examine_text(text: str, path: Path) -> tuple[Machine | None, list[str]]:
+    """Return the machine of a description in memory, and all mistakes in it, one line each.
+
+    Parameters
+    ----------
+    text
+        The description, TOML.
+    path
+        File that the description would be. Its model is looked for beside that file.
+    """
+    mistakes = Mistakes()
+    try:
+        document = parse_toml(text)
     except (ValueError, RecursionError) as error:
         return None, [f"it is not valid TOML: {error}"]
     reader = _Reader(path, document, mistakes)
@@ -79,6 +97,8 @@ class _Reader:
             else None
         )
         mechanism = self._mechanism(about)
+        if mechanism is not None:
+            self._document = expand(self._document, mechanism, self._mistakes)
         given = self._document.get("components")
         if not isinstance(given, Mapping) or not given:
             note(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +60,66 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     """
     recordable(keep_apart(out, *data, map_path))
     wanted = load(map_path)
+    imported = read_channels(data, wanted)
+    _write(out, wanted, imported.period, imported.channels)
+    count = len(imported.time)
+    return [
+        *imported.report,
+        f"{count} ticks of {imported.period:g} s for machine {wanted.machine} in {out}",
+    ]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Channels of a recording, read from another program's files.
+
+    Parameters
+    ----------
+    period
+        Period of the ticks, s.
+    time
+        s, shape (ticks,).
+    channels
+        (Topic, field) → values in SI, shape (ticks,).
+    report
+        What was found on the way, a line each.
+    """
+
+    period: float
+    time: Array
+    channels: Channels
+    report: tuple[str, ...]
+
+
+def read_columns(data: Sequence[Path]) -> Columns:
+    """Return the columns of files, put side by side row by row.
+
+    Parameters
+    ----------
+    data
+        Files of another program.
+    """
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one, they are told by it")
-    columns = join({path.stem: read(path) for path in data})
+    return join({path.stem: read(path) for path in data})
+
+
+def read_channels(data: Sequence[Path], wanted: Map) -> Imported:
+    """Return the channels that a map makes of another program's files.
+
+    Parameters
+    ----------
+    data
+        Files, put side by side row by row.
+    wanted
+        Which column is which channel.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the column, unit or line that is at fault.
+    """
+    columns = read_columns(data)
     said = ", ".join(map(str, data))
     report = [f"{said}: {columns.form}; {columns.rows} rows, columns {', '.join(columns.values)}"]
     report += columns.notes
@@ -95,9 +152,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
         raise RigtwinError(f"{said}: {error}") from None
     for channel, values in channels.items():
         report += [f"{'.'.join(channel)} {each}" for each in find_oddities(values, time - time[0])]
-    _write(out, wanted, period, channels)
-    report.append(f"{len(time)} ticks of {period:g} s for machine {wanted.machine} in {out}")
-    return report
+    return Imported(period, time, channels, tuple(report))
 
 
 def _inputs(wanted: Map, columns: Columns) -> dict[str, Column]:

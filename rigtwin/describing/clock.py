@@ -1,0 +1,166 @@
+"""The time of a log's rows: which column it is, in what unit, and whether its steps are even."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigtwin.describing.heading import split_words
+from rigtwin.describing.quantity import TIME, TIME_UNITS
+from rigtwin.describing.question import ask, enumerate_names, option
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.columns import Columns
+from rigtwin.importing.timing import JITTER, find_period
+from rigtwin.importing.units import unit_of
+from rigtwin.numerics.arrays import Array
+
+SLOWEST, FASTEST = 0.15, 1e-4
+"""s; steps of a log of a machine's motion are taken to lie between."""
+UNITS = ("s", "ms", "us", "ns")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time base of a log.
+
+    Parameters
+    ----------
+    column
+        Column of the time; empty where the period is stated instead.
+    unit
+        Unit of the column.
+    period
+        Typical step, s.
+    resample
+        Period to which uneven rows are resampled, s; None where the steps are even.
+    why
+        Reason for the column and its unit, for people.
+    assumed
+        Whether the unit or the column was concluded and not stated.
+    """
+
+    column: str
+    unit: str
+    period: float
+    resample: float | None
+    why: str
+    assumed: bool
+
+
+def find_clock(columns: Columns, stated: str = "") -> Clock:
+    """Return the time base of a log.
+
+    Parameters
+    ----------
+    columns
+        Columns of the log.
+    stated
+        Answer of the log's owner: a column, with its unit in brackets where the log does not
+        state it, or the period in s; empty if there was none.
+
+    Raises
+    ------
+    Question
+        If no column, or more than one, can be the time, or if two units are possible.
+    """
+    try:
+        period = float(stated)
+    except ValueError:
+        pass
+    else:
+        if not 1e-6 <= period <= 10.0:
+            raise RigtwinError(f"--column time={stated}: expected a period from 1e-6 to 10 s")
+        return Clock("", "s", period, None, "period as stated", False)
+    column, unit = _split(stated) if stated else (_find_column(columns), "")
+    if column not in columns.values:
+        raise RigtwinError(
+            f"--column time={stated}: no column {column!r}; there are {', '.join(columns.values)}"
+        )
+    broken = ~np.isfinite(columns.values[column])
+    if broken.any():
+        where = columns.wrong.get(column) or f"row {int(np.argmax(broken)) + 1}"
+        raise RigtwinError(f"time column {column!r} is not a number in {where}")
+    steps = _steps(column, columns.values[column])
+    unit, why, assumed = _unit(column, unit, columns, steps)
+    factor = unit_of(unit)[1]
+    time = factor * columns.values[column]
+    moving = np.concatenate([[True], np.diff(time) > 0.0])
+    period = find_period(time[moving])
+    uneven = np.abs(np.diff(time[moving]) - period) > JITTER * period
+    resample = float(f"{float(np.median(np.diff(time[moving]))):.3g}") if uneven.any() else None
+    return Clock(column, unit, period, resample, why, assumed)
+
+
+def _split(stated: str) -> tuple[str, str]:
+    """A column and its unit, which can stand in brackets behind it."""
+    column, bracket, unit = stated.partition("[")
+    return column.strip(), unit.rstrip("] ").strip() if bracket else ""
+
+
+def _find_column(columns: Columns) -> str:
+    named, falling = [], []
+    for column, values in columns.values.items():
+        words = split_words(column)
+        telling = [word for word in words if word not in TIME_UNITS or word in TIME]
+        if telling and set(words) & TIME:
+            if _rises(values):
+                named.append((len(telling), column))
+            elif len(words) == len(telling) == 1:
+                falling.append(column)
+    named.sort()
+    if len(named) > 1 and named[0][0] == named[1][0]:
+        names = [column for _, column in named]
+        raise ask(
+            f"columns {enumerate_names(names)} could be the time; which is it?",
+            *(option("time", name) for name in names[:3]),
+        )
+    if named:
+        return named[0][1]
+    steps = np.diff(columns.values[falling[0]]) if falling else np.zeros(0)
+    if (steps < 0.0).any():
+        row = int(np.argmax(steps < 0.0)) + 2
+        raise RigtwinError(
+            f"time column {falling[0]!r} goes back in row {row}; several runs in one file? "
+            "expected one run"
+        )
+    raise ask(
+        "no column is named as the time; which is it, or what is the period of the rows in s",
+        option("time", "COLUMN"),
+        option("time", "0.002"),
+    )
+
+
+def _rises(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return len(known) > 2 and bool(np.all(np.diff(known) >= 0.0)) and known[-1] > known[0]
+
+
+def _steps(column: str, values: Array) -> float:
+    """Typical step in the column's own unit."""
+    steps = np.diff(values[np.isfinite(values)])
+    steps = steps[steps > 0.0]
+    if not len(steps):
+        raise RigtwinError(f"time column {column!r} does not rise")
+    return float(np.median(steps))
+
+
+def _unit(column: str, unit: str, columns: Columns, step: float) -> tuple[str, str, bool]:
+    """Unit of the time column, the reason, and whether it was concluded."""
+    if unit:
+        if unit_of(unit)[0] != "s":
+            raise RigtwinError(f"--column time={column} [{unit}]: expected a unit of time")
+        return unit, "as stated", False
+    if column in columns.units:
+        return columns.units[column], "unit as the file says", False
+    words = [word for word in split_words(column) if word in TIME_UNITS]
+    if words and len(split_words(column)) > 1 and words[-1] != "sec":
+        return TIME_UNITS[words[-1]], "unit by the column's name", False
+    fits = [each for each in UNITS if FASTEST <= unit_of(each)[1] * step <= SLOWEST]
+    if len(fits) == 1:
+        seconds = unit_of(fits[0])[1] * step
+        return fits[0], f"unit by its step of {step:.4g}: a row every {seconds:.4g} s", True
+    raise ask(
+        f"time column {column!r} rises by {step:.4g} a row; in what unit is it?",
+        *(option("time", f"{column} [{each}]") for each in (fits or UNITS[:3])),
+    )

@@ -1,0 +1,137 @@
+"""The commands of the joints' actuators: positions, or forces."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from rigtwin.describing.checks import follows
+from rigtwin.describing.force_signals import force_signal
+from rigtwin.describing.log import STATED, Log
+from rigtwin.describing.quantity import SI, JointQuantity
+from rigtwin.describing.question import Question, option
+from rigtwin.describing.signal import LogSignal
+from rigtwin.describing.units import Unit, actuator_constant, command_unit
+from rigtwin.description.implied import actuator_on
+from rigtwin.numerics.arrays import Array
+
+OPPOSED = -0.5
+"""Correlation of a command and a position below which the command's sign is turned."""
+
+
+def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
+    """Return the command of a position actuator; None where a question is open.
+
+    Parameters
+    ----------
+    log
+        The log. Questions are added to it.
+    joint
+        Joint that the actuator moves.
+    position
+        Position of the joint, SI, shape (rows,).
+    """
+    key = f"{joint}.command"
+    if not log.slots.has(joint, JointQuantity.COMMAND):
+        log.questions.append(
+            f"no column is the command of joint {joint}; say {option(key, 'COLUMN')}"
+        )
+        return None
+    source = log.slots.stated(joint, JointQuantity.COMMAND)
+    if source is not None and (source.formula or source.unit):
+        return log.stated_signal(joint, JointQuantity.COMMAND)
+    try:
+        column, why, sign = _source(log, joint, JointQuantity.COMMAND)
+        general = log.stated.units.get(JointQuantity.COMMAND)
+        si = SI[JointQuantity.POSITION][log.mechanism.turns(joint)]
+        unit = (
+            Unit(general)
+            if general is not None
+            else command_unit(log.columns, column, position, si, key)
+        )
+    except Question as question:
+        log.questions.append(str(question))
+        return None
+    assumed = [unit.assumed] if unit.assumed else []
+    if source is None and follows(log.columns.values[column], position) < OPPOSED:
+        sign = -1.0
+        assumed.append("sign turned, as the position goes against it")
+    return LogSignal(
+        joint=joint,
+        quantity=JointQuantity.COMMAND,
+        column=column,
+        formula="",
+        unit=unit.name,
+        sign=sign,
+        why=why,
+        assumed=tuple(assumed),
+    )
+
+
+def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal | None:
+    """Return the command of an actuator that pushes, as the actuator takes it.
+
+    Parameters
+    ----------
+    log
+        The log. Questions are added to it.
+    joint
+        Joint that the actuator pushes.
+    measured
+        Joints whose measured force can take the place of a command.
+    """
+    for quantity in (JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND):
+        if log.slots.has(joint, quantity):
+            return _control(log, joint, quantity)
+    if joint in measured and (signal := force_signal(log, joint)) is not None:
+        return replace(_as_control(log, signal), quantity=JointQuantity.FORCE_COMMAND)
+    log.questions.append(
+        f"no column is the command of joint {joint}; say "
+        f"{option(f'{joint}.command', 'COLUMN')} or {option(f'{joint}.command', '0')}"
+    )
+    return None
+
+
+def _source(log: Log, joint: str, quantity: JointQuantity) -> tuple[str, str, float]:
+    """Column, reason and sign of a command."""
+    source = log.slots.stated(joint, quantity)
+    if source is not None:
+        return source.column, STATED, source.sign
+    match = log.slots.match(joint, quantity)
+    return match.column, match.why, 1.0
+
+
+def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
+    """A command column: a force where its unit says so, else in the actuator's own unit."""
+    source = log.slots.stated(joint, quantity)
+    if source is not None and source.formula:
+        return log.stated_signal(joint, quantity)
+    try:
+        column, why, sign = _source(log, joint, quantity)
+    except Question as question:
+        log.questions.append(str(question))
+        return None
+    unit = (source.unit if source else "") or log.columns.units.get(column, "")
+    signal = LogSignal(
+        joint=joint,
+        quantity=quantity,
+        column=column,
+        formula="",
+        unit=unit or "1",
+        sign=sign,
+        why=why,
+        assumed=() if unit else ("in the unit of the actuator's control",),
+    )
+    return _as_control(log, signal)
+
+
+def _as_control(log: Log, signal: LogSignal) -> LogSignal:
+    """A force as the control that makes the actuator give it."""
+    constant = actuator_constant(log.mechanism, actuator_on(log.mechanism, signal.joint) or "")
+    if constant in (0.0, 1.0) or signal.unit == "1" or signal.formula:
+        return signal
+    return replace(
+        signal,
+        scale=1.0 / constant,
+        assumed=(*signal.assumed, f"divided by the actuator's force of {constant:g} a unit"),
+    )

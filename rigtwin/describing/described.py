@@ -1,0 +1,228 @@
+"""A machine that is described from its model and a log, and the recordings that this makes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigtwin.describing.clock import find_clock
+from rigtwin.describing.matching import NUMBERED
+from rigtwin.describing.reading import Reading, read_log
+from rigtwin.describing.writer import (
+    name_machine,
+    table_rows,
+    write_description,
+    write_map,
+)
+from rigtwin.description.document import examine_text
+from rigtwin.description.machine import Machine
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart, write_whole
+from rigtwin.importing.columns import Columns
+from rigtwin.importing.convert import read_channels, read_columns
+from rigtwin.importing.mapping import Map, parse
+from rigtwin.numerics.arrays import Array
+from rigtwin.recording import Recording
+
+MODELS = (".xml", ".mjcf", ".urdf")
+"""Endings of models."""
+MAP = "map.toml"
+"""Name of the map's file beside a description."""
+
+
+@dataclass(frozen=True)
+class Described:
+    """Machine described from its model and a log.
+
+    Parameters
+    ----------
+    machine
+        The machine; its components follow from the model and the kind of the test.
+    reading
+        Conclusions from the log.
+    log
+        Files of the log, put side by side.
+    description
+        The description, TOML.
+    mapping
+        The map of the log, TOML.
+    rows
+        Table of what was taken for what, its head first.
+    """
+
+    machine: Machine
+    reading: Reading
+    log: tuple[Path, ...]
+    description: str = field(repr=False)
+    mapping: str = field(repr=False)
+    rows: tuple[Sequence[str], ...] = field(repr=False)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """Everything that neither the log nor its owner states, one a sentence."""
+        clock, lines = self.reading.clock, []
+        if clock.assumed:
+            lines.append(f"time from {clock.column}: {clock.why}")
+        if clock.resample is not None:
+            lines.append(f"rows are uneven in time; resampled to {clock.resample:g} s")
+        lines.append(f"test of {self.reading.kind.test}: {self.reading.kind.why}")
+        for signal in self.reading.signals:
+            reasons = (signal.why,) if signal.why == NUMBERED else ()
+            if remarks := (*reasons, *signal.assumed):
+                lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
+        return (*lines, *self.reading.notes)
+
+    def record(self, log: Sequence[Path] = ()) -> Recording:
+        """Return a log as a recording of the machine.
+
+        Parameters
+        ----------
+        log
+            Files of another log with the same columns, put side by side. Defaults to the log that
+            the machine was described from.
+
+        Raises
+        ------
+        RigtwinError
+            If the log lacks a column, or holds no numbers where they are needed.
+        """
+        files = tuple(log) or self.log
+        wanted, notes = parse(self.mapping, "map"), self.assumptions
+        if files != self.log:
+            wanted, notes = self._resampled(wanted, files)
+        imported = read_channels(files, wanted)
+        columns: dict[str, dict[str, Array]] = {}
+        for (topic, name), values in imported.channels.items():
+            columns.setdefault(topic, {})[name] = values
+        return Recording(
+            path=files[0],
+            machine=self.machine.name,
+            experiment=" ".join(path.stem for path in files),
+            period=imported.period,
+            time=np.arange(len(imported.time)) * imported.period,
+            columns=columns,
+            controller={},
+            notes=notes,
+        )
+
+    def _resampled(self, wanted: Map, log: Sequence[Path]) -> tuple[Map, tuple[str, ...]]:
+        """The map for another log, whose rows can be uneven in time; and a note if they are."""
+        clock = self.reading.clock
+        if not clock.column:
+            return wanted, ()
+        second = find_clock(read_columns(log), f"{clock.column} [{clock.unit}]")
+        note = f"rows are uneven in time; resampled to {second.resample or 0.0:g} s"
+        return replace(wanted, resample=second.resample), (note,) if second.resample else ()
+
+    def write(self, folder: str | Path) -> tuple[Path, Path]:
+        """Write the description and the map, files to be edited.
+
+        Parameters
+        ----------
+        folder
+            Folder of the files NAME.toml and map.toml; made if it does not exist.
+
+        Returns
+        -------
+        Path, Path
+            The description and the map.
+
+        Raises
+        ------
+        RigtwinError
+            If a file cannot be written, or exists.
+        """
+        place = Path(folder)
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RigtwinError(f"cannot write {place}: {error.strerror}") from None
+        paths = place / f"{self.machine.name}.toml", place / MAP
+        for path in paths:
+            if path.exists():
+                raise RigtwinError(f"{path} exists; choose another folder, or remove it first")
+            keep_apart(path, self.machine.model, *self.log)
+        model = os.path.relpath(self.machine.model, place)
+        first = f"model = {_quote(self.machine.model.name)}"
+        text = self.description.replace(first, f"model = {_quote(Path(model).as_posix())}", 1)
+        write_whole(paths[0], text)
+        write_whole(paths[1], self.mapping)
+        return paths
+
+    def __str__(self) -> str:
+        """The table of what was taken for what, and the assumptions about the test."""
+        kind = self.reading.kind
+        widths = [max(len(row[at]) for row in self.rows) for at in range(len(self.rows[0]))]
+        lines = [f"{self.machine.name}, {kind.test}: {kind.why}"]
+        lines += [
+            "  " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
+            for row in self.rows
+        ]
+        notes = (
+            []
+            if self.reading.clock.resample is None
+            else [f"rows are uneven in time; resampled to {self.reading.clock.resample:g} s"]
+        )
+        lines += [f"  note: {note}" for note in (*notes, *self.reading.notes)]
+        lines += [f"  not taken into account: {line}" for line in self.machine.overlooked]
+        return "\n".join(lines)
+
+
+def _quote(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def describe_log(
+    model: Path, log: Sequence[Path], stated: Mapping[str, str], test: str = ""
+) -> Described:
+    """Describe a machine from its model and a log.
+
+    Parameters
+    ----------
+    model
+        MJCF or URDF.
+    log
+        Files of the log, put side by side row by row.
+    stated
+        Statements of the log's owner: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
+    test
+        Kind of the test; empty to conclude it.
+
+    Raises
+    ------
+    Question
+        If two readings are possible, or something is missing.
+    RigtwinError
+        If the model or the log cannot be read.
+    """
+    mechanism = Mechanism(model)
+    columns: Columns = read_columns(log)
+    said = " + ".join(path.name for path in log)
+    try:
+        reading = read_log(mechanism, columns, stated, test)
+    except RigtwinError as error:
+        raise type(error)(f"{said}: {error}") from None
+    name = name_machine(_model_name(mechanism), model.stem)
+    description = write_description(mechanism, reading, name, model.name, said)
+    mapping = write_map(mechanism, columns, reading, name, said)
+    machine, mistakes = examine_text(description, model)
+    if machine is None:
+        raise RigtwinError(f"{model}: {mistakes[0]}")
+    return Described(
+        machine=machine,
+        reading=reading,
+        log=tuple(log),
+        description=description,
+        mapping=mapping,
+        rows=tuple(table_rows(mechanism, reading)),
+    )
+
+
+def _model_name(mechanism: Mechanism) -> str:
+    """Name that an MJCF states, the first of the model's names."""
+    return mechanism.model.names.split(b"\0", 1)[0].decode("utf-8", "replace")

@@ -1,0 +1,217 @@
+"""The measured forces at the joints, and whether they have a sign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
+from rigtwin.describing.log import STATED, Log
+from rigtwin.describing.quantity import SI, JointQuantity
+from rigtwin.describing.question import Question, ask, enumerate_names, option
+from rigtwin.describing.signal import LogSignal
+from rigtwin.describing.units import Unit, actuator_constant, force_unit
+from rigtwin.description.implied import actuator_on
+from rigtwin.numerics.arrays import Array
+
+SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
+"""Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
+SHOWN = 0.5
+"""Share of a force that the model must explain for its scale or sign to be judged."""
+SUGGESTED = 3
+"""Columns of one joint that a question offers."""
+
+
+def force_signals(
+    log: Log, positions: Mapping[str, Array]
+) -> tuple[dict[str, LogSignal], tuple[str, ...]]:
+    """Return the measured forces that have a sign, and the joints whose force is zero throughout.
+
+    Parameters
+    ----------
+    log
+        The log. Questions, notes and unused columns are added to it.
+    positions
+        Joint → position, SI, shape (rows,).
+    """
+    forces: dict[str, LogSignal] = {}
+    still: list[str] = []
+    for joint in positions:
+        if not log.slots.has(joint, JointQuantity.FORCE):
+            continue
+        signal = force_signal(log, joint)
+        if signal is None:
+            continue
+        if np.any(log.values(signal)):
+            forces[joint] = signal
+        else:
+            still.append(joint)
+    if _are_magnitudes(log, forces, positions):
+        names = [signal.column for signal in forces.values()]
+        log.unused |= dict.fromkeys(names, "a magnitude without a sign, not the force")
+        log.notes.append(
+            f"{enumerate_names(names)}: not used; they never change their sign and return to 0, so "
+            "they are magnitudes"
+        )
+        forces = {}
+    return forces, tuple(still)
+
+
+def force_signal(log: Log, joint: str) -> LogSignal | None:
+    """Return the force at a joint as the log has it; None where a question is open.
+
+    Parameters
+    ----------
+    log
+        The log.
+    joint
+        Joint whose force it offers.
+    """
+    if log.slots.stated(joint, JointQuantity.FORCE) is not None:
+        return log.stated_signal(joint, JointQuantity.FORCE)
+    general = log.stated.units.get(JointQuantity.FORCE)
+    try:
+        match = log.slots.match(joint, JointQuantity.FORCE)
+        unit = (
+            Unit(general)
+            if general is not None
+            else force_unit(log.mechanism, log.columns, match.column, joint)
+        )
+    except Question as question:
+        log.questions.append(str(question))
+        return None
+    return LogSignal(
+        joint=joint,
+        quantity=JointQuantity.FORCE,
+        column=match.column,
+        formula="",
+        unit=unit.name,
+        sign=1.0,
+        why=match.why,
+        assumed=(unit.assumed,) if unit.assumed else (),
+    )
+
+
+def check_forces(
+    log: Log, signals: Sequence[LogSignal], positions: Mapping[str, Array]
+) -> list[LogSignal]:
+    """Return signals with the signs of forces as the model's inverse dynamics have them.
+
+    Parameters
+    ----------
+    log
+        The log. Questions about units and gears are added to it.
+    signals
+        Signals of the recording.
+    positions
+        Joint → position, SI, shape (rows,).
+    """
+    values = {s.joint: log.values(s) for s in signals if s.quantity is not JointQuantity.POSITION}
+    values = {joint: each for joint, each in values.items() if np.any(each)}
+    slopes = force_slopes(log.mechanism, log.time(), positions, values)
+    return [
+        signal
+        if signal.quantity is JointQuantity.POSITION or signal.joint not in slopes
+        else _check_force(log, signal, slopes[signal.joint])
+        for signal in signals
+    ]
+
+
+def suggest_forces(
+    log: Log,
+    joints: Sequence[str],
+    positions: Mapping[str, Array],
+    forces: Mapping[str, LogSignal],
+) -> None:
+    """Ask whether currents, or columns without a meaning, are the forces that are missing.
+
+    Parameters
+    ----------
+    log
+        The log. Questions are added to it.
+    joints
+        Joints that take part.
+    positions
+        Joint → position, SI, shape (rows,).
+    forces
+        Forces that are known.
+    """
+    lacking = [joint for joint in joints if joint not in forces]
+    currents = {joint: log.slots.columns(joint, JointQuantity.CURRENT) for joint in lacking}
+    offers = {joint: names for joint, names in currents.items() if names}
+    if len(joints) == 1 and lacking and not offers:
+        offers = {joints[0]: [name for name, why in log.unused.items() if "fits no joint" in why]}
+    unclear: list[tuple[str, str]] = []
+    for joint, names in offers.items():
+        for name in names[:SUGGESTED]:
+            slope = _slope(log, joint, positions, log.columns.values[name])
+            if slope is not None and slope.explained > SHOWN:
+                factor = f"{1.0 / slope.slope:.4g}"
+                unit = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
+                log.questions.append(
+                    f"column {name!r} explains {100.0 * slope.explained:.0f} % of the force that "
+                    f"the model needs at {joint}, with {factor} {unit} a unit: is it that force? "
+                    f"then say {option(f'{joint}.force', f'{factor} * {name}')}, with the factor "
+                    "that you know"
+                )
+            elif currents[joint]:
+                unclear.append((joint, name))
+    if unclear:
+        joint, name = unclear[0]
+        names = enumerate_names([column for _, column in unclear])
+        log.questions.append(
+            f"{names} are currents; what force at the joint does one ampere make, behind the gear? "
+            f"say {option(f'{joint}.force', f'FACTOR * {name}')}"
+            + (", and the same of the others" if len(unclear) > 1 else "")
+        )
+
+
+def _are_magnitudes(
+    log: Log, forces: Mapping[str, LogSignal], positions: Mapping[str, Array]
+) -> bool:
+    """Whether the logger writes forces without their signs: all of them, if none is stated."""
+    if any(signal.why == STATED for signal in forces.values()):
+        return False
+    values = {joint: log.values(signal) for joint, signal in forces.items()}
+    if not values or not all(is_magnitude(v, positions[j]) for j, v in values.items()):
+        return False
+    slopes = [_slope(log, joint, positions, each) for joint, each in values.items()]
+    return all(slope is None or slope.explained < SHOWN for slope in slopes)
+
+
+def _slope(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -> Slope | None:
+    """Regression of a column on the force that the model needs; None where time is unknown."""
+    if log.clock is None or not np.isfinite(force).all() or len(force) != len(positions[joint]):
+        return None
+    return force_slopes(log.mechanism, log.time(), positions, {joint: force}).get(joint)
+
+
+def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
+    """The signal with its sign checked; a question is added where its scale is in doubt."""
+    stated = signal.why == STATED
+    if slope.explained < SHOWN:
+        share = f"{100.0 * slope.explained:.0f} %"
+        text = f"sign and scale not confirmed: the model explains {share} of it"
+        return replace(signal, assumed=(*signal.assumed, text))
+    constant = 1.0
+    if signal.quantity is not JointQuantity.FORCE:
+        actuator = actuator_on(log.mechanism, signal.joint) or ""
+        constant = actuator_constant(log.mechanism, actuator) or 1.0
+    ratio = slope.slope * constant
+    if not stated and not SLOPE_LOW < abs(ratio) < SLOPE_HIGH:
+        question = ask(
+            f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
+            f"{signal.joint}; is it in another unit, or before a gear?",
+            option(signal.key, f"{1.0 / ratio:.4g} * {signal.column}"),
+            option(signal.key, f"{signal.column} [{signal.unit}]") + " if it is right",
+        )
+        log.questions.append(str(question))
+    if ratio < 0.0 and not stated:
+        text = f"sign turned, as the model needs the opposite ({ratio:.2g} times the model's)"
+        return replace(signal, sign=-signal.sign, assumed=(*signal.assumed, text))
+    if ratio < 0.0:
+        log.notes.append(f"{signal.key}: the model needs the opposite sign")
+        return signal
+    return replace(signal, checked=f"confirmed by inverse dynamics ({ratio:.2g} times the model's)")

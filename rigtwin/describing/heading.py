@@ -1,0 +1,111 @@
+"""The name of a column, taken apart into words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from rigtwin.describing.quantity import (
+    COMMANDED,
+    MEASURED,
+    UNIT_WORDS,
+    WORDS,
+    JointQuantity,
+    quantity_of_unit,
+)
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.units import unit_of
+
+GREEK = {"θ": "theta", "τ": "tau", "φ": "phi", "ω": "omega", "ϕ": "phi"}
+"""Letters that columns are named by."""
+PRECEDENCE = (
+    JointQuantity.OTHER,
+    JointQuantity.CURRENT,
+    JointQuantity.FORCE,
+    JointQuantity.VELOCITY,
+    JointQuantity.POSITION,
+)
+"""Order in which the words of quantities decide: a "position error" is no position."""
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """Meaning of words of a heading that name no joint.
+
+    Parameters
+    ----------
+    quantity
+        Quantity that the words, or else the unit, state. None if they state none.
+    commanded
+        Whether the words say that the column was commanded.
+    unknown
+        Words without a meaning here.
+    """
+
+    quantity: JointQuantity | None
+    commanded: bool
+    unknown: tuple[str, ...]
+
+
+def split_words(name: str) -> tuple[str, ...]:
+    """Return the words and numbers of a name, in small letters.
+
+    Words end at signs, at a capital after a small letter, and between letters and digits:
+    `leftElbow.pos[3]` has the words left, elbow, pos, 3.
+
+    Parameters
+    ----------
+    name
+        Name of a column, joint, actuator or sensor.
+    """
+    for letter, word in GREEK.items():
+        name = name.replace(letter, f" {word} ")
+    name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
+    return tuple(re.findall(r"[a-z]+|\d+", name.lower()))
+
+
+def read_words(words: tuple[str, ...], unit: str) -> Meaning:
+    """Return what the words of a heading mean that name no joint.
+
+    Parameters
+    ----------
+    words
+        Words without those of a joint's name.
+    unit
+        Unit that the file states for the column; empty if it states none.
+    """
+    commanded = any(word in COMMANDED for word in words)
+    quantity = None
+    if "dot" in words:
+        quantity = JointQuantity.VELOCITY
+    elif "ddot" in words:
+        quantity = JointQuantity.OTHER
+    else:
+        quantity = next((q for q in PRECEDENCE if WORDS[q] & set(words)), None)
+    if quantity is None:
+        quantity = _quantity_by_unit(words, unit)
+    known = COMMANDED | MEASURED | frozenset(UNIT_WORDS) | {"dot", "ddot"}
+    known |= frozenset().union(*WORDS.values())
+    unknown = tuple(word for word in words if word not in known and not word.isdigit())
+    return Meaning(quantity, commanded, unknown)
+
+
+def stated_unit(words: tuple[str, ...]) -> str:
+    """Return the unit that a heading's words state; empty if they state none.
+
+    Parameters
+    ----------
+    words
+        All words of the heading.
+    """
+    return next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), "")
+
+
+def _quantity_by_unit(words: tuple[str, ...], unit: str) -> JointQuantity | None:
+    text = unit or stated_unit(words)
+    if not text:
+        return None
+    try:
+        return quantity_of_unit(unit_of(text)[0])
+    except RigtwinError:
+        return None

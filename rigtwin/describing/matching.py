@@ -1,0 +1,218 @@
+"""Which column of a log is which quantity of which joint, by the names of both."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rigtwin.describing.heading import read_words, split_words
+from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
+from rigtwin.describing.quantity import MEASURED, JointQuantity
+from rigtwin.describing.question import enumerate_names
+from rigtwin.description.implied import movable_joints
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.importing.columns import Columns
+
+NUMBERED = "numbered in the order of the model's joints"
+"""Reason of a match by number, which is an assumption."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Column that a quantity of a joint can be read from.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+    joint
+        Name of the joint.
+    quantity
+        Quantity that the column holds.
+    why
+        Reason, for people.
+    rank
+        Quality of the match; of two columns for one quantity the higher one is taken.
+    """
+
+    column: str
+    joint: str
+    quantity: JointQuantity
+    why: str
+    rank: float
+
+
+def match_columns(
+    mechanism: Mechanism, columns: Columns, skipped: Sequence[str] = ()
+) -> tuple[list[Match], dict[str, str]]:
+    """Match the columns of a log with the joints of a model.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    columns
+        Columns of the log.
+    skipped
+        Columns that are something else, such as the time.
+
+    Returns
+    -------
+    list of Match
+        One for each column that names a joint and a quantity.
+    dict
+        Every other column → why it is not used.
+    """
+    aliases, joints = list_aliases(mechanism), movable_joints(mechanism)
+    matches: list[Match] = []
+    unused: dict[str, str] = {}
+    numbered: dict[str, tuple[str, ...]] = {}
+    for column in _distinct(columns):
+        if column in skipped:
+            continue
+        words, unit = split_words(column), columns.units.get(column, "")
+        named = _by_alias(column, words, unit, aliases)
+        if len(named) == 1:
+            matches += named
+        elif named:
+            owners = enumerate_names([match.joint for match in named])
+            unused[column] = f"its name fits joints {owners} alike"
+        elif sum(word.isdigit() for word in words) == 1:
+            numbered[column] = words
+        elif len(joints) == 1 and (match := _alone(column, words, unit, joints[0])) is not None:
+            matches.append(match)
+        else:
+            unused[column] = "its name fits no joint"
+    for family in _families(numbered).values():
+        matched, reason = _by_number(family, numbered, columns.units, joints)
+        matches += matched
+        unused |= {column: reason for column in family} if reason else {}
+    for match in matches:
+        if match.quantity is JointQuantity.OTHER:
+            unused[match.column] = "no test needs this quantity"
+    return [match for match in matches if match.quantity is not JointQuantity.OTHER], unused
+
+
+def _distinct(columns: Columns) -> list[str]:
+    """Names of columns; of joined files that name a column twice, the longer name is left out."""
+    names: dict[int, str] = {}
+    for name, values in columns.values.items():
+        known = names.get(id(values))
+        if known is None or len(name) < len(known):
+            names[id(values)] = name
+    return [name for name in columns.values if name in set(names.values())]
+
+
+def _by_alias(
+    column: str, words: tuple[str, ...], unit: str, aliases: Sequence[Alias]
+) -> list[Match]:
+    """Best matches by a name of a joint, an actuator or a sensor within the column's name; several
+    of different joints where they are equally good."""
+    best: tuple[float, ...] = ()
+    matches: dict[str, Match] = {}
+    for alias in aliases:
+        at = _place(alias.words, words)
+        exact = alias.words == words
+        if at is None or (not exact and alias.quantity and set(alias.words) <= QUANTITY_WORDS):
+            continue  # A sensor that is named "force" is meant by "force" alone.
+        meaning = read_words(words[:at] + words[at + len(alias.words) :], unit)
+        quantity, why = meaning.quantity, f"named as {alias.name}"
+        if exact and alias.quantity is not None and not meaning.commanded:
+            quantity = alias.quantity
+        elif meaning.commanded:
+            quantity = _commanded(quantity)
+        elif quantity is None:
+            quantity = alias.quantity or JointQuantity.POSITION
+            if alias.quantity in (None, JointQuantity.COMMAND):
+                quantity = JointQuantity.POSITION
+                why += ", taken as the position"
+        if len(meaning.unknown) > len(alias.words):
+            continue
+        quality = (-len(meaning.unknown), len(alias.words), float(exact))
+        rank = 2.0 + exact - 0.1 * len(meaning.unknown)
+        match = Match(column, alias.joint, quantity, why, rank)
+        if quality > best:
+            best, matches = quality, {match.joint: match}
+        elif quality == best:
+            matches.setdefault(match.joint, match)
+    return list(matches.values())
+
+
+def _commanded(quantity: JointQuantity | None) -> JointQuantity:
+    if quantity is JointQuantity.FORCE:
+        return JointQuantity.FORCE_COMMAND
+    if quantity in (None, JointQuantity.POSITION):
+        return JointQuantity.COMMAND
+    return JointQuantity.OTHER
+
+
+def _place(inner: tuple[str, ...], outer: tuple[str, ...]) -> int | None:
+    """Where words stand together within others."""
+    for at in range(len(outer) - len(inner) + 1):
+        if outer[at : at + len(inner)] == inner:
+            return at
+    return None
+
+
+def _alone(column: str, words: tuple[str, ...], unit: str, joint: str) -> Match | None:
+    """A quantity without a joint's name, of a model with one joint."""
+    meaning = read_words(words, unit)
+    quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
+    if quantity is None:
+        return None
+    rank = 1.0 - 0.1 * len(meaning.unknown)
+    return Match(column, joint, quantity, "the model has one joint", rank)
+
+
+def _families(numbered: Mapping[str, tuple[str, ...]]) -> dict[str, list[str]]:
+    """Columns whose names differ by a number only."""
+    families: dict[str, list[str]] = {}
+    for column in numbered:
+        families.setdefault(re.sub(r"\d+", "#", column), []).append(column)
+    return families
+
+
+def _by_number(
+    family: Sequence[str],
+    numbered: Mapping[str, tuple[str, ...]],
+    units: Mapping[str, str],
+    joints: Sequence[str],
+) -> tuple[list[Match], str]:
+    """Columns numbered in the order of the joints, or as the joints' own names are."""
+    numbers = {column: _number(numbered[column]) for column in family}
+    order = _order(sorted(numbers.values()), joints)
+    first = family[0]
+    rest = tuple(word for word in numbered[first] if not word.isdigit())
+    meaning = read_words(rest, units.get(first, ""))
+    quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
+    if quantity is None and not meaning.unknown and set(rest) <= MEASURED:
+        quantity = JointQuantity.POSITION
+    if quantity is None or len(meaning.unknown) > 1:
+        return [], "its name fits no joint"
+    if order is None:
+        listed = ", ".join(map(str, sorted(numbers.values())))
+        return [], f"numbered {listed}, and the model has {len(joints)} joints"
+    rank = 1.0 - 0.1 * len(meaning.unknown)
+    return [
+        Match(column, order[number], quantity, NUMBERED, rank) for column, number in numbers.items()
+    ], ""
+
+
+def _number(words: Sequence[str]) -> int:
+    return next(int(word) for word in words if word.isdigit())
+
+
+def _order(numbers: Sequence[int], joints: Sequence[str]) -> dict[int, str] | None:
+    """Number of a column → joint; None if there are not as many joints."""
+    digits = [[int(w) for w in split_words(joint) if w.isdigit()] for joint in joints]
+    if all(len(each) == 1 for each in digits):
+        by_name = {each[0]: joint for each, joint in zip(digits, joints, strict=True)}
+        if len(by_name) == len(joints) and set(numbers) <= set(by_name):
+            return by_name
+    if len(numbers) != len(joints) or list(numbers) not in (
+        list(range(len(joints))),
+        list(range(1, len(joints) + 1)),
+    ):
+        return None
+    return dict(zip(numbers, joints, strict=True))

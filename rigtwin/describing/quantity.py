@@ -1,0 +1,123 @@
+"""Quantities that a column of a log can hold, and the words by which columns name them."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class JointQuantity(Enum):
+    """Quantity of one joint, as a column can hold it."""
+
+    POSITION = "position"
+    VELOCITY = "velocity"
+    FORCE = "force"
+    CURRENT = "current"
+    COMMAND = "command"
+    """Command of the joint's actuator: a position, or a force, as the actuator takes it."""
+    FORCE_COMMAND = "force command"
+    """Command that says itself that it is a force or a torque."""
+    OTHER = "other"
+    """Quantity that no test needs, such as an acceleration or a temperature."""
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+WORDS: dict[JointQuantity, frozenset[str]] = {
+    JointQuantity.POSITION: _words(
+        "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
+        "travel coordinate jointpos rotation location place qm"
+    ),
+    JointQuantity.VELOCITY: _words(
+        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm jointvel"
+    ),
+    JointQuantity.FORCE: _words(
+        "tau torque torques force forces effort efforts trq tq frc moment loadcell"
+    ),
+    JointQuantity.CURRENT: _words("current currents cur curr amps amperage"),
+    JointQuantity.OTHER: _words(
+        "acc accel acceleration ddq qdd qacc temp temperature voltage volt volts error err status "
+        "mode flag index episode frame task imu gyro quat id seq count"
+    ),
+}
+"""Quantity → words that name it."""
+COMMANDED = _words(
+    "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
+    "set qref qdes qcmd action actions demand demanded ctrl control u sp input"
+)
+"""Words that say that a column was commanded and not measured."""
+MEASURED = _words(
+    "measured meas actual act present read reading feedback fb observation obs state real data "
+    "raw value states joint joints motor actuator servo axis link j m sensor of the"
+)
+"""Words that say nothing more."""
+UNIT_WORDS = {
+    "deg": "deg",
+    "degs": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "rad": "rad",
+    "rads": "rad",
+    "radians": "rad",
+    "mrad": "mrad",
+    "mm": "mm",
+    "cm": "cm",
+    "meters": "m",
+    "metres": "m",
+    "nm": "Nm",
+    "mnm": "mNm",
+    "newton": "N",
+    "amp": "A",
+    "amps": "A",
+    "ma": "mA",
+    "rpm": "rpm",
+    "dps": "deg/s",
+    "rps": "rev/s",
+}
+"""Word in a column's name → unit that it states."""
+TIME = _words("t time timestamp timestamps stamp clock elapsed seconds secs sec")
+"""Words that name the time."""
+TIME_UNITS = {
+    "s": "s",
+    "sec": "s",
+    "secs": "s",
+    "seconds": "s",
+    "ms": "ms",
+    "msec": "ms",
+    "millis": "ms",
+    "us": "us",
+    "usec": "us",
+    "micros": "us",
+    "ns": "ns",
+    "nsec": "ns",
+    "nanos": "ns",
+}
+"""Word in the time column's name → unit that it states."""
+SI = {
+    JointQuantity.POSITION: ("m", "rad"),
+    JointQuantity.VELOCITY: ("m/s", "rad/s"),
+    JointQuantity.FORCE: ("N", "Nm"),
+    JointQuantity.FORCE_COMMAND: ("N", "Nm"),
+    JointQuantity.CURRENT: ("A", "A"),
+}
+"""Quantity → SI unit where the joint slides, and where it turns."""
+
+
+def quantity_of_unit(unit: str) -> JointQuantity | None:
+    """Return the quantity that an SI unit belongs to; None if it is no joint's.
+
+    Parameters
+    ----------
+    unit
+        SI unit, such as "rad".
+    """
+    for quantity in (
+        JointQuantity.POSITION,
+        JointQuantity.VELOCITY,
+        JointQuantity.FORCE,
+        JointQuantity.CURRENT,
+    ):
+        if unit in SI[quantity]:
+            return quantity
+    return None

@@ -1,0 +1,226 @@
+"""A log as it is read: its clock, the kind of its test, and which column is which signal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rigtwin.describing.checks import motion_band
+from rigtwin.describing.clock import Clock, find_clock
+from rigtwin.describing.command_signals import force_command, position_command
+from rigtwin.describing.corrections import read_corrections
+from rigtwin.describing.force_signals import check_forces, force_signals, suggest_forces
+from rigtwin.describing.formulas import read_formula
+from rigtwin.describing.log import Log
+from rigtwin.describing.matching import Match, match_columns
+from rigtwin.describing.position_signals import ask_positions, position_signals
+from rigtwin.describing.quantity import JointQuantity
+from rigtwin.describing.question import Question, enumerate_names, option
+from rigtwin.describing.replay_kind import ReplayKind, choose_kind
+from rigtwin.describing.signal import LogSignal
+from rigtwin.describing.slots import Slots
+from rigtwin.description.coupling import act_on_each_other
+from rigtwin.description.implied import FORCES, INVERSE, actuator_on, movable_joints
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.errors import RigtwinError
+from rigtwin.importing.columns import Columns
+from rigtwin.numerics.arrays import Array
+
+FEWEST = 50
+"""Rows of a log from which anything can be concluded."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Everything that was concluded from a log and a model.
+
+    Parameters
+    ----------
+    clock
+        Time base.
+    kind
+        Kind of the test.
+    joints
+        Joints that take part.
+    signals
+        Signals of the recording, with their sources.
+    unused
+        Column → why it is not used.
+    notes
+        Assumptions that belong to no single signal.
+    idle
+        Joints whose actuator does nothing throughout.
+    band
+        Frequency up to which forces are judged, Hz; None where all is judged.
+    """
+
+    clock: Clock
+    kind: ReplayKind
+    joints: tuple[str, ...]
+    signals: tuple[LogSignal, ...]
+    unused: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+    idle: tuple[str, ...] = ()
+    band: float | None = None
+
+
+def read_log(
+    mechanism: Mechanism, columns: Columns, stated: Mapping[str, str], test: str = ""
+) -> Reading:
+    """Conclude what the columns of a log are.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    columns
+        Columns of the log.
+    stated
+        Statements of the log's owner, see `read_corrections`.
+    test
+        Kind of the test as the owner states it; empty to conclude it.
+
+    Raises
+    ------
+    Question
+        If two readings are possible; all questions at once.
+    """
+    if columns.rows < FEWEST:
+        raise RigtwinError(f"it has {columns.rows} rows; expected at least {FEWEST}")
+    log, matches = _open(mechanism, columns, stated)
+    joints = log.slots.joints(JointQuantity.POSITION, movable_joints(mechanism))
+    if not joints:
+        ask_positions(log)
+        raise _all_questions(log, ())
+    positions = position_signals(log, joints)
+    if positions is None:
+        raise _all_questions(log, ())
+    values = {joint: log.values(signal) for joint, signal in positions.items()}
+    kind, movers = _choose_movers(log, test, list(positions.values()), values)
+    signals = [*positions.values(), *movers]
+    if kind.test in (INVERSE, FORCES):
+        signals = check_forces(log, signals, values)
+    if log.questions or log.clock is None:
+        raise _all_questions(log, signals)
+    _note_resting(log, joints)
+    if kind.test != INVERSE:
+        log.notes.append("positions have the signs of the log")
+    idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
+    band = _band(log, kind.test, values)
+    return Reading(
+        clock=log.clock,
+        kind=kind,
+        joints=tuple(joints),
+        signals=tuple(signals),
+        unused=_unused(log, signals, matches),
+        notes=tuple(log.notes),
+        idle=tuple(idle) if kind.test == FORCES else (),
+        band=band,
+    )
+
+
+def _choose_movers(
+    log: Log, test: str, signals: Sequence[LogSignal], positions: Mapping[str, Array]
+) -> tuple[ReplayKind, list[LogSignal]]:
+    """The kind of the test, and the forces or commands that it needs."""
+    joints = list(positions)
+    forces, still = force_signals(log, positions)
+    try:
+        kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, test)
+    except Question as question:
+        before = len(log.questions)
+        suggest_forces(log, joints, positions, forces)
+        if len(log.questions) == before:
+            log.questions.append(str(question))
+        raise _all_questions(log, signals) from None
+    movers = _movers(log, kind.test, positions, forces, still)
+    if log.questions:
+        raise _all_questions(log, signals)
+    return kind, list(movers.values())
+
+
+def _note_resting(log: Log, joints: Sequence[str]) -> None:
+    """Note the joints whose position no column holds."""
+    resting = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
+    if resting:
+        log.notes.append(
+            f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
+            "has it"
+        )
+
+
+def _open(
+    mechanism: Mechanism, columns: Columns, stated: Mapping[str, str]
+) -> tuple[Log, list[Match]]:
+    """The log with its clock and the columns that it offers; a question can be open."""
+    corrections = read_corrections(stated, mechanism, columns)
+    clock, questions = None, []
+    try:
+        clock = find_clock(columns, corrections.time)
+    except Question as question:
+        questions.append(str(question))
+    skipped = [clock.column] if clock is not None else []
+    matches, unused = match_columns(mechanism, columns, skipped)
+    slots = Slots(columns, matches, corrections)
+    log = Log(mechanism, columns, corrections, slots, clock, questions, unused=unused)
+    return log, matches
+
+
+def _all_questions(log: Log, signals: Sequence[LogSignal]) -> Question:
+    """All open questions in one, with what was assumed so far."""
+    text = "; and ".join(dict.fromkeys(log.questions))
+    assumed = [f"{s.key} from {s.column}, {s.assumed[0]}" for s in signals if s.assumed]
+    return Question(f"{text}; assumed so far: {enumerate_names(assumed, 2)}" if assumed else text)
+
+
+def _movers(
+    log: Log,
+    test: str,
+    positions: Mapping[str, Array],
+    forces: Mapping[str, LogSignal],
+    still: Sequence[str],
+) -> dict[str, LogSignal]:
+    """Forces or commands that the test needs, by joint."""
+    movers: dict[str, LogSignal] = {}
+    for joint, position in positions.items():
+        mover: LogSignal | None = None
+        if test == INVERSE:
+            mover = forces.get(joint)
+            if mover is None:
+                log.questions.append(
+                    f"no measured force of joint {joint}; say {option(f'{joint}.force', 'COLUMN')}"
+                )
+        elif actuator_on(log.mechanism, joint) is not None:
+            mover = (
+                force_command(log, joint, {*forces, *still})
+                if test == FORCES
+                else position_command(log, joint, position)
+            )
+        if mover is not None:
+            movers[joint] = mover
+    return movers
+
+
+def _band(log: Log, test: str, positions: Mapping[str, Array]) -> float | None:
+    """Frequency up to which forces are judged, of joints that are replayed together."""
+    if test != INVERSE or not act_on_each_other(log.mechanism, list(positions)):
+        return None
+    band = motion_band(log.time(), positions)
+    log.notes.append(f"forces are judged up to {band:g} Hz, by the motion of the joints")
+    return band
+
+
+def _unused(log: Log, signals: Sequence[LogSignal], matches: Sequence[Match]) -> dict[str, str]:
+    """Columns that are not used, and why."""
+    used = {log.time_column}
+    for signal in signals:
+        if signal.formula:
+            used |= set(read_formula(signal.formula, log.columns.values).names.values())
+        else:
+            used.add(signal.column)
+    unused = dict(log.unused)
+    for match in matches:
+        unused.setdefault(match.column, f"the test does not need the {match.quantity.value}")
+    return {column: why for column, why in unused.items() if column not in used}

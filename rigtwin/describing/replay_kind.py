@@ -1,0 +1,155 @@
+"""Which kind of test a log is of, by the quantities that it holds and by the model's actuators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rigtwin.describing.quantity import JointQuantity
+from rigtwin.describing.question import ask, enumerate_names, option
+from rigtwin.describing.slots import Slots
+from rigtwin.description.implied import (
+    FORCES,
+    INVERSE,
+    POSITIONS,
+    SERVOS,
+    TESTS,
+    actuator_on,
+)
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mistakes import near
+from rigtwin.errors import RigtwinError
+
+
+@dataclass(frozen=True)
+class ReplayKind:
+    """Kind of the test that a log is of.
+
+    Parameters
+    ----------
+    test
+        One of the kinds that a description knows.
+    why
+        Reason, for people.
+    """
+
+    test: str
+    why: str
+
+
+def choose_kind(
+    mechanism: Mechanism,
+    slots: Slots,
+    joints: Sequence[str],
+    measured: Sequence[str],
+    still: Sequence[str],
+    stated: str = "",
+) -> ReplayKind:
+    """Choose the kind of test.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    slots
+        Columns that the log offers.
+    joints
+        Joints whose position the log holds.
+    measured
+        Joints whose force was measured, with its sign.
+    still
+        Joints whose force is zero throughout.
+    stated
+        Kind of test that the owner of the log states; empty without one.
+
+    Raises
+    ------
+    Question
+        If the quantities of the log fit no test.
+    """
+    if stated:
+        wanted = stated.replace("-", " ").replace("_", " ").strip().lower()
+        if wanted not in TESTS:
+            raise RigtwinError(f"--test {stated}: {near(stated, TESTS)}")
+        return ReplayKind(wanted, "as stated")
+    positions = [j for j in joints if _takes_position(mechanism, j)]
+    commanded = slots.joints(JointQuantity.COMMAND, joints)
+    if len(measured) == len(joints):
+        beside = " (position commands are there too: --test servos)" if commanded else ""
+        return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
+    if commanded and set(commanded) <= set(positions):
+        return _position_test(mechanism, commanded)
+    pushed = [
+        joint
+        for joint in joints
+        if actuator_on(mechanism, joint)
+        and (
+            joint in measured
+            or joint in still
+            or slots.has(joint, JointQuantity.FORCE_COMMAND)
+            or (joint in commanded and joint not in positions)
+        )
+    ]
+    if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
+        if set(pushed) <= set(still):
+            return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
+        return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
+    raise _question(mechanism, joints, measured, commanded)
+
+
+def _takes_position(mechanism: Mechanism, joint: str) -> bool:
+    actuator = actuator_on(mechanism, joint)
+    return actuator is not None and mechanism.positions(actuator)
+
+
+def _position_test(mechanism: Mechanism, joints: Sequence[str]) -> ReplayKind:
+    """Servos where the model says how they are damped; else actuators without a model inside."""
+    for joint in joints:
+        servo = mechanism.servo(actuator_on(mechanism, joint) or "")
+        damped = mechanism.friction("joint", joint)
+        if servo is None:
+            return ReplayKind(POSITIONS, f"the actuator of {joint} has a gear, so it is no servo")
+        if not servo["damping_gain"] and not damped["viscous"] and not damped["coulomb"]:
+            return ReplayKind(
+                POSITIONS,
+                f"the model says nothing of the damping of {joint}, so it is no servo's model",
+            )
+    return ReplayKind(SERVOS, "the model's position actuators are damped, so they model servos")
+
+
+def _question(
+    mechanism: Mechanism, joints: Sequence[str], measured: Sequence[str], commanded: Sequence[str]
+) -> RigtwinError:
+    if not measured and not commanded:
+        joint = joints[0]
+        answers = [option(f"{joint}.force", "COLUMN"), option(f"{joint}.command", "COLUMN")]
+        if actuator_on(mechanism, joint):
+            answers.append(option(f"{joint}.command", "0") + " if nothing pushes")
+        return ask(
+            "no column is a measured force or a command, so nothing says what moves "
+            f"{enumerate_names(list(joints))}",
+            *answers,
+        )
+    pulling = [
+        a for a in mechanism.names("actuator") if mechanism.tendon_of("actuator", a) is not None
+    ]
+    if pulling and not measured:
+        return RigtwinError(
+            f"actuator {pulling[0]} pulls a tendon; such a machine needs a written description, "
+            "docs/machines.md, joints that are free"
+        )
+    if commanded and not measured:
+        missing = [j for j in commanded if actuator_on(mechanism, j) is None]
+        if missing:
+            return RigtwinError(
+                f"joint {missing[0]} has a command in the log and no actuator in the model; add "
+                f'<position joint="{missing[0]}"/> or <motor joint="{missing[0]}"/> to the model'
+            )
+    known = measured or commanded
+    lacking = [joint for joint in joints if joint not in known]
+    return ask(
+        f"the log holds forces or commands of {enumerate_names(list(known))} and none of "
+        f"{enumerate_names(lacking)}",
+        *(option(f"{joint}.force", "COLUMN") for joint in lacking[:1]),
+        *(option(f"{joint}.position", "none") + " if it rests" for joint in lacking[:1]),
+    )

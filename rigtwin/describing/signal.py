@@ -1,0 +1,60 @@
+"""A quantity of a joint as it is read from a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigtwin.describing.quantity import JointQuantity
+
+
+@dataclass(frozen=True)
+class LogSignal:
+    """Source of a quantity of a joint, and what was assumed about it.
+
+    Parameters
+    ----------
+    joint
+        Name of the joint.
+    quantity
+        Quantity that is read.
+    column
+        Column of the log; empty where a formula gives the values.
+    formula
+        Formula of columns, in SI; empty where a column gives the values.
+    unit
+        Unit of the column.
+    sign
+        1 or -1.
+    why
+        Reason for the column.
+    assumed
+        Assumptions about unit, sign and scale, one a sentence; empty where the log or its owner
+        states everything.
+    scale
+        Factor after conversion to SI, such as that of an actuator's gear.
+    checked
+        Result of a check against the model; empty without one.
+    """
+
+    joint: str
+    quantity: JointQuantity
+    column: str
+    formula: str
+    unit: str
+    sign: float
+    why: str
+    assumed: tuple[str, ...] = ()
+    scale: float = 1.0
+    checked: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name by which the signal can be corrected, such as elbow.position."""
+        quantity = self.quantity
+        name = "command" if quantity is JointQuantity.FORCE_COMMAND else quantity.value
+        return f"{self.joint}.{name}"
+
+    @property
+    def source(self) -> str:
+        """Column or formula with its sign, for people."""
+        return f"{'-' if self.sign < 0.0 else ''}{self.column or self.formula}"

@@ -1,0 +1,259 @@
+"""Units of a log's columns: as the file or its owner states them, by name, or by range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from rigtwin.describing.heading import split_words, stated_unit
+from rigtwin.describing.quantity import SI, JointQuantity
+from rigtwin.describing.question import ask, option
+from rigtwin.description.mechanism import Mechanism
+from rigtwin.importing.columns import Columns
+from rigtwin.importing.units import is_unit, unit_of
+from rigtwin.numerics.arrays import Array
+
+BEYOND = 0.1
+"""Share of a joint's range by which a log may be beyond its ends."""
+WHOLE = 1.05 * 2.0 * math.pi
+"""rad; a joint without a range is taken to stay within a turn either way."""
+SURELY_DEGREES = 45.0
+"""Numbers between a turn in rad and this one could be rad or degrees."""
+SURELY_METRES, SURELY_MILLIMETRES = 3.0, 20.0
+"""Numbers between these could be m or mm, of a joint without a range."""
+LARGEST_PERCENT = 100.0
+"""Some loggers write shares of a joint's range in percent."""
+ALIKE = 5.0
+"""Largest ratio of the strokes of a command and of the position that follows it."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Unit of a column.
+
+    Parameters
+    ----------
+    name
+        Unit as a map has it.
+    assumed
+        Why it was concluded; empty where the file or its owner states it.
+    """
+
+    name: str
+    assumed: str = ""
+
+    @property
+    def factor(self) -> float:
+        """Factor to SI."""
+        return unit_of(self.name)[1]
+
+
+def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
+    """Return the unit that the file or a column's name states; None if neither does.
+
+    Parameters
+    ----------
+    columns
+        Columns of the log.
+    column
+        Name of the column.
+    si
+        SI unit of the quantity.
+    key
+        Name of the quantity, for a question.
+
+    Raises
+    ------
+    Question
+        If the file states the unit of another quantity.
+    """
+    written = columns.units.get(column, "")
+    if written and is_unit(written) and unit_of(written)[0] != "1":
+        if unit_of(written)[0] == si:
+            return Unit(written)
+        raise ask(
+            f"column {column!r} is in {written}, and {key} is in {si}; how much is one {written}?",
+            option(key, f"FACTOR * {column}"),
+            option(key, "COLUMN"),
+        )
+    word = stated_unit(split_words(column))
+    if word and unit_of(word)[0] == si:
+        return Unit(word, f"{word} by its name")
+    return None
+
+
+def position_units(
+    mechanism: Mechanism, columns: Columns, positions: Mapping[str, str]
+) -> dict[str, Unit]:
+    """Return the units of measured positions.
+
+    Positions without a stated unit are taken to have one unit in common: of all joints that turn,
+    and of all that slide.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    columns
+        Columns of the log.
+    positions
+        Joint → column of its position.
+
+    Raises
+    ------
+    Question
+        If two units are possible, or none.
+    """
+    units: dict[str, Unit] = {}
+    open_joints: dict[bool, list[str]] = {True: [], False: []}
+    for joint, column in positions.items():
+        turns = mechanism.turns(joint)
+        known = known_unit(columns, column, SI[JointQuantity.POSITION][turns], f"{joint}.position")
+        if known is not None:
+            units[joint] = known
+        else:
+            open_joints[turns].append(joint)
+    for turns, joints in open_joints.items():
+        if joints:
+            unit = _common_unit(mechanism, columns, positions, joints, turns)
+            units |= {joint: unit for joint in joints}
+    return units
+
+
+def command_unit(columns: Columns, column: str, position: Array, si: str, key: str) -> Unit:
+    """Return the unit of a position command, by the position that follows it.
+
+    Parameters
+    ----------
+    columns
+        Columns of the log.
+    column
+        Column of the command.
+    position
+        Position of the joint, SI, shape (rows,).
+    si
+        SI unit of the position.
+    key
+        Name of the command, for a question.
+
+    Raises
+    ------
+    Question
+        If no unit makes the strokes alike.
+    """
+    known = known_unit(columns, column, si, key)
+    if known is not None:
+        return known
+    small = {"rad": "deg", "m": "mm"}[si]
+    stroke, followed = _stroke(columns.values[column]), _stroke(position)
+    if stroke == 0.0 or followed == 0.0:
+        return Unit(si, f"{si}, as nothing moves")
+    for name in (si, small):
+        if 1.0 / ALIKE < unit_of(name)[1] * stroke / followed < ALIKE:
+            return Unit(name, f"{name} by the stroke of the position")
+    raise ask(
+        f"column {column!r} has a stroke of {stroke:.4g}, and the position that follows it "
+        f"{followed:.4g} {si}; in what unit is it?",
+        option(key, f"{column} [{small}]"),
+        option(key, f"0.01 * {column}"),
+    )
+
+
+def _stroke(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if len(known) else 0.0
+
+
+def _common_unit(
+    mechanism: Mechanism,
+    columns: Columns,
+    positions: Mapping[str, str],
+    joints: Sequence[str],
+    turns: bool,
+) -> Unit:
+    """Unit that joints share whose columns do not state one."""
+    si, small = ("rad", "deg") if turns else ("m", "mm")
+    worst = {joint: _extremes(columns.values[positions[joint]]) for joint in joints}
+    largest = max(max(abs(low), abs(high)) for low, high in worst.values())
+    answers = [option("*.position", f"[{unit}]") for unit in (si, small)]
+    beyond = next((j for j in joints if not _within(mechanism, j, worst[j], 1.0, turns)), None)
+    percent = largest <= LARGEST_PERCENT and all(
+        split_words(positions[j])[-1] == "pos" and "." in positions[j] for j in joints
+    )
+    if beyond is None:
+        return Unit(si, f"{si} by its range")
+    factor = unit_of(small)[1]
+    outside = next((j for j in joints if not _within(mechanism, j, worst[j], factor, turns)), None)
+    column = positions[beyond]
+    reach = f"column {column!r} reaches from {worst[beyond][0]:.4g} to {worst[beyond][1]:.4g}"
+    if outside is not None:
+        column, (low, high) = positions[outside], worst[outside]
+        raise ask(
+            f"column {column!r} reaches from {low:.4g} to {high:.4g}, which is beyond the range of "
+            f"joint {outside} in {si} and in {small}; is it counted at the motor, behind a gear?",
+            option(f"{outside}.position", f"{column} / 32"),
+            answers[1],
+        )
+    if percent:
+        raise ask(
+            f"{reach}; is it degrees, or a share of the joint's range in percent?",
+            answers[1],
+            option(f"{beyond}.position", f"0.01745 * {column}"),
+        )
+    if turns and not _limited(mechanism, beyond) and largest < SURELY_DEGREES:
+        raise ask(f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers)
+    if not turns and not _limited(mechanism, beyond) and largest < SURELY_MILLIMETRES:
+        raise ask(f"{reach}, and joint {beyond} has no range; are these m or mm?", *answers)
+    return Unit(small, f"{small} by its range, as {beyond} cannot be there in {si}")
+
+
+def _extremes(values: Array) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+
+
+def _limited(mechanism: Mechanism, joint: str) -> bool:
+    return bool(mechanism.model.jnt_limited[mechanism.number("joint", joint)])
+
+
+def _within(
+    mechanism: Mechanism, joint: str, extremes: tuple[float, float], factor: float, turns: bool
+) -> bool:
+    """Whether a joint can be where a column says, in a unit of that factor."""
+    low, high = factor * extremes[0], factor * extremes[1]
+    if _limited(mechanism, joint):
+        bottom, top = map(float, mechanism.model.jnt_range[mechanism.number("joint", joint)])
+        slack = BEYOND * (top - bottom)
+        return bottom - slack <= low and high <= top + slack
+    limit = WHOLE if turns else SURELY_METRES
+    return max(abs(low), abs(high)) <= limit
+
+
+def force_unit(mechanism: Mechanism, columns: Columns, column: str, joint: str) -> Unit:
+    """Return the unit of a force or torque.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    columns
+        Columns of the log.
+    column
+        Column of the force.
+    joint
+        Joint that the force acts on.
+    """
+    si = SI[JointQuantity.FORCE][mechanism.turns(joint)]
+    known = known_unit(columns, column, si, f"{joint}.force")
+    return known or Unit(si, f"{si}, as nothing states another unit")
+
+
+def actuator_constant(mechanism: Mechanism, actuator: str) -> float:
+    """Force of an actuator for each unit of its control, N or Nm."""
+    number = mujoco.mj_name2id(mechanism.model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
+    model = mechanism.model
+    return float(model.actuator_gear[number, 0]) * float(model.actuator_gainprm[number, 0])

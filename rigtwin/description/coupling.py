@@ -1,0 +1,88 @@
+"""Which joints of a mechanism act on each other, by inertia or by gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from rigtwin.description.mechanism import Mechanism
+
+POSES, SHARE = 7, 1e-6
+"""Poses that are tried, and the share of the diagonal terms below which a coupling term is zero."""
+
+
+def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+    """Return whether any two of the joints act on each other.
+
+    The mass matrix M(q) is evaluated at several poses within the ranges of the joints. Joints i and
+    j act on each other where M_ij is not zero, or where the gravity load of i depends on the
+    position of j. Tendons and equalities that span two of the joints couple them too.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joints
+        Names of hinges and slides.
+    """
+    model = mechanism.model
+    if len(joints) < 2:
+        return False
+    if model.ntendon or any(tie.joint in joints and tie.to in joints for tie in mechanism.ties()):
+        return True
+    numbers = [mechanism.number("joint", joint) for joint in joints]
+    at = [int(model.jnt_dofadr[number]) for number in numbers]
+    data, random = mujoco.MjData(model), np.random.default_rng(0)
+    full = np.zeros((model.nv, model.nv))
+    weights = _weights(mechanism, at)
+    for _ in range(POSES):
+        _pose(model, data, numbers, random)
+        mujoco.mj_fullM(model, data, full)
+        scale = np.sqrt(np.outer(np.diag(full)[at], np.diag(full)[at]))
+        off = np.abs(full[np.ix_(at, at)]) / np.maximum(scale, 1e-300)
+        np.fill_diagonal(off, 0.0)
+        if off.max() > SHARE or _load_moves(model, data, numbers, at, weights):
+            return True
+    return False
+
+
+def _pose(
+    model: mujoco.MjModel, data: mujoco.MjData, numbers: Sequence[int], random: np.random.Generator
+) -> None:
+    """Put the joints at random positions, at rest."""
+    for number in numbers:
+        low, high = model.jnt_range[number] if model.jnt_limited[number] else (-1.0, 1.0)
+        data.qpos[model.jnt_qposadr[number]] = random.uniform(low, high)
+    data.qvel[:] = 0.0
+    mujoco.mj_forward(model, data)
+
+
+def _weights(mechanism: Mechanism, at: Sequence[int]) -> float:
+    """Largest gravity load that the machine could have, as a scale, N or Nm."""
+    model = mechanism.model
+    return float(np.sum(model.body_mass) * np.linalg.norm(model.opt.gravity)) * len(at)
+
+
+def _load_moves(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    numbers: Sequence[int],
+    at: Sequence[int],
+    weights: float,
+) -> bool:
+    """Whether the gravity load of one joint changes with the position of another."""
+    before = data.qfrc_bias[list(at)].copy()
+    for own, number in enumerate(numbers):
+        place = int(model.jnt_qposadr[number])
+        was = float(data.qpos[place])
+        data.qpos[place] = was + 0.1
+        mujoco.mj_forward(model, data)
+        change = np.abs(data.qfrc_bias[list(at)] - before)
+        change[own] = 0.0
+        data.qpos[place] = was
+        if change.max() > SHARE * max(weights, 1e-300):
+            return True
+    mujoco.mj_forward(model, data)
+    return False
