@@ -16,7 +16,7 @@ from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
 from rigtwin.importing.oddities import find_oddities, looks_wrapped
 from rigtwin.importing.table import read
-from rigtwin.importing.text import split_unit
+from rigtwin.importing.naming import split_unit
 from rigtwin.importing.timing import (
     Signals,
     drop_repeats,

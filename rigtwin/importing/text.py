@@ -13,6 +13,9 @@ from pathlib import Path
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns, is_missing, is_value, numbers_of
+from rigtwin.importing.format import Format
+from rigtwin.importing.naming import split_unit
+from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.units import is_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
@@ -45,7 +48,7 @@ class Line:
     numbers: int
 
 
-def read_text(path: Path) -> Columns:
+def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     """Columns of a text file. Raises RigtwinError saying what is wrong and in which line."""
     lines = _decode(path).splitlines()
     while lines and not lines[-1].strip():
@@ -208,9 +211,5 @@ def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
     return replace(found, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
 
 
-def split_unit(name: str, unit: str) -> tuple[str, str]:
-    """A name and its unit, which may stand in brackets behind it."""
-    match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    if match and not unit and match.group(1) and is_unit(match.group(2)):
-        return match.group(1).strip(), match.group(2)
-    return name.strip(), re.sub(r"^[\[(]|[\])]$", "", unit)
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+FORMAT = Format("text", ENDINGS, read_text)
