@@ -53,7 +53,7 @@ if TYPE_CHECKING:
         machine,
         machines,
     )
-    from rigtwin.api.recordings import Recording, import_data, load
+    from rigtwin.api.recordings import Recording, import_data, import_episodes, load
     from rigtwin.api.running import run
     from rigtwin.api.session import (
         DryRun,
@@ -129,6 +129,7 @@ __all__ = [
     "faults",
     "identifiability",
     "import_data",
+    "import_episodes",
     "load",
     "look",
     "machine",
@@ -167,6 +168,7 @@ _MODULES = {
     "recordings": (
         "Recording",
         "import_data",
+        "import_episodes",
         "load",
     ),
     "running": ("run",),

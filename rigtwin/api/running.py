@@ -11,6 +11,7 @@ from typing import Any
 
 from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
 from rigtwin.api.recordings import Recording, faced
+from rigtwin.description.catalogue import own_description
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Structure
@@ -146,6 +147,7 @@ def _record(
             effects_from=effects_from,
             machine=on.name,
             controller=tick,
+            description=own_description(on),
         )
     else:
         run_machine(

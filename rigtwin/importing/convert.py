@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeGuard
 
 import numpy as np
 
+from rigtwin.description import catalogue
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import keep_apart, recordable, written_whole
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
+from rigtwin.importing.episodes import Episode, split_episodes
+from rigtwin.importing.frames import read_frame
 from rigtwin.importing.mapping import Column, Map, Source, load
+from rigtwin.importing.naming import split_unit
 from rigtwin.importing.oddities import find_oddities, looks_wrapped
 from rigtwin.importing.table import read
-from rigtwin.importing.naming import split_unit
 from rigtwin.importing.timing import (
     Signals,
     drop_repeats,
@@ -30,23 +35,50 @@ from rigtwin.recording import Writer
 
 BLOCK = 10_000
 """Ticks written at a time."""
+Data = Any
+"""Paths of files, a list; or data in memory."""
 LARGEST = 1e15
 """What no channel reaches, in SI units."""
 Channels = Mapping[tuple[str, str], Array]
 """(Topic, field) → shape (ticks,)."""
+ENDING = ".mcap"
+"""Ending of a recording's name."""
 
 
-def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
-    """Converts another program's data to a recording.
+@dataclass(frozen=True)
+class Imported:
+    """A recording made of another program's data.
+
+    Parameters
+    ----------
+    path
+        File of the recording.
+    report
+        What was found on the way, a line each.
+    """
+
+    path: Path
+    report: tuple[str, ...]
+
+
+def convert(
+    data: Data,
+    mapping: Path | Mapping[str, Any],
+    out: Path,
+    machine: Machine | None = None,
+) -> list[str]:
+    """Convert another program's data to a recording.
 
     Parameters
     ----------
     data
-        Files; several are put side by side, row by row.
-    map_path
-        Which column is which channel, TOML.
+        Files; several are put side by side, row by row. Or data in memory, see `read_frame`.
+    mapping
+        Map from columns to channels: a TOML file, or its tables.
     out
-        Of the recording.
+        File of the recording.
+    machine
+        Machine the data belong to. Defaults to the one named in the map.
 
     Returns
     -------
@@ -56,18 +88,142 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     Raises
     ------
     RigtwinError
-        Before anything is written.
+        Before anything is written. Also if the data hold several episodes.
     """
-    recordable(keep_apart(out, *data, map_path))
-    wanted = load(map_path)
+    recordable(keep_apart(out, *_files(data, mapping)))
+    wanted = load(mapping)
+    label, columns = _gather(data, wanted)
+    episodes = _episodes(label, columns, wanted)
+    if len(episodes) > 1:
+        raise RigtwinError(
+            f"{label} holds {len(episodes)} episodes; name a folder as the output, which gets a "
+            f"recording of each, or choose one in the map: [episodes] take = [{episodes[0].number}]"
+        )
+    described = _machine(wanted, machine)
+    columns = episodes[0].columns if episodes else columns
+    return [*_header(label, columns), *_convert(label, columns, wanted, described, out)]
+
+
+def convert_episodes(
+    data: Data,
+    mapping: Path | Mapping[str, Any],
+    folder: Path,
+    machine: Machine | None = None,
+) -> tuple[Imported, ...]:
+    """Convert each episode of another program's data to a recording.
+
+    Parameters
+    ----------
+    data, mapping, machine
+        As for `convert`.
+    folder
+        Folder of the recordings, made if it is absent. Each is named by its episode's number.
+
+    Returns
+    -------
+    tuple of Imported
+        In the order of the episodes. An episode that cannot be converted is left out, which every
+        report states.
+
+    Raises
+    ------
+    RigtwinError
+        If no episode can be converted, or the folder cannot be written.
+    """
+    wanted = load(mapping)
+    label, columns = _gather(data, wanted)
+    episodes = _episodes(label, columns, wanted)
+    described = _machine(wanted, machine)
+    if not episodes:
+        name = data[0].stem if _are_paths(data) else "recording"
+        out = folder / f"{name}{ENDING}"
+        _make_folder(folder)
+        return (Imported(out, tuple(convert(data, mapping, out, described))),)
+    _make_folder(folder)
+    header, done, errors = _header(label, columns), [], []
+    for episode in episodes:
+        out = folder / f"{episode.name}{ENDING}"
+        try:
+            report = _convert(label, episode.columns, wanted, described, recordable(out))
+        except RigtwinError as error:
+            errors.append(error)
+            header.append(f"episode {episode.number} is left out: {error}")
+        else:
+            lines = tuple(f"episode {episode.number}: {line}" for line in report)
+            done.append(Imported(out, lines))
+    if not done:
+        raise errors[0]
+    return tuple(replace(each, report=(*header, *each.report)) for each in done)
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {folder}: {error.strerror}") from None
+
+
+def _files(data: Data, mapping: Path | Mapping[str, Any]) -> list[Path]:
+    """Return the files that an import reads."""
+    files = list(data) if _are_paths(data) else []
+    return [*files, mapping] if isinstance(mapping, Path) else files
+
+
+def _are_paths(data: Data) -> TypeGuard[Sequence[Path]]:
+    return isinstance(data, list | tuple) and all(isinstance(path, Path) for path in data)
+
+
+def _gather(data: Data, wanted: Map) -> tuple[str, Columns]:
+    """Return what the data are called in messages, and their columns."""
+    selection = wanted.selection
+    if not _are_paths(data):
+        columns = read_frame(data, selection)
+        return f"the {columns.form}", columns
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one, they are told by it")
-    columns = join({path.stem: read(path) for path in data})
-    said = ", ".join(map(str, data))
-    report = [f"{said}: {columns.form}; {columns.rows} rows, columns {', '.join(columns.values)}"]
-    report += columns.notes
+    tables = {path.stem: read(path, selection.of_file(path.stem)) for path in data}
+    return ", ".join(map(str, data)), join(tables)
+
+
+def _episodes(label: str, columns: Columns, wanted: Map) -> list[Episode]:
+    """Return the episodes of data that hold several tests, else none."""
+    name = wanted.episode or columns.episode
+    if not name:
+        if wanted.episodes:
+            raise RigtwinError(
+                f"{label}: [episodes] take needs [episodes] column, which numbers the episodes"
+            )
+        return []
     try:
-        inputs = _inputs(wanted, columns)
+        _column(columns, name)
+        return list(split_episodes(columns, name, wanted.episodes))
+    except RigtwinError as error:
+        raise RigtwinError(f"{label}: {error}") from None
+
+
+def _machine(wanted: Map, machine: Machine | None) -> Machine | None:
+    """Return the machine that was given, or the one whose description the map names, if any."""
+    if machine is not None or not wanted.machine.endswith(".toml"):
+        return machine
+    return catalogue.find(str(wanted.folder / wanted.machine))
+
+
+def _header(label: str, columns: Columns) -> list[str]:
+    """Return the first lines of the report: what the data hold."""
+    names = ", ".join(columns.names)
+    return [f"{label}: {columns.form}; {columns.rows} rows, columns {names}", *columns.notes]
+
+
+def _convert(
+    label: str, columns: Columns, wanted: Map, machine: Machine | None, out: Path
+) -> list[str]:
+    """Write the recording of one test; return what was found on the way."""
+    report: list[str] = []
+    try:
+        inputs = {
+            key: replace(column, name=_named(columns, column.name))
+            for key, column in wanted.inputs.items()
+        }
         signals: Signals = {
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
@@ -92,39 +248,31 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
             for channel, source in wanted.channels.items()
         }
     except RigtwinError as error:
-        raise RigtwinError(f"{said}: {error}") from None
+        raise RigtwinError(f"{label}: {error}") from None
     for channel, values in channels.items():
         report += [f"{'.'.join(channel)} {each}" for each in find_oddities(values, time - time[0])]
-    _write(out, wanted, period, channels)
-    report.append(f"{len(time)} ticks of {period:g} s for machine {wanted.machine} in {out}")
+    _write(out, wanted, machine, period, channels)
+    name = wanted.machine if machine is None else machine.name
+    report.append(f"{len(time)} ticks of {period:g} s for machine {name} in {out}")
     return report
-
-
-def _inputs(wanted: Map, columns: Columns) -> dict[str, Column]:
-    """The columns that are read: of channels by the channel's name, of formulas by their own."""
-    found = {}
-    for channel, source in wanted.channels.items():
-        if source.column is not None:
-            found[".".join(channel)] = source.column
-        for name in source.formula.inputs if source.formula is not None else ():
-            found[name] = wanted.columns.get(name, Column(name, None, None))
-    return {key: replace(each, name=_named(columns, each.name)) for key, each in found.items()}
 
 
 def _named(columns: Columns, name: str) -> str:
     """A column's name, also where the map has it as the file's first line does, its unit behind
     it."""
-    if name in columns.values:
+    if name in columns.values or name in columns.refused:
         return name
     bare, unit = split_unit(name, "")
     return bare if columns.units.get(bare) == unit != "" else name
 
 
 def _column(columns: Columns, name: str) -> Array:
+    if name in columns.refused:
+        raise RigtwinError(f"column {name!r} cannot be read: {columns.refused[name]}")
     if name not in columns.values:
-        close = difflib.get_close_matches(name, columns.values, 1)
+        close = difflib.get_close_matches(name, columns.names, 1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise RigtwinError(f"no column {name!r}; {hint}there are {', '.join(columns.values)}")
+        raise RigtwinError(f"no column {name!r}; {hint}there are {', '.join(columns.names)}")
     return columns.values[name]
 
 
@@ -235,7 +383,9 @@ def _values(name: str, source: Source, signals: Signals, time: Array, period: fl
     return values
 
 
-def _write(out: Path, wanted: Map, period: float, channels: Channels) -> None:
+def _write(
+    out: Path, wanted: Map, machine: Machine | None, period: float, channels: Channels
+) -> None:
     fields: dict[str, list[str]] = {}
     for topic, name in channels:
         fields.setdefault(topic, []).append(name)
@@ -244,7 +394,13 @@ def _write(out: Path, wanted: Map, period: float, channels: Channels) -> None:
     with (
         written_whole(out) as beside,
         Writer(
-            beside, wanted.experiment, period, wanted.controller, wanted.machine, names
+            beside,
+            wanted.experiment,
+            period,
+            wanted.controller,
+            wanted.machine if machine is None else machine.name,
+            names,
+            description=None if machine is None else catalogue.own_description(machine),
         ) as writer,
     ):
         for start in range(0, ticks, BLOCK):

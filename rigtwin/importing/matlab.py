@@ -13,7 +13,6 @@ from rigtwin.importing.format import Format
 from rigtwin.importing.selection import Selection
 from rigtwin.numerics.arrays import Array
 
-
 NUMBERS = "fiub"
 """Kinds of data type that hold numbers, as numpy names them."""
 

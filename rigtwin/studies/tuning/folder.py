@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from rigtwin import __version__
+from rigtwin.description.catalogue import own_description
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Structure
 from rigtwin.errors import RigtwinError
@@ -94,7 +95,15 @@ def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
     configuration = twin._replace(controller=result.settings)
     demands = experiment.demands(configuration, APART)
     if machine.structure is Structure.QUARTER_CAR:
-        record(path, experiment.name, configuration, demands, APART, machine=machine.name)
+        record(
+            path,
+            experiment.name,
+            configuration,
+            demands,
+            APART,
+            machine=machine.name,
+            description=own_description(machine),
+        )
     else:
         run_machine(path, machine, experiment.name, configuration, demands, APART)
 
