@@ -21,6 +21,7 @@ from rigtwin.importing.frames import read_frame
 from rigtwin.importing.mapping import Column, Map, Source, load
 from rigtwin.importing.naming import split_unit
 from rigtwin.importing.oddities import find_oddities, looks_wrapped
+from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.table import read
 from rigtwin.importing.timing import (
     Signals,
@@ -47,7 +48,29 @@ ENDING = ".mcap"
 
 @dataclass(frozen=True)
 class Imported:
-    """A recording made of another program's data.
+    """Channels of a recording, read from another program's data.
+
+    Parameters
+    ----------
+    period
+        Period of the ticks, s.
+    time
+        Time of the ticks, s, shape (ticks,).
+    channels
+        (Topic, field) → values in SI, shape (ticks,).
+    report
+        What was found on the way, a line each.
+    """
+
+    period: float
+    time: Array
+    channels: Channels
+    report: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Written:
+    """A recording made of one episode of another program's data.
 
     Parameters
     ----------
@@ -92,16 +115,8 @@ def convert(
     """
     recordable(keep_apart(out, *_files(data, mapping)))
     wanted = load(mapping)
-    label, columns = _gather(data, wanted)
-    episodes = _episodes(label, columns, wanted)
-    if len(episodes) > 1:
-        raise RigtwinError(
-            f"{label} holds {len(episodes)} episodes; name a folder as the output, which gets a "
-            f"recording of each, or choose one in the map: [episodes] take = [{episodes[0].number}]"
-        )
-    described = _machine(wanted, machine)
-    columns = episodes[0].columns if episodes else columns
-    return [*_header(label, columns), *_convert(label, columns, wanted, described, out)]
+    imported = read_channels(data, wanted)
+    return [*imported.report, _write(out, wanted, _machine(wanted, machine), imported)]
 
 
 def convert_episodes(
@@ -131,29 +146,83 @@ def convert_episodes(
         If no episode can be converted, or the folder cannot be written.
     """
     wanted = load(mapping)
-    label, columns = _gather(data, wanted)
-    episodes = _episodes(label, columns, wanted)
-    described = _machine(wanted, machine)
-    if not episodes:
-        name = data[0].stem if _are_paths(data) else "recording"
-        out = folder / f"{name}{ENDING}"
-        _make_folder(folder)
-        return (Imported(out, tuple(convert(data, mapping, out, described))),)
+    label, columns = _label(data), read_columns(data, wanted.selection)
+    episodes = _split(label, columns, wanted)
     _make_folder(folder)
+    if not episodes:
+        out = folder / f"{data[0].stem if _are_paths(data) else 'recording'}{ENDING}"
+        return (Written(out, tuple(convert(data, mapping, out, machine))),)
+    described = _machine(wanted, machine)
     header, done, errors = _header(label, columns), [], []
     for episode in episodes:
         out = folder / f"{episode.name}{ENDING}"
         try:
-            report = _convert(label, episode.columns, wanted, described, recordable(out))
+            imported = _channels(label, episode.columns, wanted)
+            line = _write(recordable(out), wanted, described, imported)
         except RigtwinError as error:
             errors.append(error)
             header.append(f"episode {episode.number} is left out: {error}")
         else:
-            lines = tuple(f"episode {episode.number}: {line}" for line in report)
-            done.append(Imported(out, lines))
+            lines = [f"episode {episode.number}: {each}" for each in (*imported.report, line)]
+            done.append(Written(out, tuple(lines)))
     if not done:
         raise errors[0]
     return tuple(replace(each, report=(*header, *each.report)) for each in done)
+
+
+def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
+    """Return the columns of another program's data.
+
+    Parameters
+    ----------
+    data
+        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+    selection
+        Columns and episodes that are needed. Defaults to all.
+
+    Returns
+    -------
+    Columns
+        The needed columns, and the names of all.
+    """
+    if not _are_paths(data):
+        return read_frame(data, selection)
+    if len({path.stem for path in data}) < len(data):
+        raise RigtwinError("two of the files have the same name; rename one, they are told by it")
+    return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
+
+
+def read_channels(data: Data, wanted: Map) -> Imported:
+    """Return the channels that a map makes of another program's data.
+
+    Parameters
+    ----------
+    data
+        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+    wanted
+        Map from columns to channels.
+
+    Returns
+    -------
+    Imported
+        Channels of one test.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the column, unit or line that is at fault. Also if the data hold several episodes.
+    """
+    label, columns = _label(data), read_columns(data, wanted.selection)
+    episodes = _split(label, columns, wanted)
+    if len(episodes) > 1:
+        raise RigtwinError(
+            f"{label} holds {len(episodes)} episodes; name a folder as the output, such as "
+            "-o episodes/, which gets a recording of each, or choose one in the map: "
+            f"[episodes] take = [{episodes[0].number}]"
+        )
+    header = _header(label, columns)
+    imported = _channels(label, episodes[0].columns if episodes else columns, wanted)
+    return replace(imported, report=(*header, *imported.report))
 
 
 def _make_folder(folder: Path) -> None:
@@ -173,19 +242,12 @@ def _are_paths(data: Data) -> TypeGuard[Sequence[Path]]:
     return isinstance(data, list | tuple) and all(isinstance(path, Path) for path in data)
 
 
-def _gather(data: Data, wanted: Map) -> tuple[str, Columns]:
-    """Return what the data are called in messages, and their columns."""
-    selection = wanted.selection
-    if not _are_paths(data):
-        columns = read_frame(data, selection)
-        return f"the {columns.form}", columns
-    if len({path.stem for path in data}) < len(data):
-        raise RigtwinError("two of the files have the same name; rename one, they are told by it")
-    tables = {path.stem: read(path, selection.of_file(path.stem)) for path in data}
-    return ", ".join(map(str, data)), join(tables)
+def _label(data: Data) -> str:
+    """Return what data are called in messages."""
+    return ", ".join(map(str, data)) if _are_paths(data) else "the data"
 
 
-def _episodes(label: str, columns: Columns, wanted: Map) -> list[Episode]:
+def _split(label: str, columns: Columns, wanted: Map) -> list[Episode]:
     """Return the episodes of data that hold several tests, else none."""
     name = wanted.episode or columns.episode
     if not name:
@@ -214,10 +276,8 @@ def _header(label: str, columns: Columns) -> list[str]:
     return [f"{label}: {columns.form}; {columns.rows} rows, columns {names}", *columns.notes]
 
 
-def _convert(
-    label: str, columns: Columns, wanted: Map, machine: Machine | None, out: Path
-) -> list[str]:
-    """Write the recording of one test; return what was found on the way."""
+def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
+    """Return the channels of one test."""
     report: list[str] = []
     try:
         inputs = {
@@ -251,10 +311,7 @@ def _convert(
         raise RigtwinError(f"{label}: {error}") from None
     for channel, values in channels.items():
         report += [f"{'.'.join(channel)} {each}" for each in find_oddities(values, time - time[0])]
-    _write(out, wanted, machine, period, channels)
-    name = wanted.machine if machine is None else machine.name
-    report.append(f"{len(time)} ticks of {period:g} s for machine {name} in {out}")
-    return report
+    return Imported(period, time, channels, tuple(report))
 
 
 def _named(columns: Columns, name: str) -> str:
@@ -383,14 +440,13 @@ def _values(name: str, source: Source, signals: Signals, time: Array, period: fl
     return values
 
 
-def _write(
-    out: Path, wanted: Map, machine: Machine | None, period: float, channels: Channels
-) -> None:
+def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) -> str:
+    """Write a recording; return the last line of the report."""
+    channels, period, ticks = imported.channels, imported.period, len(imported.time)
     fields: dict[str, list[str]] = {}
-    for topic, name in channels:
-        fields.setdefault(topic, []).append(name)
-    ticks = len(next(iter(channels.values())))
-    names = {topic: tuple(each) for topic, each in fields.items()}
+    for topic, field in channels:
+        fields.setdefault(topic, []).append(field)
+    name = wanted.machine if machine is None else machine.name
     with (
         written_whole(out) as beside,
         Writer(
@@ -398,15 +454,16 @@ def _write(
             wanted.experiment,
             period,
             wanted.controller,
-            wanted.machine if machine is None else machine.name,
-            names,
-            description=None if machine is None else catalogue.own_description(machine),
+            name,
+            {topic: tuple(each) for topic, each in fields.items()},
+            None if machine is None else catalogue.own_description(machine),
         ) as writer,
     ):
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {
-                topic.strip("/"): np.column_stack([channels[topic, name][part] for name in each])
-                for topic, each in names.items()
+                topic.strip("/"): np.column_stack([channels[topic, each][part] for each in names])
+                for topic, names in fields.items()
             }
             writer.append(**blocks)
+    return f"{ticks} ticks of {period:g} s for machine {name} in {out}"

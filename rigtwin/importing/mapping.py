@@ -148,15 +148,37 @@ def load(path: Path | Mapping[str, Any]) -> Map:
     if isinstance(path, Mapping):
         return _map(path)
     try:
-        document = parse_toml(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise RigtwinError(f"{path} is not valid TOML: {error}") from None
+    return replace(parse(text, str(path)), folder=path.parent)
+
+
+def parse(text: str, name: str) -> Map:
+    """Read a map in memory.
+
+    Parameters
+    ----------
+    text
+        The map, TOML.
+    name
+        Name of the map, for errors.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the map, the key and what was expected.
+    """
     try:
-        return replace(_map(document), folder=path.parent)
+        document = parse_toml(text)
+    except (ValueError, RecursionError) as error:
+        raise RigtwinError(f"{name} is not valid TOML: {error}") from None
+    try:
+        return _map(document)
     except RigtwinError as error:
-        raise RigtwinError(f"{path}: {error}") from None
+        raise RigtwinError(f"{name}: {error}") from None
 
 
 def _require_keys(where: str, table: object, known: tuple[str, ...]) -> Mapping[str, Any]:

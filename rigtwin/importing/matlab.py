@@ -93,13 +93,16 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
         ) from None
     found: dict[str, tuple[Any, int, int]] = {}
 
-    def list_columns(prefix: str, group: Any) -> None:
+    def list_columns(prefix: str, group: Any, above: tuple[int, ...] = ()) -> None:
+        above = (*above, h5py.h5o.get_info(group.id).addr)
         for name, item in group.items():
             # A link may lead nowhere.
             if name.startswith("#") or item is None:
                 continue
             if isinstance(item, h5py.Group):
-                list_columns(f"{prefix}{name}.", item)
+                # A group may link to one that it stands in.
+                if h5py.h5o.get_info(item.id).addr not in above:
+                    list_columns(f"{prefix}{name}.", item, above)
             elif item.dtype.kind in NUMBERS:
                 shape = tuple(length for length in item.shape or () if length != 1)
                 for column, number in _name_columns(f"{prefix}{name}", shape).items():
