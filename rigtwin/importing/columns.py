@@ -31,8 +31,8 @@ class Columns:
         What was odd in the file, a line each.
     wrong
         Name → first cell that should be a number and is none, and where it stands.
-    unread
-        Columns of numbers that the file has and that were not needed.
+    listed
+        Columns of numbers that the file has, those that were not needed included.
     refused
         Name → why the column cannot be read as numbers.
     episode
@@ -44,7 +44,7 @@ class Columns:
     form: str = ""
     notes: tuple[str, ...] = ()
     wrong: Mapping[str, str] = field(default_factory=dict)
-    unread: tuple[str, ...] = ()
+    listed: tuple[str, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
     episode: str = ""
 
@@ -56,7 +56,7 @@ class Columns:
     @property
     def names(self) -> tuple[str, ...]:
         """All columns of numbers, those that were not needed included."""
-        return (*self.values, *self.unread)
+        return tuple(dict.fromkeys((*self.listed, *self.values)))
 
 
 def is_missing(cell: str) -> bool:
@@ -163,16 +163,17 @@ def join(tables: Mapping[str, Columns]) -> Columns:
     units: dict[str, str] = {}
     wrong: dict[str, str] = {}
     refused: dict[str, str] = {}
-    unread: list[str] = []
+    listed: list[str] = []
     for file, table in tables.items():
         for name, column in table.values.items():
             for own in (f"{file}.{name}", *([name] if names.count(name) == 1 else [])):
                 values[own] = column
                 units |= {own: table.units[name]} if name in table.units else {}
                 wrong |= {own: table.wrong[name]} if name in table.wrong else {}
-        unread += [f"{file}.{name}" for name in table.unread]
+        for name in table.names:
+            listed += [f"{file}.{name}", *([name] if names.count(name) == 1 else [])]
         for name, reason in table.refused.items():
             refused |= {f"{file}.{name}": reason, name: reason}
     notes = tuple(f"{file}: {note}" for file, table in tables.items() for note in table.notes)
     form = "; ".join(f"{file}: {table.form}" for file, table in tables.items())
-    return Columns(values, units, form, notes, wrong, tuple(unread), refused)
+    return Columns(values, units, form, notes, wrong, tuple(listed), refused)

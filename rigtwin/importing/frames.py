@@ -43,12 +43,12 @@ def read_frame(data: object, selection: Selection) -> Columns:
     values: dict[str, Array] = {}
     units: dict[str, str] = {}
     wrong: dict[str, str] = {}
-    unread: list[str] = []
+    listed: list[str] = []
     for name, column in pairs:
         if name in refused:
             continue
         if not selection.takes_within(name):
-            unread.append(name)
+            listed.append(name)
             continue
         try:
             found, unit = _numbers(name, column, wrong)
@@ -56,8 +56,9 @@ def read_frame(data: object, selection: Selection) -> Columns:
             refused[name] = str(error).splitlines()[0] if str(error) else "it holds no numbers"
             continue
         values |= found
+        listed += found
         units |= dict.fromkeys(found, unit) if unit else {}
-    return Columns(values, units, form, (), wrong, tuple(unread), refused)
+    return Columns(values, units, form, (), wrong, tuple(listed), refused)
 
 
 def _list_columns(data: Any) -> tuple[list[tuple[str, Any]], str]:

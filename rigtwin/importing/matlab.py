@@ -40,8 +40,7 @@ def read_matlab(path: Path, selection: Selection) -> Columns:
     longest = max(map(len, found.values()), default=0)
     wanted = {name: len(value) for name, value in found.items() if _is_column(len(value), longest)}
     values = {name: found[name] for name in wanted if selection.takes(name)}
-    unread = tuple(name for name in wanted if name not in values)
-    return Columns(values, {}, "MATLAB v5", unread=unread)
+    return Columns(values, {}, "MATLAB v5", listed=tuple(wanted))
 
 
 def _is_column(length: int, longest: int) -> bool:
@@ -109,7 +108,7 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
                     found[column] = (item, number, max(shape))
 
     values: dict[str, Array] = {}
-    unread: list[str] = []
+    listed: list[str] = []
     try:
         with h5py.File(path, "r") as file:
             list_columns("", file)
@@ -118,15 +117,15 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
             for column, (item, number, length) in found.items():
                 if not _is_column(length, longest):
                     continue
+                listed.append(column)
                 if not selection.takes(column):
-                    unread.append(column)
                     continue
                 if item.name != name:
                     name, content = item.name, np.squeeze(item[()])
                 values[column] = _take(content, number)
     except Exception as error:  # The reader raises errors of any kind for a damaged file.
         raise _unreadable(path, error) from None
-    return Columns(values, {}, "MATLAB v7.3", unread=tuple(unread))
+    return Columns(values, {}, "MATLAB v7.3", listed=tuple(listed))
 
 
 def _unreadable(path: Path, error: Exception) -> RigtwinError:

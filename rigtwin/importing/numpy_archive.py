@@ -22,7 +22,7 @@ def read_archive(path: Path, selection: Selection) -> Columns:
     try:
         with np.load(path, allow_pickle=False) as archive:
             needed = [name for name in archive.files if selection.takes_within(name)]
-            unread = tuple(name for name in archive.files if name not in needed)
+            passed = tuple(name for name in archive.files if name not in needed)
             columns = read_frame({name: archive[name] for name in needed}, selection)
     except (ValueError, zipfile.BadZipFile, EOFError) as error:
         raise RigtwinError(f"{path} is damaged, or holds Python objects: {error}") from None
@@ -31,7 +31,7 @@ def read_archive(path: Path, selection: Selection) -> Columns:
         columns.units,
         "NumPy archive",
         wrong=columns.wrong,
-        unread=(*columns.unread, *unread),
+        listed=(*columns.listed, *passed),
         refused=columns.refused,
     )
 

@@ -62,13 +62,13 @@ def read_tables(
         ) from None
     found = expand(dict(zip(table.column_names, table.columns, strict=True)), labels or {})
     values = {name: column for name, column in found.values.items() if selection.takes(name)}
-    unread = (*(n for n in found.values if n not in values), *(n for n in names if n not in needed))
+    listed = (*found.values, *(name for name in names if name not in needed))
     return Columns(
         values,
         {name: unit for name, unit in found.units.items() if name in values},
         "parquet",
         wrong=found.wrong,
-        unread=unread,
+        listed=listed,
         refused={**found.refused, **repeated},
     )
 

@@ -83,7 +83,7 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
     by_recorder = any(name.endswith(f".{RECORDED}") for name in selection.time)
     topics: list[Topic] = []
     refused: dict[str, str] = {}
-    unread: list[str] = []
+    listed: list[str] = []
     for name, connections in by_topic.items():
         types = {connection.msgtype for connection in connections}
         decode = find(connections[0].msgtype)
@@ -95,13 +95,13 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
             refused |= dict.fromkeys((name, *parts), why)
         elif selection.takes_within(name):
             topics.append(read_topic(reader, connections, decode, selection.takes, by_recorder))
-            unread += topics[-1].unread
+            listed += topics[-1].columns
         else:
-            unread += list_columns(reader, connections, decode)
+            listed += list_columns(reader, connections, decode)
     if not any(topic.series for topic in topics):
-        return Columns({}, {}, "ROS 2 bag", unread=tuple(unread), refused=refused)
+        return Columns({}, {}, "ROS 2 bag", listed=tuple(listed), refused=refused)
     joined = _join(path, topics, selection, RECORDED if by_recorder else TIME)
-    return replace(joined, unread=tuple(unread), refused={**refused, **joined.refused})
+    return replace(joined, listed=tuple(listed), refused={**refused, **joined.refused})
 
 
 def _join(

@@ -40,8 +40,8 @@ class Topic:
         Column → its samples.
     times
         Time of each message, ns.
-    unread
-        Columns that the messages have and that are not needed, in order.
+    columns
+        All columns of the messages, in order.
     delay
         Median of the time of recording less the time in the header, ns; None without headers.
     unordered
@@ -52,7 +52,7 @@ class Topic:
     type: str
     series: dict[str, Series] = field(default_factory=dict)
     times: array[int] = field(default_factory=lambda: array("q"))
-    unread: dict[str, None] = field(default_factory=dict)
+    columns: dict[str, None] = field(default_factory=dict)
     delay: int | None = None
     unordered: int = 0
 
@@ -109,8 +109,8 @@ def read_topic(
         for after, pairs in _samples(message):
             for suffix, number in pairs:
                 name = f"{topic.name}{suffix}"
+                topic.columns[name] = None
                 if not takes(name):
-                    topic.unread[name] = None
                     continue
                 series = topic.series.get(name)
                 if series is None:
