@@ -74,12 +74,12 @@ class ColumnBuilder:
         """Return the numbers of all blocks."""
         self.end_block()
         plain = [block for block in self._blocks if isinstance(block, np.ndarray)]
-        if len(plain) == len(self._blocks):
+        blocks, self._blocks = self._blocks, []
+        if len(plain) == len(blocks):
             return Numbers(np.concatenate(plain))
         cells: list[str] = []
-        for block in self._blocks:
+        for block in blocks:
             cells += block if isinstance(block, list) else map(repr, block.tolist())
-        self._blocks.clear()
         values, row = numbers_of(cells, self.decimal)
         if row is not None:
             return Numbers(values, (row, cells[row]))

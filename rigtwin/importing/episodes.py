@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.numerics.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def split_episodes(columns: Columns, column: str, take: Sequence[int]) -> Iterat
             yield Episode(number, _take_rows(columns, rows))
 
 
-def _take_rows(columns: Columns, rows: Array) -> Columns:
+def _take_rows(columns: Columns, rows: NDArray[np.int64]) -> Columns:
     length = columns.rows
     values = {
         name: values[rows] for name, values in columns.values.items() if len(values) == length

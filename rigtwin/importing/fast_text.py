@@ -13,7 +13,7 @@ from rigtwin.numerics.arrays import Array
 
 LARGE = 4_000_000
 """Bytes from which reading by Arrow is worth loading it."""
-BLOCK = 1 << 24
+BLOCK = 1 << 20
 """Bytes of a file that Arrow reads at a time."""
 SPELLINGS = sorted({s for m in MISSING for s in (m, m.upper(), m.capitalize(), "NaN", "N/A")})
 """Cells that hold no value. Any other spelling is left to the slower reader."""
@@ -102,4 +102,5 @@ def read_plain(
         return None
     if odd or not parts[names[0]]:
         return None
-    return {place: np.concatenate(parts[str(place)]) for place in places}
+    # Popped, so that the parts of one column at a time are in memory twice.
+    return {place: np.concatenate(parts.pop(str(place))) for place in places}

@@ -83,7 +83,10 @@ def _label(name: object) -> str:
 
 def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, Array], str]:
     """Return a column's numbers by name, and their unit. Raises TypeError or ValueError."""
-    array = np.asarray(column)
+    try:
+        array: Any = np.asarray(column)
+    except ValueError:
+        raise ValueError("it holds lists of different lengths; expected one length") from None
     if array.dtype.kind == "O":
         array = _unpack(array)
     if array.dtype.kind in "Mm":
@@ -124,7 +127,7 @@ def _unpack(array: Array) -> Array:
     return np.array([np.nan if cell is None else float(cell) for cell in cells])
 
 
-def _seconds(array: Array) -> Array:
+def _seconds(array: Any) -> Array:
     """Return dates since 1970 or durations in s, not a number where there is none."""
     unit, count = np.datetime_data(array.dtype)
     if unit in ("Y", "M"):

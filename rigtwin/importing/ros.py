@@ -67,7 +67,7 @@ def read_bag(path: Path, selection: Selection) -> Columns:
     except Exception as error:  # The reader raises errors of any kind for a damaged bag.
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         hint = ""
-        if "profile" in reason:
+        if "profile" in reason.lower():
             hint = "; a recording of rigtwin needs no import"
         raise RigtwinError(f"{path} is not a ROS 2 bag, or damaged: {reason}{hint}") from None
 
