@@ -124,7 +124,7 @@ def convert_episodes(
     mapping: Path | Mapping[str, Any],
     folder: Path,
     machine: Machine | None = None,
-) -> tuple[Imported, ...]:
+) -> tuple[Written, ...]:
     """Convert each episode of another program's data to a recording.
 
     Parameters
@@ -136,7 +136,7 @@ def convert_episodes(
 
     Returns
     -------
-    tuple of Imported
+    tuple of Written
         In the order of the episodes. An episode that cannot be converted is left out, which every
         report states.
 

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, cast
+from typing import Any, BinaryIO, cast
 
 from rigtwin.errors import RigtwinError
 
@@ -66,6 +66,6 @@ def read_lines(path: Path, encoding: str) -> Iterator[str]:
     """Yield the lines of a text file without their ends, one at a time."""
     with open_bytes(path) as file:
         # The mark of UTF-8 and UTF-16 is no part of the text.
-        text = io.TextIOWrapper(cast(io.BufferedIOBase, file), encoding, errors="replace")
+        text = io.TextIOWrapper(cast(Any, file), encoding, errors="replace")
         for line in text:
             yield from line.splitlines()
