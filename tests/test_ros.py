@@ -234,3 +234,84 @@ def test_a_recording_of_rigtwin_needs_no_import(tmp_path: Path):
     convert([bag], tmp_path / "map.toml", tmp_path / "out.mcap")
     with pytest.raises(RigtwinError, match="a recording of rigtwin needs no import"):
         read(tmp_path / "out.mcap")
+
+
+CONTROLLER_STATE = """
+std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint reference
+trajectory_msgs/JointTrajectoryPoint feedback
+"""
+INTERFACES = """
+std_msgs/Header header
+string[] joint_names
+control_msgs/InterfaceValue[] interface_values
+================================================================================
+MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+"""
+
+
+def test_controller_states_whose_definitions_stand_in_the_bag(tmp_path: Path):
+    from rosbags.typesys import get_types_from_msg
+
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    state, dynamic = (
+        f"control_msgs/msg/{name}"
+        for name in ("JointTrajectoryControllerState", "DynamicJointState")
+    )
+    store.register(get_types_from_msg(CONTROLLER_STATE, state))
+    store.register(get_types_from_msg(INTERFACES, dynamic))
+    point = store.types["trajectory_msgs/msg/JointTrajectoryPoint"]
+    value = store.types["control_msgs/msg/InterfaceValue"]
+    joint_names, empty = ["shoulder", "elbow"], np.empty(0)
+
+    def position(*values: float) -> Any:
+        return point(np.array(values, float), empty, empty, empty, time_of(0, "Duration"))
+
+    path = tmp_path / "bag"
+    with rosbag2.Writer(path, version=9, storage_plugin=KINDS[0]) as writer:
+        topics = {
+            kind: writer.add_connection(f"/{kind[-12:].lower()}", kind, typestore=store)
+            for kind in (state, dynamic)
+        }
+        for tick in range(TICKS):
+            stamp = header(START + tick * STEP)
+            reference, feedback = position(tick, -tick), position(0.5 * tick, 0.0)
+            values = [
+                value(["position", "effort"], np.array([1.0 * tick, 7.0])),
+                value(["effort"], np.array([9.0])),
+            ]
+            for kind, content in (
+                (state, store.types[state](stamp, joint_names, reference, feedback)),
+                (dynamic, store.types[dynamic](stamp, joint_names, values)),
+            ):
+                data = store.serialize_cdr(content, kind)
+                writer.write(topics[kind], START + tick * STEP, data)
+    found = read(path).values
+    first, second = (f"/{kind[-12:].lower()}" for kind in (state, dynamic))
+    np.testing.assert_array_equal(found[f"{first}.reference.positions[elbow]"], -np.arange(TICKS))
+    np.testing.assert_array_equal(
+        found[f"{first}.feedback.positions[shoulder]"], 0.5 * np.arange(TICKS)
+    )
+    effort = f"{second}.interface_values[elbow].values[effort]"
+    np.testing.assert_array_equal(found[effort], np.full(TICKS, 9.0))
+
+
+def test_a_joint_that_only_some_messages_have(tmp_path: Path):
+    # Two publishers take turns, each with a joint of its own.
+    turns = [
+        (
+            "/joint_states",
+            START + tick * STEP,
+            joints(START + tick * STEP, ["elbow" if tick % 2 else "shoulder"], [float(tick)]),
+        )
+        for tick in range(TICKS)
+    ]
+    columns = read(write(tmp_path / "bag", turns))
+    np.testing.assert_allclose(np.diff(columns.values["time"]), 2e-9 * STEP)
+    gap = columns.values["/joint_states.position[elbow]"]
+    gap = gap - columns.values["/joint_states.position[shoulder]"]
+    # One of them is interpolated at the times of the other one.
+    np.testing.assert_allclose(gap, 0.0, atol=1e-9)
