@@ -54,7 +54,7 @@ if TYPE_CHECKING:
         machine,
         machines,
     )
-    from rigtwin.api.recordings import Recording, import_data, load
+    from rigtwin.api.recordings import Recording, import_data, import_episodes, load
     from rigtwin.api.running import run
     from rigtwin.api.session import (
         DryRun,
@@ -132,6 +132,7 @@ __all__ = [
     "faults",
     "identifiability",
     "import_data",
+    "import_episodes",
     "load",
     "look",
     "machine",
@@ -170,6 +171,7 @@ _MODULES = {
     "recordings": (
         "Recording",
         "import_data",
+        "import_episodes",
         "load",
     ),
     "running": ("run",),

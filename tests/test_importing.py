@@ -13,7 +13,8 @@ from scipy.io import savemat
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.convert import convert
-from rigtwin.importing.table import read
+from rigtwin.importing.selection import Selection
+from rigtwin.importing.table import formats, read
 from rigtwin.importing.text import find_layout
 from rigtwin.importing.units import UNITS, unit_of
 from rigtwin.recording import load
@@ -526,3 +527,34 @@ def test_a_link_to_nowhere_is_no_column(tmp_path):
     path.write_bytes(data[:1500])
     with pytest.raises(RigtwinError, match=r"link\.mat"):
         read(path)
+
+
+def test_only_the_mapped_datasets_of_matlab_v73_are_read(tmp_path, monkeypatch):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["t"], file["x"] = TIME[None, :], np.vstack([POSITION, FORCE])
+        file.create_group("s")["large"] = np.zeros((3, 1000))
+        file["s/above"] = file["/"]
+    data = bytearray(path.read_bytes())
+    data[:128] = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(data)
+    taken = []
+    original = h5py.Dataset.__getitem__
+    monkeypatch.setattr(
+        h5py.Dataset,
+        "__getitem__",
+        lambda item, key: taken.append(item.name) or original(item, key),
+    )
+    found = read(path, Selection(frozenset({"t", "x:2"})))
+    assert sorted(taken) == ["/t", "/x"]
+    assert set(found.values) == {"t", "x:2"}
+    np.testing.assert_array_equal(found.values["x:2"], FORCE)
+    assert {"x:1", "s.large:3"} <= set(found.names)
+
+
+def test_every_module_with_a_format_is_found():
+    titles = [known.title for known in formats()]
+    assert len(set(titles)) == len(titles) >= 7
+    endings = [ending for known in formats() for ending in known.endings]
+    assert len(set(endings)) == len(endings)

@@ -57,17 +57,33 @@ def machines() -> dict[str, Path]:
 
 
 def machine_of(recording: reader.Recording) -> Machine:
-    """The machine that a recording is of. Raises RigtwinError if it has to be said."""
+    """Return the machine of a recording: the one that was said, the description that the recording
+    remembers, or the shipped machine of that name.
+
+    Raises
+    ------
+    RigtwinError
+        If the machine has to be said.
+    """
     described = getattr(recording, "described", None)
     if described is not None:
         return described
-    if recording.machine not in catalogue.shipped():
-        known = ", ".join(catalogue.shipped())
-        raise RigtwinError(
-            f"{recording.path}: it is of machine {recording.machine!r}; give its description, "
-            f'machine="F.toml" or --machine F.toml (shipped ones: {known})'
-        )
-    return catalogue.find(recording.machine)
+    remembered = recording.description
+    if remembered is not None and remembered.is_file():
+        found = catalogue.find(str(remembered))
+        if found.name == recording.machine:
+            return found
+        why = f"but {remembered}, which it remembers, describes {found.name!r}"
+    elif recording.machine in catalogue.shipped():
+        return catalogue.find(recording.machine)
+    elif remembered is not None:
+        why = f"but its description {remembered} does not exist any more"
+    else:
+        why = f"which is none of the shipped ones, {', '.join(catalogue.shipped())}"
+    raise RigtwinError(
+        f"{recording.path}: it is of machine {recording.machine!r}, {why}; "
+        'give its description, machine="F.toml" or --machine F.toml'
+    )
 
 
 def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:

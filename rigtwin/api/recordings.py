@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigtwin.api.machines import Settings, machine, machine_of, twin_of
+from rigtwin.api.machines import Settings, machine, machine_of, the_machine, twin_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import keep_apart
-from rigtwin.importing.convert import convert
+from rigtwin.importing.convert import Data, convert, convert_episodes
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
 
@@ -174,24 +174,87 @@ def faced(plain: reader.Recording, described: Machine | None) -> Recording:
 
 
 def import_data(
-    data: str | Path | Sequence[str | Path], mapping: str | Path, out: str | Path
+    data: Data | str | Path | Sequence[str | Path],
+    mapping: str | Path | Mapping[str, Any],
+    out: str | Path,
+    *,
+    machine: Machine | str | Path | None = None,
 ) -> Recording:
-    """Makes a recording of another program's data.
+    """Make a recording of another program's data.
 
     Parameters
     ----------
     data
-        A csv, json, mat or parquet file, or several that are put side by side, row by row.
+        File or folder of a kind that docs/importing.md lists; several files, which are put side by
+        side, row by row; or data in memory: a pandas DataFrame, an Arrow table, or a dictionary of
+        name → array, shape (rows,) or (rows, items).
     mapping
-        A TOML file that says which column is which channel, docs/machines.md.
+        Map from columns to channels: a TOML file, or its tables as a dictionary.
     out
         The recording, an MCAP file.
+    machine
+        Machine the data belong to, or its name or description. Defaults to the one named in the
+        map.
+
+    Returns
+    -------
+    Recording
+        The recording, with a report of what was found on the way.
 
     Raises
     ------
     RigtwinError
-        Naming the column, unit or line that is at fault.
+        Naming the column, unit or line that is at fault. Also for data of several episodes.
     """
-    files = [data] if isinstance(data, str | Path) else data
-    report = convert([Path(each) for each in files], Path(mapping), Path(out))
-    return replace(load(out), report=tuple(report))
+    described = _described(machine)
+    report = convert(_given(data), _map_of(mapping), Path(out), described)
+    return replace(load(out, described), report=tuple(report))
+
+
+def import_episodes(
+    data: Data | str | Path | Sequence[str | Path],
+    mapping: str | Path | Mapping[str, Any],
+    folder: str | Path,
+    *,
+    machine: Machine | str | Path | None = None,
+) -> tuple[Recording, ...]:
+    """Make a recording of each episode of another program's data.
+
+    Parameters
+    ----------
+    data, mapping, machine
+        As for `import_data`.
+    folder
+        Folder of the recordings, made if it is absent.
+
+    Returns
+    -------
+    tuple of Recording
+        In the order of the episodes. An episode that cannot be imported is left out, which every
+        report states.
+
+    Raises
+    ------
+    RigtwinError
+        If no episode can be imported.
+    """
+    described = _described(machine)
+    done = convert_episodes(_given(data), _map_of(mapping), Path(folder), described)
+    return tuple(replace(load(each.path, described), report=each.report) for each in done)
+
+
+def _described(given: Machine | str | Path | None) -> Machine | None:
+    return None if given is None else the_machine(given)
+
+
+def _given(data: Any) -> Any:
+    """Return paths as a list, and data in memory as they are."""
+    if isinstance(data, str | Path):
+        return [Path(data)]
+    if isinstance(data, list | tuple) and data and all(isinstance(n, str | Path) for n in data):
+        return [Path(name) for name in data]
+    return data
+
+
+def _map_of(given: str | Path | Mapping[str, Any]) -> Path | Mapping[str, Any]:
+    return given if isinstance(given, Mapping) else Path(given)

@@ -40,3 +40,9 @@ def find(name: str) -> Machine:
         f"unknown machine {name!r}; there are {', '.join(shipped())}, "
         "or give the path of a description, F.toml"
     )
+
+
+def own_description(machine: Machine) -> Path | None:
+    """Return the path of a machine's description, or None if it is a shipped one, which every
+    installation has under its name."""
+    return None if shipped().get(machine.name) == machine.path else machine.path

@@ -20,7 +20,10 @@ from rigtwin.signals.noise import rms, smallest_step, white_noise
 from rigtwin.signals.runs import find_cut_off, longest_run
 
 SHORTEST = 200
-"""Ticks below which a noise floor cannot be estimated."""
+"""Ticks below which a noise floor cannot be estimated: of a recording that is judged alone, or of
+all recordings that are judged together."""
+SHORTEST_PART = 40
+"""Ticks below which a recording does not count among others: filters need them to settle."""
 SHORTEST_TIME = 0.5
 """s; less than a few periods of anything that a machine does says nothing."""
 STEPS = 2
@@ -70,7 +73,10 @@ class Fault:
 
 
 def find_faults(
-    machine: Machine, recording: Recording, configuration: Configuration
+    machine: Machine,
+    recording: Recording,
+    configuration: Configuration,
+    least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
     """All faults of a recording.
 
@@ -82,12 +88,14 @@ def find_faults(
         The data.
     configuration
         Of the twin, see `Machine.configuration_of`.
+    least
+        Ticks that the recording must have. Fewer suffice among others, see `least_ticks`.
 
     Returns
     -------
     Faults, the gravest first. Later checks are left out where earlier ones make them meaningless.
     """
-    found = [*_check_presence(machine, recording)]
+    found = [*_check_presence(machine, recording, least)]
     if not found:
         found += _check_values(machine, recording)
     if not found:
@@ -105,11 +113,14 @@ def find_faults(
 
 
 def require_fit(
-    machine: Machine, recording: Recording, configuration: Configuration
+    machine: Machine,
+    recording: Recording,
+    configuration: Configuration,
+    least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
     """The faults that do not forbid a comparison. Raises RigtwinError naming every one that
     does."""
-    faults = find_faults(machine, recording, configuration)
+    faults = find_faults(machine, recording, configuration, least)
     if fatal := [fault.message for fault in faults if fault.fatal]:
         raise RigtwinError(f"{recording.path}: {'; '.join(fatal)}")
     return faults
@@ -128,7 +139,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     return list(dict.fromkeys(found))
 
 
-def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_presence(machine: Machine, recording: Recording, least: int) -> Iterator[Fault]:
     if recording.machine != machine.name:
         yield Fault(
             "wrong machine",
@@ -147,11 +158,11 @@ def _check_presence(machine: Machine, recording: Recording) -> Iterator[Fault]:
                 "missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}"
             )
     lasts = recording.ticks * recording.period
-    if recording.ticks < SHORTEST:
+    if recording.ticks < least:
         yield Fault(
             "too short",
             "recording",
-            f"it has {recording.ticks} ticks; a comparison needs at least {SHORTEST}",
+            f"it has {recording.ticks} ticks; a comparison needs at least {least}",
         )
     elif lasts < SHORTEST_TIME:
         message = (

@@ -19,7 +19,7 @@ from rigtwin.description.machine import OWN, Machine
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
-from rigtwin.diagnosis.data_checks import find_faults, require_fit
+from rigtwin.diagnosis.data_checks import SHORTEST, SHORTEST_PART, find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.explain import Explanation, explain
 from rigtwin.diagnosis.finding import (
@@ -49,6 +49,7 @@ from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
+from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
@@ -70,9 +71,14 @@ def _answer_unusable(
     faults = [
         f"{recording.path}: {fault.message}"
         for recording, configuration in zip(recordings, configurations, strict=True)
-        for fault in find_faults(machine, recording, configuration)
+        for fault in find_faults(machine, recording, configuration, least_ticks(recordings))
         if fault.fatal
     ]
+    total = sum(recording.ticks for recording in recordings)
+    if len(recordings) > 1 and total < SHORTEST:
+        faults.insert(
+            0, f"the recordings have {total} ticks together; a diagnosis needs at least {SHORTEST}"
+        )
     if not faults:
         return None
     return Answer(
@@ -139,13 +145,16 @@ def diagnose(
     started = time.perf_counter()
     recordings, copies = drop_copies(recordings)
     refuse_copies(held_out, recordings)
+    recordings, short = drop_short(recordings)
+    held_out, short_held_out = drop_short(held_out)
+    left_out = [*copies, *short, *short_held_out]
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
         if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
             return Diagnosis(bad, machine, None, configurations[0])
         others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
-            require_fit(machine, recording, configuration)
+            require_fit(machine, recording, configuration, least_ticks(held_out))
 
         def diagnose_part(part: Machine) -> Diagnosis:
             evidence = Evidence(part, recordings, configurations)
@@ -162,10 +171,10 @@ def diagnose(
 
         found = [diagnose_part(part) for part in machine.physics.split(machine)]
         if len(found) == 1:
-            return _with_notes(found[0], copies)
+            return _with_notes(found[0], left_out)
         apart = Evidence(machine, held_out, others) if held_out else None
         joined = join(Evidence(machine, recordings, configurations), apart, found, started)
-        return _with_notes(joined, copies)
+        return _with_notes(joined, left_out)
 
 
 def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:
@@ -315,7 +324,7 @@ def _clipping_notes(evidence: Evidence) -> list[str]:
         for recording, configuration in zip(
             evidence.recordings, evidence.configurations, strict=True
         )
-        for fault in find_faults(evidence.machine, recording, configuration)
+        for fault in find_faults(evidence.machine, recording, configuration, SHORTEST_PART)
         if not fault.fatal
     ]
 

@@ -17,20 +17,46 @@ MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "
 
 @dataclass(frozen=True)
 class Columns:
-    """values: name → numbers, shape (rows,), not a number where a cell held none; units: name → as
-    the file says; form: how it was read, for people; notes: what was odd on the way; wrong: name →
-    the first cell that should be a number and is none, and where it stands."""
+    """Table of numbers.
+
+    Parameters
+    ----------
+    values
+        Name → numbers, shape (rows,); not a number where a cell held none.
+    units
+        Name → unit as the file spells it.
+    form
+        How the file was read, for people.
+    notes
+        What was odd in the file, a line each.
+    wrong
+        Name → first cell that should be a number and is none, and where it stands.
+    listed
+        Columns of numbers that the file has, those that were not needed included.
+    refused
+        Name → why the column cannot be read as numbers.
+    episode
+        Column that numbers the episodes of a file that holds several; "" for a file of one.
+    """
 
     values: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=dict)
     form: str = ""
     notes: tuple[str, ...] = ()
     wrong: Mapping[str, str] = field(default_factory=dict)
+    listed: tuple[str, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+    episode: str = ""
 
     @property
     def rows(self) -> int:
-        """Of the longest column."""
+        """Number of rows of the longest column."""
         return max((len(each) for each in self.values.values()), default=0)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All columns of numbers, those that were not needed included."""
+        return tuple(dict.fromkeys((*self.listed, *self.values)))
 
 
 def is_missing(cell: str) -> bool:
@@ -127,16 +153,27 @@ def join(tables: Mapping[str, Columns]) -> Columns:
     if len(set(rows.values())) > 1:
         counts = ", ".join(f"{name} {count}" for name, count in rows.items())
         raise RigtwinError(f"files that are joined must have the same rows; they have: {counts}")
-    names = [name for table in tables.values() for name in table.values]
+    for file, table in tables.items():
+        if table.episode:
+            raise RigtwinError(
+                f"{file} holds episodes and cannot be put beside another file; import it alone"
+            )
+    names = [name for table in tables.values() for name in table.names]
     values: dict[str, Array] = {}
     units: dict[str, str] = {}
     wrong: dict[str, str] = {}
+    refused: dict[str, str] = {}
+    listed: list[str] = []
     for file, table in tables.items():
         for name, column in table.values.items():
             for own in (f"{file}.{name}", *([name] if names.count(name) == 1 else [])):
                 values[own] = column
                 units |= {own: table.units[name]} if name in table.units else {}
                 wrong |= {own: table.wrong[name]} if name in table.wrong else {}
+        for name in table.names:
+            listed += [f"{file}.{name}", *([name] if names.count(name) == 1 else [])]
+        for name, reason in table.refused.items():
+            refused |= {f"{file}.{name}": reason, name: reason}
     notes = tuple(f"{file}: {note}" for file, table in tables.items() for note in table.notes)
     form = "; ".join(f"{file}: {table.form}" for file, table in tables.items())
-    return Columns(values, units, form, notes, wrong)
+    return Columns(values, units, form, notes, wrong, tuple(listed), refused)

@@ -6,17 +6,23 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, TypeGuard
 
 import numpy as np
 
+from rigtwin.description import catalogue
+from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import keep_apart, recordable, written_whole
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
+from rigtwin.importing.episodes import Episode, split_episodes
+from rigtwin.importing.frames import read_frame
 from rigtwin.importing.mapping import Column, Map, Source, load
+from rigtwin.importing.naming import split_unit
 from rigtwin.importing.oddities import find_oddities, looks_wrapped
+from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.table import read
-from rigtwin.importing.text import split_unit
 from rigtwin.importing.timing import (
     Signals,
     drop_repeats,
@@ -30,55 +36,26 @@ from rigtwin.recording import Writer
 
 BLOCK = 10_000
 """Ticks written at a time."""
+Data = Any
+"""Paths of files, a list; or data in memory."""
 LARGEST = 1e15
 """What no channel reaches, in SI units."""
 Channels = Mapping[tuple[str, str], Array]
 """(Topic, field) → shape (ticks,)."""
-
-
-def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
-    """Converts another program's data to a recording.
-
-    Parameters
-    ----------
-    data
-        Files; several are put side by side, row by row.
-    map_path
-        Which column is which channel, TOML.
-    out
-        Of the recording.
-
-    Returns
-    -------
-    list of str
-        What was found on the way, a line each.
-
-    Raises
-    ------
-    RigtwinError
-        Before anything is written.
-    """
-    recordable(keep_apart(out, *data, map_path))
-    wanted = load(map_path)
-    imported = read_channels(data, wanted)
-    _write(out, wanted, imported.period, imported.channels)
-    count = len(imported.time)
-    return [
-        *imported.report,
-        f"{count} ticks of {imported.period:g} s for machine {wanted.machine} in {out}",
-    ]
+ENDING = ".mcap"
+"""Ending of a recording's name."""
 
 
 @dataclass(frozen=True)
 class Imported:
-    """Channels of a recording, read from another program's files.
+    """Channels of a recording, read from another program's data.
 
     Parameters
     ----------
     period
         Period of the ticks, s.
     time
-        s, shape (ticks,).
+        Time of the ticks, s, shape (ticks,).
     channels
         (Topic, field) → values in SI, shape (ticks,).
     report
@@ -91,40 +68,222 @@ class Imported:
     report: tuple[str, ...]
 
 
-def read_columns(data: Sequence[Path]) -> Columns:
-    """Return the columns of files, put side by side row by row.
+@dataclass(frozen=True)
+class Written:
+    """A recording made of one episode of another program's data.
 
     Parameters
     ----------
-    data
-        Files of another program.
+    path
+        File of the recording.
+    report
+        What was found on the way, a line each.
     """
-    if len({path.stem for path in data}) < len(data):
-        raise RigtwinError("two of the files have the same name; rename one, they are told by it")
-    return join({path.stem: read(path) for path in data})
+
+    path: Path
+    report: tuple[str, ...]
 
 
-def read_channels(data: Sequence[Path], wanted: Map) -> Imported:
-    """Return the channels that a map makes of another program's files.
+def convert(
+    data: Data,
+    mapping: Path | Mapping[str, Any],
+    out: Path,
+    machine: Machine | None = None,
+) -> list[str]:
+    """Convert another program's data to a recording.
 
     Parameters
     ----------
     data
-        Files, put side by side row by row.
-    wanted
-        Which column is which channel.
+        Files; several are put side by side, row by row. Or data in memory, see `read_frame`.
+    mapping
+        Map from columns to channels: a TOML file, or its tables.
+    out
+        File of the recording.
+    machine
+        Machine the data belong to. Defaults to the one named in the map.
+
+    Returns
+    -------
+    list of str
+        What was found on the way, a line each.
 
     Raises
     ------
     RigtwinError
-        Naming the column, unit or line that is at fault.
+        Before anything is written. Also if the data hold several episodes.
     """
-    columns = read_columns(data)
-    said = ", ".join(map(str, data))
-    report = [f"{said}: {columns.form}; {columns.rows} rows, columns {', '.join(columns.values)}"]
-    report += columns.notes
+    recordable(keep_apart(out, *_files(data, mapping)))
+    wanted = load(mapping)
+    imported = read_channels(data, wanted)
+    return [*imported.report, _write(out, wanted, _machine(wanted, machine), imported)]
+
+
+def convert_episodes(
+    data: Data,
+    mapping: Path | Mapping[str, Any],
+    folder: Path,
+    machine: Machine | None = None,
+) -> tuple[Written, ...]:
+    """Convert each episode of another program's data to a recording.
+
+    Parameters
+    ----------
+    data, mapping, machine
+        As for `convert`.
+    folder
+        Folder of the recordings, made if it is absent. Each is named by its episode's number.
+
+    Returns
+    -------
+    tuple of Written
+        In the order of the episodes. An episode that cannot be converted is left out, which every
+        report states.
+
+    Raises
+    ------
+    RigtwinError
+        If no episode can be converted, or the folder cannot be written.
+    """
+    wanted = load(mapping)
+    label, columns = _label(data), read_columns(data, wanted.selection)
+    episodes = _split(label, columns, wanted)
+    _make_folder(folder)
+    if not episodes:
+        out = folder / f"{data[0].stem if _are_paths(data) else 'recording'}{ENDING}"
+        return (Written(out, tuple(convert(data, mapping, out, machine))),)
+    described = _machine(wanted, machine)
+    header, done, errors = _header(label, columns), [], []
+    for episode in episodes:
+        out = folder / f"{episode.name}{ENDING}"
+        try:
+            imported = _channels(label, episode.columns, wanted)
+            line = _write(recordable(out), wanted, described, imported)
+        except RigtwinError as error:
+            errors.append(error)
+            header.append(f"episode {episode.number} is left out: {error}")
+        else:
+            lines = [f"episode {episode.number}: {each}" for each in (*imported.report, line)]
+            done.append(Written(out, tuple(lines)))
+    if not done:
+        raise errors[0]
+    return tuple(replace(each, report=(*header, *each.report)) for each in done)
+
+
+def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
+    """Return the columns of another program's data.
+
+    Parameters
+    ----------
+    data
+        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+    selection
+        Columns and episodes that are needed. Defaults to all.
+
+    Returns
+    -------
+    Columns
+        The needed columns, and the names of all.
+    """
+    if not _are_paths(data):
+        return read_frame(data, selection)
+    if len({path.stem for path in data}) < len(data):
+        raise RigtwinError("two of the files have the same name; rename one, they are told by it")
+    return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
+
+
+def read_channels(data: Data, wanted: Map) -> Imported:
+    """Return the channels that a map makes of another program's data.
+
+    Parameters
+    ----------
+    data
+        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+    wanted
+        Map from columns to channels.
+
+    Returns
+    -------
+    Imported
+        Channels of one test.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the column, unit or line that is at fault. Also if the data hold several episodes.
+    """
+    label, columns = _label(data), read_columns(data, wanted.selection)
+    episodes = _split(label, columns, wanted)
+    if len(episodes) > 1:
+        raise RigtwinError(
+            f"{label} holds {len(episodes)} episodes; name a folder as the output, such as "
+            "-o episodes/, which gets a recording of each, or choose one in the map: "
+            f"[episodes] take = [{episodes[0].number}]"
+        )
+    header = _header(label, columns)
+    imported = _channels(label, episodes[0].columns if episodes else columns, wanted)
+    return replace(imported, report=(*header, *imported.report))
+
+
+def _make_folder(folder: Path) -> None:
     try:
-        inputs = _inputs(wanted, columns)
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot write {folder}: {error.strerror}") from None
+
+
+def _files(data: Data, mapping: Path | Mapping[str, Any]) -> list[Path]:
+    """Return the files that an import reads."""
+    files = list(data) if _are_paths(data) else []
+    return [*files, mapping] if isinstance(mapping, Path) else files
+
+
+def _are_paths(data: Data) -> TypeGuard[Sequence[Path]]:
+    return isinstance(data, list | tuple) and all(isinstance(path, Path) for path in data)
+
+
+def _label(data: Data) -> str:
+    """Return what data are called in messages."""
+    return ", ".join(map(str, data)) if _are_paths(data) else "the data"
+
+
+def _split(label: str, columns: Columns, wanted: Map) -> list[Episode]:
+    """Return the episodes of data that hold several tests, else none."""
+    name = wanted.episode or columns.episode
+    if not name:
+        if wanted.episodes:
+            raise RigtwinError(
+                f"{label}: [episodes] take needs [episodes] column, which numbers the episodes"
+            )
+        return []
+    try:
+        _column(columns, name)
+        return list(split_episodes(columns, name, wanted.episodes))
+    except RigtwinError as error:
+        raise RigtwinError(f"{label}: {error}") from None
+
+
+def _machine(wanted: Map, machine: Machine | None) -> Machine | None:
+    """Return the machine that was given, or the one whose description the map names, if any."""
+    if machine is not None or not wanted.machine.endswith(".toml"):
+        return machine
+    return catalogue.find(str(wanted.folder / wanted.machine))
+
+
+def _header(label: str, columns: Columns) -> list[str]:
+    """Return the first lines of the report: what the data hold."""
+    names = ", ".join(columns.names)
+    return [f"{label}: {columns.form}; {columns.rows} rows, columns {names}", *columns.notes]
+
+
+def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
+    """Return the channels of one test."""
+    report: list[str] = []
+    try:
+        inputs = {
+            key: replace(column, name=_named(columns, column.name))
+            for key, column in wanted.inputs.items()
+        }
         signals: Signals = {
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
@@ -149,37 +308,28 @@ def read_channels(data: Sequence[Path], wanted: Map) -> Imported:
             for channel, source in wanted.channels.items()
         }
     except RigtwinError as error:
-        raise RigtwinError(f"{said}: {error}") from None
+        raise RigtwinError(f"{label}: {error}") from None
     for channel, values in channels.items():
         report += [f"{'.'.join(channel)} {each}" for each in find_oddities(values, time - time[0])]
     return Imported(period, time, channels, tuple(report))
 
 
-def _inputs(wanted: Map, columns: Columns) -> dict[str, Column]:
-    """The columns that are read: of channels by the channel's name, of formulas by their own."""
-    found = {}
-    for channel, source in wanted.channels.items():
-        if source.column is not None:
-            found[".".join(channel)] = source.column
-        for name in source.formula.inputs if source.formula is not None else ():
-            found[name] = wanted.columns.get(name, Column(name, None, None))
-    return {key: replace(each, name=_named(columns, each.name)) for key, each in found.items()}
-
-
 def _named(columns: Columns, name: str) -> str:
     """A column's name, also where the map has it as the file's first line does, its unit behind
     it."""
-    if name in columns.values:
+    if name in columns.values or name in columns.refused:
         return name
     bare, unit = split_unit(name, "")
     return bare if columns.units.get(bare) == unit != "" else name
 
 
 def _column(columns: Columns, name: str) -> Array:
+    if name in columns.refused:
+        raise RigtwinError(f"column {name!r} cannot be read: {columns.refused[name]}")
     if name not in columns.values:
-        close = difflib.get_close_matches(name, columns.values, 1)
+        close = difflib.get_close_matches(name, columns.names, 1)
         hint = f"did you mean {close[0]!r}? " if close else ""
-        raise RigtwinError(f"no column {name!r}; {hint}there are {', '.join(columns.values)}")
+        raise RigtwinError(f"no column {name!r}; {hint}there are {', '.join(columns.names)}")
     return columns.values[name]
 
 
@@ -290,22 +440,30 @@ def _values(name: str, source: Source, signals: Signals, time: Array, period: fl
     return values
 
 
-def _write(out: Path, wanted: Map, period: float, channels: Channels) -> None:
+def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) -> str:
+    """Write a recording; return the last line of the report."""
+    channels, period, ticks = imported.channels, imported.period, len(imported.time)
     fields: dict[str, list[str]] = {}
-    for topic, name in channels:
-        fields.setdefault(topic, []).append(name)
-    ticks = len(next(iter(channels.values())))
-    names = {topic: tuple(each) for topic, each in fields.items()}
+    for topic, field in channels:
+        fields.setdefault(topic, []).append(field)
+    name = wanted.machine if machine is None else machine.name
     with (
         written_whole(out) as beside,
         Writer(
-            beside, wanted.experiment, period, wanted.controller, wanted.machine, names
+            beside,
+            wanted.experiment,
+            period,
+            wanted.controller,
+            name,
+            {topic: tuple(each) for topic, each in fields.items()},
+            None if machine is None else catalogue.own_description(machine),
         ) as writer,
     ):
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {
-                topic.strip("/"): np.column_stack([channels[topic, name][part] for name in each])
-                for topic, each in names.items()
+                topic.strip("/"): np.column_stack([channels[topic, each][part] for each in names])
+                for topic, names in fields.items()
             }
             writer.append(**blocks)
+    return f"{ticks} ticks of {period:g} s for machine {name} in {out}"

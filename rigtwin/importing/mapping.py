@@ -6,18 +6,28 @@ import difflib
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
+from rigtwin.importing.selection import Selection
 from rigtwin.importing.units import unit_of
 from rigtwin.recording.schema import NAME, check_names
 
 TOPICS = ("/command", "/sensor")
-TABLES = ("machine", "experiment", "time", "columns", "constants", "channels", "controller")
+TABLES = (
+    "machine",
+    "experiment",
+    "time",
+    "episodes",
+    "columns",
+    "constants",
+    "channels",
+    "controller",
+)
 COLUMN = ("column", "unit", "wrap")
 SCALED = (*COLUMN, "scale", "offset", "sign")
 
@@ -47,9 +57,37 @@ class Source:
 
 @dataclass(frozen=True)
 class Map:
-    """period: s, None if a column says the time; time: columns whose sum that is, such as a date
-    and a time of day; resample: s, None if the data stay as they are; start, until: s of the data
-    that are taken; columns: name in formulas → column."""
+    """Columns of a file, and the channels that they become.
+
+    Parameters
+    ----------
+    machine
+        Name of the machine, or the path of its description as the map spells it.
+    experiment
+        Name of the test.
+    time
+        Columns whose sum is the time, such as a date and a time of day.
+    time_unit
+        Unit of these columns. None for the unit that the file states.
+    period
+        Period of the rows, s. None if columns hold the time.
+    resample
+        Period to resample to, s. None keeps the rows.
+    start, until
+        Stretch of the data to import, s.
+    columns
+        Name in formulas → column.
+    channels
+        (Topic, field) → source of the channel.
+    controller
+        Settings of the controller in this test.
+    episode
+        Column that numbers the episodes. None for the one that the file states.
+    episodes
+        Numbers of the episodes to import. Empty for all.
+    folder
+        Folder in which a relative path of a description is looked for.
+    """
 
     machine: str
     experiment: str
@@ -62,17 +100,60 @@ class Map:
     columns: Mapping[str, Column]
     channels: Mapping[tuple[str, str], Source]
     controller: Mapping[str, float | str]
+    episode: str | None = None
+    episodes: tuple[int, ...] = ()
+    folder: Path = Path()
+
+    @property
+    def inputs(self) -> dict[str, Column]:
+        """Columns to read: by the channel's name, and by their name in formulas."""
+        found: dict[str, Column] = {}
+        for channel, source in self.channels.items():
+            if source.column is not None:
+                found[".".join(channel)] = source.column
+            for name in source.formula.inputs if source.formula is not None else ():
+                found[name] = self.columns.get(name, Column(name, None, None))
+        return found
+
+    @property
+    def selection(self) -> Selection:
+        """Columns and episodes that the map needs of a file."""
+        names = {column.name for column in self.inputs.values()} | {*self.time}
+        return Selection(
+            frozenset(names | ({self.episode} if self.episode else set())),
+            self.time,
+            self.episodes,
+        )
 
 
-def load(path: Path) -> Map:
-    """Reads a map. Raises RigtwinError naming the file, the key and what was expected."""
+def load(path: Path | Mapping[str, Any]) -> Map:
+    """Read a map.
+
+    Parameters
+    ----------
+    path
+        TOML file, or its tables as a dictionary.
+
+    Returns
+    -------
+    Map
+        The map.
+
+    Raises
+    ------
+    RigtwinError
+        If a key is unknown, missing or wrong. The message names the file, the key and what was
+        expected.
+    """
+    if isinstance(path, Mapping):
+        return _map(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except ValueError as error:
         raise RigtwinError(f"{path} is not valid TOML: {error}") from None
-    return parse(text, str(path))
+    return replace(parse(text, str(path)), folder=path.parent)
 
 
 def parse(text: str, name: str) -> Map:
@@ -129,7 +210,7 @@ def _map(document: Mapping[str, Any]) -> Map:
     if not isinstance(machine, str) or not machine:
         raise RigtwinError(
             "machine is missing; expected the name that its description has, "
-            'such as machine = "emps"'
+            'such as machine = "emps", or the path of its description'
         )
     time = _require_keys(
         "[time]",
@@ -144,6 +225,7 @@ def _map(document: Mapping[str, Any]) -> Map:
     )
     if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
         raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
+    episode, episodes = _episodes(document.get("episodes", {}))
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:
         raise RigtwinError(
@@ -177,7 +259,21 @@ def _map(document: Mapping[str, Any]) -> Map:
         columns=columns,
         channels=found,
         controller=dict(controller),
+        episode=episode,
+        episodes=episodes,
     )
+
+
+def _episodes(given: object) -> tuple[str | None, tuple[int, ...]]:
+    """Return the column that numbers the episodes, and the episodes to import."""
+    table = _require_keys("[episodes]", given, ("column", "take"))
+    column = table.get("column")
+    if column is not None and not (isinstance(column, str) and column):
+        raise RigtwinError(f"[episodes] column = {column}: expected the name of a column")
+    take = table.get("take", [])
+    if not isinstance(take, list | tuple) or not all(type(number) is int for number in take):
+        raise RigtwinError(f"[episodes] take = {take}: expected a list of whole numbers")
+    return column, tuple(dict.fromkeys(take))
 
 
 def _channel(name: str) -> tuple[str, str]:

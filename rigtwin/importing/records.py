@@ -11,9 +11,11 @@ import numpy as np
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns, numbers_of
+from rigtwin.importing.format import Format
+from rigtwin.importing.selection import EVERYTHING, Selection
 
 
-def read_json(path: Path) -> Columns:
+def read_json(path: Path, _: Selection = EVERYTHING) -> Columns:
     """Columns of a JSON file: a list of records, an object with such a list in it, an object with a
     list of numbers a column, or a record a line.
 
@@ -105,3 +107,6 @@ def _of_cells(cells: Mapping[str, Sequence[Any]], form: str, notes: tuple[str, .
 
 def _cell(value: Any) -> str:
     return str(float(value)) if isinstance(value, bool) else str(value)
+
+
+FORMAT = Format("JSON", (".json", ".jsonl", ".ndjson"), read_json)

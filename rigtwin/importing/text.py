@@ -3,16 +3,19 @@ data, columns of words, rows that break off."""
 
 from __future__ import annotations
 
-import csv
-import io
-import re
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
-from rigtwin.importing.columns import Columns, is_missing, is_value, numbers_of
+from rigtwin.importing.cells import Numbers, gather_rows, split_cells
+from rigtwin.importing.columns import Columns, is_missing, is_value
+from rigtwin.importing.fast_text import read_plain
+from rigtwin.importing.format import Format
+from rigtwin.importing.lines import find_encoding, read_lines
+from rigtwin.importing.naming import repeated_names, split_unit
+from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.units import is_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
@@ -45,102 +48,84 @@ class Line:
     numbers: int
 
 
-def read_text(path: Path) -> Columns:
-    """Columns of a text file. Raises RigtwinError saying what is wrong and in which line."""
-    lines = _decode(path).splitlines()
-    while lines and not lines[-1].strip():
-        lines.pop()
+def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
+    """Read the needed columns of a text file, block by block.
+
+    Parameters
+    ----------
+    path
+        The file, plain or compressed by gzip.
+    selection
+        Columns that are needed. Defaults to all.
+
+    Returns
+    -------
+    Columns
+        The needed columns.
+
+    Raises
+    ------
+    RigtwinError
+        Saying what is wrong, and in which line.
+    """
+    encoding = find_encoding(path)
+    head = list(islice(read_lines(path, encoding), HEADER))
+    while head and not head[-1].strip():
+        head.pop()
     try:
-        found = find_layout(lines)
+        found = find_layout(head)
     except RigtwinError as error:
         raise RigtwinError(f"{path}: {error}") from None
     if found is None:
         raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
-    for name, count in Counter(found.names).items():
-        if count > 1:
-            raise RigtwinError(f"{path}: {count} columns are named {name!r}")
-    numbers, rows, notes = _rows(path, lines, found)
-    values, wrong = {}, {}
-    for place, name in enumerate(found.names):
-        if place in found.words:
-            continue
-        values[name], bad = numbers_of([row[place] for row in rows], found.decimal)
-        if bad is not None:
-            wrong[name] = f"{rows[bad][place][:40]!r} in line {numbers[bad]}"
+    refused = repeated_names(found.names)
+    known = {
+        name: place
+        for place, name in enumerate(found.names)
+        if place not in found.words and name not in refused
+    }
+    needed = {name: place for name, place in known.items() if selection.takes(name)}
+    columns, notes, lines = _read_columns(path, encoding, head, found, list(needed.values()))
+    values = {name: columns[place].values for name, place in needed.items()}
+    wrong = {
+        name: f"{cell[:40]!r} in line {lines[row]}"
+        for name, place in needed.items()
+        for row, cell in filter(None, [columns[place].wrong])
+    }
+    units = {n: u for n, u in zip(found.names, found.units, strict=True) if u and n in values}
+    for name, place in needed.items():
+        if columns[place].are_stamps:
+            units.setdefault(name, "s")
     mark = {"\t": "tab", " ": "space"}.get(found.separator, found.separator)
     form = f"text, separated by {mark}, decimal {found.decimal}, data from line {found.first + 1}"
     if found.words:
         form += f"; words in {', '.join(found.names[place] for place in sorted(found.words))}"
-    units = {n: u for n, u in zip(found.names, found.units, strict=True) if u and n in values}
-    return Columns(values, units, form, notes, wrong)
+        first = split_cells(head[found.first], found.separator)
+        refused |= {
+            found.names[place]: f"it holds {first[place][:40]!r} in line {found.first + 1}, which "
+            "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
+            "separators, and not hexadecimal"
+            for place in found.words
+        }
+    return Columns(values, units, form, notes, wrong, listed=tuple(known), refused=refused)
 
 
-def _rows(
-    path: Path, lines: Sequence[str], found: Layout
-) -> tuple[list[int], list[list[str]], tuple[str, ...]]:
-    """Line numbers, cells, and what was odd. A row that breaks off lacks its last cells; of the
-    last row nothing is believed then."""
-    wide = len(found.names)
-    numbers: list[int] = []
-    rows: list[list[str]] = []
-    short: list[int] = []
-    long: list[int] = []
-    for number, line in enumerate(lines[found.first :], start=found.first + 1):
-        cells = _cells(line, found.separator)
-        if not any(cells):
-            continue
-        while len(cells) > wide and not cells[-1]:
-            cells.pop()
-        if len(cells) > wide:
-            if any(is_value(cell, found.decimal) for cell in cells[wide:]):
-                raise RigtwinError(f"{path}: line {number} has {len(cells)} cells; expected {wide}")
-            long.append(number)
-        elif len(cells) < wide:
-            short.append(number)
-        numbers.append(number)
-        rows.append((cells + [""] * wide)[:wide])
-    notes = []
-    if short and short[-1] == numbers[-1]:
-        notes.append(f"the last line, {short.pop()}, breaks off and is left out")
-        numbers.pop()
-        rows.pop()
-    if short:
-        notes.append(f"{len(short)} lines break off, the first is {short[0]}; cells are missing")
-    if long:
-        notes.append(f"{len(long)} lines have words after their last cell, the first is {long[0]}")
-    return numbers, rows, tuple(notes)
-
-
-def _decode(path: Path) -> str:
-    raw = path.read_bytes()
-    for mark, name in (
-        (b"\xef\xbb\xbf", "utf-8-sig"),
-        (b"\xff\xfe", "utf-16"),
-        (b"\xfe\xff", "utf-16"),
-    ):
-        if raw.startswith(mark):
-            return raw.decode(name, errors="replace")
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    if separator == " ":
-        return line.split()
-    if '"' not in line:
-        cells = line.split(separator) if line else []
-    else:
-        try:
-            cells = next(csv.reader(io.StringIO(line), delimiter=separator), [])
-        except csv.Error as error:
-            raise RigtwinError(f"a line that begins {line[:30]!r}: {error}") from None
-    return [cell.strip() for cell in cells]
+def _read_columns(
+    path: Path, encoding: str, head: Sequence[str], found: Layout, places: Sequence[int]
+) -> tuple[Mapping[int, Numbers], tuple[str, ...], Sequence[int]]:
+    """Return the numbers in these places, what was odd, and the number of each row's line."""
+    layout = (found.separator, found.decimal, len(found.names), places)
+    fast = read_plain(path, encoding, head[: found.first], *layout)
+    if fast is not None:
+        return {place: Numbers(values) for place, values in fast.items()}, (), ()
+    lines = islice(enumerate(read_lines(path, encoding), start=1), found.first, None)
+    rows = gather_rows(path, lines, *layout)
+    columns = {place: builder.finish() for place, builder in rows.columns.items()}
+    return columns, tuple(rows.notes), rows.numbers
 
 
 def _look_at(line: str, separator: str, decimal: str) -> Line:
-    cells = _cells(line, separator)
+    cells = split_cells(line, separator)
     while cells and not cells[-1]:
         cells.pop()
     words = frozenset(n for n, cell in enumerate(cells) if not is_value(cell, decimal))
@@ -189,7 +174,7 @@ def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
     """The layout with names and units from the lines above the data."""
     above = []
     for line in reversed(lines[: found.first]):
-        cells = _cells(line.lstrip("#%"), found.separator)
+        cells = split_cells(line.lstrip("#%"), found.separator)
         while len(cells) > columns and not cells[-1]:
             cells.pop()
         if len(cells) == columns and any(cells):
@@ -208,11 +193,5 @@ def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
     return replace(found, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
 
 
-def split_unit(name: str, unit: str) -> tuple[str, str]:
-    """A name and its unit, which may stand in brackets behind it."""
-    match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    if re.fullmatch(r".*\S\[\d+\]", name):
-        return name, unit  # An index, q[1]; the unit one has a blank before it, "strain [1]".
-    if match and not unit and match.group(1) and is_unit(match.group(2)):
-        return match.group(1).strip(), match.group(2)
-    return name.strip(), re.sub(r"^[\[(]|[\])]$", "", unit)
+ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
+FORMAT = Format("text", (*ENDINGS, *(f"{ending}.gz" for ending in ENDINGS)), read_text)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin import __version__
+from rigtwin.description.catalogue import own_description
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
@@ -85,7 +86,8 @@ def run_machine(
     fields = {topic: tuple(names) for topic, names in columns.items()}
     period = configuration.timing.period
     reason = FINISHED if trip is None else trip.reason
-    with Writer(path, experiment, period, told, machine.name, fields) as writer:
+    described = own_description(machine)
+    with Writer(path, experiment, period, told, machine.name, fields, described) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
         tables = {
             topic.strip("/"): np.column_stack(list(names.values()))

@@ -24,6 +24,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.columns import decode_columns
+from rigtwin.recording.description_path import description_of
 from rigtwin.recording.inputs import Inputs
 from rigtwin.recording.records import Lost, Messages, read_records, unseal
 from rigtwin.recording.schema import (
@@ -68,6 +69,8 @@ class Recording:
         Of a supervised session, in order.
     lateness : mapping
         Of a loop in real time.
+    description : Path or None
+        Description of the machine, where the recording remembers one; the file may be gone.
     """
 
     path: Path
@@ -82,6 +85,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     transitions: tuple[Mapping[str, str], ...] = ()
     lateness: Mapping[str, str] = field(default_factory=dict)
+    description: Path | None = None
 
     @property
     def ticks(self) -> int:
@@ -296,6 +300,7 @@ class Gathered:
             notes=tuple(notes),
             transitions=_sort(self._states),
             lateness=_printable(metadata.get(LATENESS_RECORD, {})),
+            description=None if RECORD in doubtful else description_of(path, about),
         )
 
     def _tables(

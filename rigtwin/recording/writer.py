@@ -43,6 +43,7 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
+from rigtwin.recording.description_path import description_values
 from rigtwin.recording.owner import open_alone
 from rigtwin.recording.records import seal
 from rigtwin.recording.schema import (
@@ -110,11 +111,31 @@ class Writer:
         controller: Mapping[str, object],
         machine: str = DEFAULT_MACHINE,
         fields: Mapping[str, Sequence[str]] | None = None,
+        description: Path | None = None,
     ) -> None:
-        """period in s.
+        """Begin a recording.
 
-        Controller: the operator's settings as `config.controller` holds them; fields: of each
-        topic, by default those of the channel table. Raises RigtwinError.
+        Parameters
+        ----------
+        path
+            File of the recording.
+        experiment
+            Name of the test.
+        period
+            Period of the ticks, s.
+        controller
+            The operator's settings as `config.controller` holds them.
+        machine
+            Name of the machine.
+        fields
+            Topic → its fields. Defaults to the channel table.
+        description
+            Description of the machine, remembered in the file; None for a shipped one.
+
+        Raises
+        ------
+        RigtwinError
+            If a field cannot have its name, or the file cannot be written.
         """
         self._fields = dict(fields or {})
         for topic, names in self._fields.items():
@@ -145,6 +166,7 @@ class Writer:
                 "experiment": experiment,
                 "period": repr(period),
                 "config": config,
+                **description_values(path, description),
             },
         )
 

@@ -98,6 +98,7 @@ class SuspensionRig(Physics):
         controller: Any = None,
         progress: Callable[[int], object] = lambda _ticks: None,
     ) -> RunResult:
+        from rigtwin.description.catalogue import own_description
         from rigtwin.simulation.runner import record
 
         return record(
@@ -111,6 +112,7 @@ class SuspensionRig(Physics):
             effects_from=effects_from,
             machine=machine.name,
             controller=controller,
+            description=own_description(machine),
         )
 
     def simulate(

@@ -105,6 +105,7 @@ def record(
     effects_from: float = 0.0,
     machine: str = DEFAULT_MACHINE,
     controller: Tick | None = None,
+    description: Path | None = None,
 ) -> RunResult:
     """Runs a test on the twin of a quarter car into a new recording.
 
@@ -133,6 +134,8 @@ def record(
     controller
         One of one's own instead of the rig's, tick by tick in Python; the recording then says
         nothing of a controller's settings but where the test started.
+    description
+        Description of the machine, which the recording remembers; None for a shipped one.
 
     Returns
     -------
@@ -157,7 +160,8 @@ def record(
         told = {OWN: True, **{name: told[name] for name in ("start", "preload")}}
         blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
-    with Writer(path, experiment, configuration.timing.period, told, machine) as writer:
+    period = configuration.timing.period
+    with Writer(path, experiment, period, told, machine, description=description) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__, effects_from)
         for block in blocks:
             for first in range(0, len(block.commands), BLOCK):

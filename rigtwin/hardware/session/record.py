@@ -80,6 +80,7 @@ def _writer_of(path: Path, test: AnyTest) -> Callable[[], Writer]:
         controller=test.controller_settings,
         machine=test.machine_name,
         fields=test.layout.fields,
+        description=test.description,
     )
 
 

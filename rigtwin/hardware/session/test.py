@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from controllers import Commands, Measurements, update
+from rigtwin.description.catalogue import own_description
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.limits import HIGH, LOW, limited_signals
@@ -63,6 +65,7 @@ class Test:
     own: OwnController | None = None
 
     machine_name = "suspension-rig"
+    description = None
     layout = RIG_LAYOUT
 
     @property
@@ -149,6 +152,11 @@ class MachineTest:
     @property
     def machine_name(self) -> str:
         return self.machine.name
+
+    @property
+    def description(self) -> Path | None:
+        """Description of the machine; None for a shipped one."""
+        return own_description(self.machine)
 
     @property
     def period(self) -> float:
