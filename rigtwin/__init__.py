@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from rigtwin.api.each import Answered, diagnose_each
     from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
+    from rigtwin.api.fitting import EffectFit, fit
     from rigtwin.api.look import look, show_live, show_look
     from rigtwin.api.machines import (
         Configuration,
@@ -97,6 +98,7 @@ __all__ = [
     "Diagnosis",
     "DryRun",
     "Effect",
+    "EffectFit",
     "EnergyError",
     "Experiment",
     "FirstLook",
@@ -130,6 +132,7 @@ __all__ = [
     "energy_error",
     "experiments",
     "faults",
+    "fit",
     "identifiability",
     "import_data",
     "import_episodes",
@@ -198,6 +201,7 @@ _MODULES = {
     ),
     "energy": ("EnergyError", "energy_error"),
     "faults": ("Campaign", "faults"),
+    "fitting": ("EffectFit", "fit"),
     "look": ("look", "show_live", "show_look"),
     "session": (
         "DryRun",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from rigtwin.api.describing import describe, is_model, record_log
@@ -82,6 +83,52 @@ def diagnose(
     RigtwinError
         If the recordings' settings are unknown, or held-out data are not fit to be compared.
     """
+    given = read_inputs(recordings, machine, held_out, columns, test)
+    found = given.machine
+    base = twin_of(found, settings, without)
+    tests = [find_experiment(found, name) for name in found.next_tests]
+    return find_reasons(
+        found,
+        given.recordings,
+        base,
+        given.held_out,
+        tests,
+        progress=progress,
+        first_look=first_look,
+    )
+
+
+@dataclass(frozen=True)
+class Given:
+    """Recordings of one machine.
+
+    Attributes
+    ----------
+    machine : Machine
+        Machine they belong to.
+    recordings, held_out : tuple of Recording
+        Recordings to fit, and recordings to judge on.
+    """
+
+    machine: Machine
+    recordings: tuple[reader.Recording, ...]
+    held_out: tuple[reader.Recording, ...]
+
+
+def read_inputs(
+    recordings: Recorded | Sequence[Recorded],
+    machine: Machine | str | Path | None,
+    held_out: Recorded | Sequence[Recorded],
+    columns: Mapping[str, str] | None,
+    test: str,
+) -> Given:
+    """Read recordings, or logs of a machine that is a model, see `diagnose`.
+
+    Raises
+    ------
+    RigtwinError
+        For no recording, one named twice, or a machine that cannot be told.
+    """
     if is_model(machine):
         logs = _logs(recordings)
         if not logs:
@@ -102,11 +149,7 @@ def diagnose(
             else "no recording to diagnose"
         )
     found = described_machine(several[0], machine)
-    base = twin_of(found, settings, without)
-    tests = [find_experiment(found, name) for name in found.next_tests]
-    return find_reasons(
-        found, several, base, apart, tests, progress=progress, first_look=first_look
-    )
+    return Given(found, tuple(several), tuple(apart))
 
 
 def what_changed(

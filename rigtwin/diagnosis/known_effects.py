@@ -1,0 +1,361 @@
+"""Values of effects that somebody already suspects, without a search for others."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from rigtwin.components import Effect
+from rigtwin.components.plant import Plant
+from rigtwin.description.machine import Machine
+from rigtwin.description.mjcf import Change, write_mjcf
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.gauss_newton import take_derivatives
+from rigtwin.diagnosis.overlay import Overlay, overlay
+from rigtwin.errors import RigtwinError
+from rigtwin.files import keep_apart
+from rigtwin.numerics.arrays import Array
+
+WIDTH = 1.96
+"""Half width of a 95 % interval of a normal distribution, in standard deviations."""
+CONFOUNDED = 0.05
+"""Eigenvalue of the correlation matrix below which a combination counts as undetermined."""
+TAKES_PART = 0.3
+"""Share of a combination from which a parameter counts as part of it."""
+TIED = 4.0
+"""χ² by which two optima may differ and still explain the data equally well."""
+DISTINCT = 3.0
+"""Standard deviations by which two optima have to differ to count as two."""
+SHARES = (1.0, 0.3)
+"""Shares of the effects' separate values from which they are fitted together."""
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One fitted value.
+
+    Attributes
+    ----------
+    name : str
+        Effect, and the parameter where the effect has several: `coulomb@elbow`.
+    value : float
+        Best value, in `unit`.
+    low, high : float
+        Ends of the 95 % interval, in `unit`. It assumes that the model is right but for these
+        effects.
+    nominal : float
+        Value of the description, in `unit`.
+    unit : str
+        Unit of the values.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    nominal: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class EffectFit:
+    """Effects fitted to recordings.
+
+    Attributes
+    ----------
+    parameters : tuple of FittedParameter
+        All fitted values.
+    covariance : Array
+        Covariance of the values, shape (parameters, parameters).
+    error_before, error_after : tuple of float
+        Residual of each recording that was fitted, as a share of its signals' swing.
+    held_out_before, held_out_after : tuple of float
+        The same of each held-out recording.
+    warnings : tuple of str
+        What makes a value doubtful: bounds, flat directions, several optima.
+    machine : Machine
+        The corrected machine.
+    """
+
+    parameters: tuple[FittedParameter, ...]
+    covariance: Array = field(repr=False)
+    error_before: tuple[float, ...]
+    error_after: tuple[float, ...]
+    held_out_before: tuple[float, ...]
+    held_out_after: tuple[float, ...]
+    warnings: tuple[str, ...]
+    machine: Machine = field(repr=False)
+    described: Machine = field(repr=False)
+    evidence: Evidence = field(repr=False)
+    held_out: Evidence | None = field(repr=False)
+
+    def __getitem__(self, name: str) -> FittedParameter:
+        """Return the parameter of a name."""
+        for parameter in self.parameters:
+            if parameter.name == name:
+                return parameter
+        raise KeyError(f"{name!r}; there are {', '.join(p.name for p in self.parameters)}")
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the values, shape (parameters, parameters)."""
+        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        return self.covariance / np.outer(deviations, deviations)
+
+    def overlays(self) -> tuple[Overlay, ...]:
+        """Return every observed signal as measured, as nominal and as corrected."""
+        return overlay(self.evidence, self.machine.plant, self.held_out)
+
+    def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
+        """Write the machine's MJCF with the fitted values.
+
+        Parameters
+        ----------
+        path
+            New file; meshes and included files are looked for beside it.
+
+        Returns
+        -------
+        tuple of str
+            A line for each value that MJCF has no attribute for.
+        """
+        changes = [
+            Change(p.name.partition("@")[2].partition(" ")[0], _parameter(p.name), p.value)
+            for p in self.parameters
+        ]
+        return write_mjcf(keep_apart(path, *self.described.files), self.described, changes)
+
+
+def _parameter(name: str) -> str:
+    effect, _, parameter = name.partition(" ")
+    return parameter or effect.partition("@")[0]
+
+
+def find_effects(machine: Machine, names: Sequence[str]) -> tuple[Effect, ...]:
+    """Return the effects of these names.
+
+    Raises
+    ------
+    RigtwinError
+        For no name, an unknown one, or two that set the same parameter.
+    """
+    known = {effect.name: effect for effect in machine.effects()}
+    if not names:
+        raise RigtwinError(f"no effect to fit; {machine.name} can have {', '.join(known)}")
+    chosen: list[Effect] = []
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 3, 0.5)
+            expected = f"did you mean {' or '.join(near)}?" if near else ", ".join(known)
+            raise RigtwinError(f"{machine.name} cannot have the effect {name!r}; {expected}")
+        if clashes(known[name], chosen):
+            raise RigtwinError(f"{name} sets a parameter that another of {', '.join(names)} sets")
+        chosen.append(known[name])
+    return tuple(chosen)
+
+
+def fit_effects(
+    evidence: Evidence,
+    effects: Sequence[Effect],
+    held_out: Evidence | None = None,
+    progress: Callable[[int], object] = lambda _: None,
+) -> EffectFit:
+    """Fit effects together.
+
+    The values minimise the whitened residual's χ² with all declared tolerances free beside them
+    (Gauss-Newton). Each start comes from the effects' separate fits, so that a poor local optimum
+    shows as a disagreement.
+
+    Parameters
+    ----------
+    evidence
+        Recordings, about their nominal plant.
+    effects
+        Effects to fit.
+    held_out
+        Recordings that the values are judged on and not fitted to.
+    progress
+        Called with 1 after each fit.
+
+    Returns
+    -------
+    EffectFit
+        Values, intervals, and how well they explain the data.
+
+    Raises
+    ------
+    RigtwinError
+        If an effect cannot act on this machine together with the others.
+    """
+    effects = tuple(effects)
+    if not is_possible(effects, evidence.plant):
+        names = ", ".join(effect.name for effect in effects)
+        raise RigtwinError(
+            f"{names}: an effect lacks what it acts through, as play lacks dry friction"
+        )
+    coarse = Fitter(evidence.thin().halve_steps())
+    optima = []
+    for start in _list_starts(coarse, effects, progress):
+        optima.append(coarse.refine(effects, start))
+        progress(1)
+    optima.sort(key=lambda fit: fit.misfit)
+    exact = Fitter(evidence)
+    fit = exact.refit_with_tolerances(exact.refine(effects, optima[0].values))
+    progress(1)
+    covariance = _find_covariance(exact, fit)
+    parameters = _list_parameters(evidence.machine, fit, covariance)
+    plant = with_values(evidence.plant, effects, fit.values)
+    return EffectFit(
+        parameters=parameters,
+        covariance=covariance,
+        error_before=_errors(evidence, evidence.plant),
+        error_after=_errors(evidence, plant),
+        held_out_before=_errors(held_out, evidence.plant),
+        held_out_after=_errors(held_out, plant),
+        warnings=tuple(_find_doubts(exact, fit, parameters, covariance, optima)),
+        machine=replace(evidence.machine, plant=plant),
+        described=evidence.machine,
+        evidence=evidence,
+        held_out=held_out,
+    )
+
+
+def _errors(evidence: Evidence | None, plant: Plant) -> tuple[float, ...]:
+    return () if evidence is None else tuple(map(float, relative_errors(evidence, plant)))
+
+
+def _list_starts(
+    fitter: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
+) -> list[list[tuple[float, ...]]]:
+    """Return starts of the joint fit: shares of the separate fits, and one effect after another."""
+    alone: dict[Effect, Fit] = {}
+    for effect in effects:
+        # A refinement of friction does nothing by itself: it starts at its own first size.
+        if is_possible((effect,), fitter.plant):
+            alone[effect] = fitter.fit_one(fitter.screen(effect))
+            progress(1)
+    values = [
+        alone[effect].values[0] if effect in alone else fitter.starts(effect).values[0]
+        for effect in effects
+    ]
+    starts = [
+        [
+            fitter.scale_start(effect, value, share)[0]
+            for effect, value in zip(effects, values, strict=True)
+        ]
+        for share in SHARES
+    ]
+    if len(alone) > 1:
+        starts.append(_start_in_turn(fitter, effects, alone, values))
+    return starts if len(effects) > 1 else starts[:1]
+
+
+def _start_in_turn(
+    fitter: Fitter,
+    effects: tuple[Effect, ...],
+    alone: dict[Effect, Fit],
+    values: list[tuple[float, ...]],
+) -> list[tuple[float, ...]]:
+    """Return the fit that adds one effect after another, the one that explains most first."""
+    order = sorted(alone, key=lambda effect: alone[effect].misfit)
+    fit = alone[order[0]]
+    for effect in order[1:]:
+        small = fitter.scale_start(effect, values[effects.index(effect)], SHARES[-1])
+        chosen = (*fit.effects, effect)
+        if is_possible(chosen, fitter.plant):
+            fit = fitter.refine(chosen, [*fit.values, *small])
+    fitted = dict(zip(fit.effects, fit.values, strict=True))
+    return [fitted.get(e, value) for e, value in zip(effects, values, strict=True)]
+
+
+def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
+    """Return the covariance of the values: the inverse normal matrix with all tolerances free.
+
+    Where the model leaves more than the expected noise, the rest counts as noise: the covariance
+    grows by χ² over its expected value.
+    """
+    evidence = fitter.evidence
+    base = fit.base if fit.base is not None else evidence.plant
+    steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
+    cuts = np.cumsum([len(values) for values in fit.values])[:-1]
+
+    def residual(vector: Array) -> Array:
+        values = [tuple(part.tolist()) for part in np.split(vector, cuts)]
+        return evidence.residual(with_values(base, fit.effects, values))
+
+    here = np.concatenate([np.asarray(values, float) for values in fit.values])
+    rest = residual(here)
+    _, high = fitter.bounds(fit.effects)
+    jacobian = take_derivatives(residual, here, rest, steps, high)
+    normal, _ = fitter.space.beside(fit.effects).normal_equations(jacobian, rest)
+    excess = max(fit.misfit / evidence.expected, 1.0)
+    return np.linalg.pinv(normal, hermitian=True) * np.outer(steps, steps) * excess
+
+
+def _list_parameters(machine: Machine, fit: Fit, covariance: Array) -> tuple[FittedParameter, ...]:
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    parameters: list[FittedParameter] = []
+    for effect, values in zip(fit.effects, fit.values, strict=True):
+        nominal = effect.nominal(machine.plant)
+        quantities = effect.quantities()
+        for name, value in zip(effect.kind.parameters, values, strict=True):
+            half = WIDTH * float(deviations[len(parameters)])
+            quantity = quantities[name]
+            parameters.append(
+                FittedParameter(
+                    name=effect.name if len(values) == 1 else f"{effect.name} {name}",
+                    value=value,
+                    low=max(value - half, quantity.low),
+                    high=min(value + half, quantity.high),
+                    nominal=nominal[name],
+                    unit=machine.unit(effect.group, quantity),
+                )
+            )
+    return tuple(parameters)
+
+
+def _find_doubts(
+    fitter: Fitter,
+    fit: Fit,
+    parameters: Sequence[FittedParameter],
+    covariance: Array,
+    optima: Sequence[Fit],
+) -> list[str]:
+    """Return a line for everything that makes a value doubtful."""
+    doubts = []
+    if fitter.is_bounded(fit):
+        doubts.append("a value is at the end of what is physically possible")
+    doubts += [
+        f"{p.name}: the data allow the nominal value too ({p.low:.4g} to {p.high:.4g} {p.unit})"
+        for p in parameters
+        if p.low <= p.nominal <= p.high
+    ]
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(deviations, deviations))
+    for eigenvalue, vector in zip(eigenvalues, vectors.T, strict=True):
+        members = [
+            f"{weight / deviation:+.3g} × {p.name}"
+            for weight, deviation, p in zip(vector, deviations, parameters, strict=True)
+            if abs(weight) >= TAKES_PART
+        ]
+        if eigenvalue < CONFOUNDED and len(members) > 1:
+            doubts.append(
+                "confounded: the data determine "
+                + " ".join(members)
+                + " far better than each of them"
+            )
+    best = optima[0]
+    flat_best = np.concatenate([np.asarray(values) for values in best.values])
+    for other in optima[1:]:
+        distance = np.abs(np.concatenate([np.asarray(v) for v in other.values]) - flat_best)
+        if other.misfit - best.misfit < TIED and np.any(distance > DISTINCT * deviations):
+            values = ", ".join(f"{v:.4g}" for values in other.values for v in values)
+            doubts.append(f"several optima: {values} explains the data as well")
+            break
+    return doubts
