@@ -83,6 +83,7 @@ def test_a_body_without_a_mass_in_the_mjcf_keeps_its_inertia():
     found = list_parameters(Body(2.0), 0.0, INERTIA)
     assert found[4:7] == pytest.approx([0.04, 0.05, 0.03])
     assert list_parameters(Body(2.0), 0.5, INERTIA)[4:7] == pytest.approx([0.16, 0.2, 0.12])
+    assert list_parameters(Body(0.01), 0.005, INERTIA)[4] == pytest.approx(0.08)
 
 
 def test_the_pseudo_inertia_is_the_sum_of_m_r_r_over_homogeneous_places():

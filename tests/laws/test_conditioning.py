@@ -67,8 +67,9 @@ def test_a_gain_multiplies_the_command(component, gain):
 @law_of("gain_asymmetry", ForceActuator)
 def test_a_gain_differs_by_half_its_asymmetry_each_way():
     uneven = ForceActuator(gain=1.2, gain_asymmetry=0.4)
-    expected = 1.2 * (1.0 + 0.2 * np.sign(SWING)) * SWING
-    assert passed(uneven, SWING) == pytest.approx(expected)
+    for size in (1.0, 1e-3):
+        expected = 1.2 * (1.0 + 0.2 * np.sign(SWING)) * size * SWING
+        assert passed(uneven, size * SWING) == pytest.approx(expected, abs=1e-12)
 
 
 @law_of("lag", Motor, Cylinder, ForceActuator, Servo)

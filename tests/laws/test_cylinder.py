@@ -77,7 +77,9 @@ def test_the_piston_moves_no_faster_than_its_limit(limit):
 
 
 def test_the_nominal_cylinder_moves_at_300_mm_a_second():
-    assert discretise(Cylinder(), STEP).step == pytest.approx(0.3e-3)
+    model = discretise(Cylinder(), STEP)
+    assert model.step == pytest.approx(0.3e-3)
+    assert model.transition.shape == (4, 4)
 
 
 @law_of("backlash", Cylinder)

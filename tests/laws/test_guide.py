@@ -37,6 +37,7 @@ SLIDES = [
     Guide(2.0, asymmetry=10.0),
     Guide(2.0, asymmetry=-10.0),
     Guide(0.0, load_coefficient=0.3, stribeck=1.0, stribeck_exponent=1.0),
+    Guide(0.5, stribeck=0.01, stribeck_exponent=2.02),
 ]
 
 
@@ -181,6 +182,7 @@ def test_viscous_friction_differs_by_half_its_asymmetry_each_way(viscous, more):
         Guide(stiffness=2000.0),
         Guide(offset=-5.0),
         Guide(cogging=3.0),
+        Guide(cogging=0.01),
         Guide(stiffness=800.0, offset=2.0, cogging=4.0, cogging_pitch=0.012, cogging_phase=0.7),
     ],
 )
@@ -262,8 +264,11 @@ def test_a_guide_that_resists_one_way_only_is_a_force_not_friction():
     """The weaker direction keeps at least 5 % of the mean friction, of either sort."""
     assert resists(Guide())
     assert resists(Guide(20.0, stribeck=-5.0, asymmetry=47.4))
+    assert not resists(Guide(20.0, stribeck=-5.0, asymmetry=47.6))
     assert not resists(Guide(20.0, stribeck=-5.0, asymmetry=-47.6))
     assert resists(Guide(20.0, asymmetry=60.0, load_coefficient=0.1))
     assert resists(Guide(viscous=100.0, viscous_asymmetry=-190.0))
     assert resists(Guide(viscous=100.0, viscous_asymmetry=189.0))
     assert not resists(Guide(viscous=100.0, viscous_asymmetry=190.5))
+    assert not resists(Guide(viscous=100.0, viscous_asymmetry=-190.5))
+    assert not resists(Guide(20.0, asymmetry=-38.5))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rigtwin.components import Guide
+from rigtwin.components import Guide, mount
 from rigtwin.components.guide import friction
 from rigtwin.components.mount import give_way, guess_position, resist_at
 from tests.laws.joints import PERIOD, force_to_move, motion_under
@@ -108,6 +109,56 @@ def test_where_only_dry_friction_is_nonlinear_the_first_guess_is_the_equilibrium
     force_ahead = written_resistance(guide, share, inner, slider, viscous, limits, ahead)[0]
     expected = 1.0 + guide.mount_compliance * (force_ahead - force) / 1e-9
     assert slope == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_guide_with_steep_waves_finds_an_equilibrium_however_soft_its_mount(seed):
+    """Where 2π w c > p the waves fall more steeply than the mount resists."""
+    random = np.random.default_rng(seed)
+    for _ in range(60):
+        guide = Guide(
+            coulomb=random.choice([0.0, 5.0]),
+            viscous=random.choice([0.0, 100.0]),
+            stiffness=random.choice([0.0, 500.0]),
+            cogging=10.0 ** random.uniform(-1.0, 2.0),
+            cogging_pitch=10.0 ** random.uniform(-3.5, -1.0),
+            cogging_phase=random.uniform(-3.0, 3.0),
+            mount_compliance=10.0 ** random.uniform(-6.0, -3.0),
+        )
+        outer, inner, slider = random.uniform(-0.02, 0.02, 3)
+        arguments = (guide, friction(guide), SPRING, REST, 1.0, STEP, inner, 0.1, slider, 0.0, 0.0)
+        position, _, _, force = give_way(*arguments, outer)
+        mismatch = position + guide.mount_compliance * force - outer
+        assert abs(mismatch) <= 1.1e-9 * abs(outer - inner) + 1e-15
+
+
+@pytest.mark.parametrize(
+    ("guide", "most"),
+    [
+        (Guide(20.0, 300.0, 2000.0, mount_compliance=1e-4), 1),
+        (Guide(5.0, 100.0, drag=900.0, mount_compliance=1e-4), 12),
+        (Guide(5.0, 100.0, viscous_asymmetry=90.0, drag=4000.0, mount_compliance=1e-3), 13),
+        (Guide(0.5, cogging=3.0, cogging_pitch=0.01, mount_compliance=2e-4), 22),
+    ],
+)
+def test_an_equilibrium_needs_few_evaluations_of_the_law(monkeypatch, guide, most):
+    counts: list[int] = []
+    evaluate = mount.resist_at
+
+    def count(**arguments: Any) -> tuple[float, float, float]:
+        counts[-1] += 1
+        return evaluate(**arguments)
+
+    monkeypatch.setattr(mount, "resist_at", count)
+    for shares in STATES:
+        outer, inner, speed, slider, viscous, load = (
+            share * size for share, size in zip(shares, SIZES, strict=True)
+        )
+        counts.append(0)
+        give_way(
+            guide, friction(guide), SPRING, REST, 1.0, STEP, inner, speed, slider, viscous, load, outer
+        )
+    assert max(counts) <= most
 
 
 @law_of("mount", Guide)
