@@ -25,6 +25,7 @@ STATES = [(0.3, 0.1, 0.0), (0.1, 0.3, 0.2), (-0.2, 0.4, -0.5), (0.105, 0.1, 0.03
     [
         Servo(),
         Servo(position_gain=80.0),
+        Servo(position_gain=0.005, damping_gain=0.3),
         Servo(position_gain=80.0, damping_gain=3.0),
         Servo(position_gain=80.0, damping_gain=3.0, force_limit=12.0),
         Servo(position_gain=80.0, deadband=0.02, damping_gain=3.0),
@@ -62,6 +63,7 @@ def test_pushes_of_all_ticks_are_those_of_every_tick():
 
 def test_a_limit_that_is_left_out_is_the_widest():
     assert push_law(Servo()).limit == 1e9
+    assert push_law(ForceActuator(constant=3.0)) == (3.0, 0.0, 0.0, 0.0, 1e9)
     assert push_law(ForceActuator(force_limit=2e9)).limit == 1e9
 
 
