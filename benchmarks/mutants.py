@@ -105,8 +105,7 @@ def _starts_search(function: ast.FunctionDef) -> bool:
     """Return whether a function says where a search starts."""
     arguments = [argument.annotation for argument in function.args.args]
     return bool(
-        set().union(*(_names_in(one) for one in (function.returns, *arguments)))
-        & set(SEARCH_TYPES)
+        set().union(*(_names_in(one) for one in (function.returns, *arguments))) & set(SEARCH_TYPES)
     ) and not any(argument.arg in ("self", "cls") for argument in function.args.args)
 
 
@@ -136,9 +135,7 @@ class _Lister:
                     counted.add(node.id)
         return constants & (everywhere - counted)
 
-    def _visit(
-        self, node: ast.AST, function: str, idle: set[str]
-    ) -> Iterator[tuple[ast.AST, str]]:
+    def _visit(self, node: ast.AST, function: str, idle: set[str]) -> Iterator[tuple[ast.AST, str]]:
         """Yield the nodes that are not excluded, with the name of their function."""
         if isinstance(node, (ast.Raise, ast.Assert, ast.JoinedStr, ast.Import, ast.ImportFrom)):
             return

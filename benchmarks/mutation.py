@@ -96,8 +96,7 @@ def _with_classes(value: Any, classes: dict[int, Any]) -> Any:
         return tuple(_with_classes(part, classes) for part in value)
     if type(value) is dict:
         return {
-            _with_classes(key, classes): _with_classes(part, classes)
-            for key, part in value.items()
+            _with_classes(key, classes): _with_classes(part, classes) for key, part in value.items()
         }
     return classes.get(id(value), value)
 
@@ -110,6 +109,12 @@ def _is_own(thing: object, module: ModuleType) -> bool:
 
 def _is_value(thing: object) -> bool:
     return isinstance(thing, (bool, int, float, str, tuple, dict, frozenset))
+
+
+def _is_code(thing: object) -> bool:
+    """Return whether a class's attribute has code that can be exchanged."""
+    kinds = (FunctionType, property, classmethod, staticmethod, functools.cached_property)
+    return isinstance(thing, kinds)
 
 
 def _graft(old: Any, new: Any) -> None:
@@ -126,6 +131,10 @@ def _graft(old: Any, new: Any) -> None:
     elif isinstance(old, FunctionType):
         if len(old.__code__.co_freevars) == len(new.__code__.co_freevars):
             old.__code__ = new.__code__
+            for cell, other in zip(old.__closure__ or (), new.__closure__ or (), strict=True):
+                # Defaults of a dataclass stand in cells; a cell with a class is that of `super()`.
+                if not isinstance(other.cell_contents, type):
+                    cell.cell_contents = other.cell_contents
         old.__defaults__, old.__kwdefaults__ = new.__defaults__, new.__kwdefaults__
     elif isinstance(old, type):
         if hasattr(old, "_field_defaults"):
@@ -135,11 +144,8 @@ def _graft(old: Any, new: Any) -> None:
             before = vars(old).get(name)
             if _is_value(value) and not name.startswith("__"):
                 setattr(old, name, value)
-            elif before is not None and callable(getattr(old, name, None)) or isinstance(
-                before, (property, classmethod, staticmethod, functools.cached_property)
-            ):
-                if not name.startswith("__") or name in ("__init__", "__call__"):
-                    _graft(before, value)
+            elif _is_code(before) and name not in ("__new__", "__class_getitem__"):
+                _graft(before, value)
     elif hasattr(old, "__dict__"):
         vars(old).update(vars(new))
 
@@ -173,7 +179,9 @@ class Session:
         items = sorted(items, key=lambda item: f"test_{short}." not in item.nodeid)
         tree = ast.parse(Path(str(module.__file__)).read_text())
         if _is_noticed(module, tree, items):
-            raise RuntimeError(f"{short}: the tests fail with the unchanged source put in its place")
+            raise RuntimeError(
+                f"{short}: the tests fail with the unchanged source put in its place"
+            )
         started, first = time.perf_counter(), len(self.outcomes)
         for mutant in list_mutants(tree):
             mutant.apply()

@@ -17,7 +17,9 @@ from tests.engine.linear import PLANT
 
 DELAYED = PLANT.structure_cylinder._replace(delay=0.006, gain=1.1)
 CORRECTED = PLANT._replace(
-    rail=PLANT.rail._replace(coulomb=61.25), structure_cylinder=DELAYED, computer=Computer(0.0, 0.002)
+    rail=PLANT.rail._replace(coulomb=61.25),
+    structure_cylinder=DELAYED,
+    computer=Computer(0.0, 0.002),
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -40,7 +41,7 @@ OFF = np.array([0.5, 0.4])
 
 
 def evidence_of(off: float, nominal: float = 1.0) -> Any:
-    """Return evidence whose residual is off · OFF at a corrected plant and `nominal` at the other."""
+    """Return evidence that is off by OFF times a share, another one at the nominal plant."""
 
     def predict(plant: object) -> list[np.ndarray]:
         share = nominal if plant is PLANT else off
@@ -95,10 +96,13 @@ def test_the_support_of_an_effect_is_written_out(off, reach, rest):
     assert found.probability == 0.87
     assert found.margin == 12.0
     assert found.steadiness == pytest.approx(7.0 / 2.0)
+    rubbing = support_of(COULOMB, posterior_of(7.0, rest, reach), evidence_of(off), STANDARD)
+    assert rubbing.steadiness == pytest.approx((53.0 - 50.0) / 1.0)
     assert found.remains == pytest.approx(min(after / before, 1.0))
     amplitude = np.sqrt(np.array(reach) @ np.array([0.02, 0.05]) ** 2)
     assert found.dominance == pytest.approx(0.3 / amplitude)
-    mimic = logistic(after / ERROR) * logistic(rest / REST) * logistic(after / before / MIMICRY)
+    ratios = (after / ERROR, rest / REST, after / before / MIMICRY)
+    mimic = math.prod(logistic(float(ratio)) for ratio in ratios)
     assert found.mimic == pytest.approx(mimic)
 
 

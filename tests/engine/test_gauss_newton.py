@@ -102,8 +102,8 @@ def test_a_step_too_long_is_tried_at_its_half_fifth_and_twentieth():
 
 @pytest.mark.parametrize(
     ("gain", "misfit", "expected", "moves"),
-    [(0.19, 5.0, 5.0, False), (0.21, 5.0, 5.0, True), (0.9, 1001.0, 1.0, False),
-     (1.1, 1001.0, 1.0, True)],
+    [(0.1995, 5.0, 5.0, False), (0.2005, 5.0, 5.0, True), (0.996, 1001.0, 1.0, False),
+     (1.004, 1001.0, 1.0, True), (0.205, 201.0, 1.0, True), (0.204, 211.0, 4.0, False)],
 )  # fmt: skip
 def test_a_step_must_promise_a_fifth_of_a_unit_and_a_thousandth_of_the_misfit(
     gain, misfit, expected, moves
@@ -154,14 +154,11 @@ def test_derivatives_are_taken_sixteen_times_at_most():
 
 
 @pytest.mark.parametrize(
-    ("misfit", "sufficient"), [(79.0, False), (81.0, True), (109.0, True), (111.0, False)]
+    ("misfit", "sufficient"), [(79.9, False), (80.1, True), (109.9, True), (110.1, False)]
 )
-def test_a_fit_is_sufficient_between_four_fifths_and_eleven_tenths_of_the_noise(
-    misfit, sufficient
-):
+def test_a_fit_is_sufficient_between_four_fifths_and_eleven_tenths_of_the_noise(misfit, sufficient):
     assert is_sufficient(misfit, 100.0) is sufficient
-    assert is_sufficient(0.3 * misfit, 100.0, 0.4) is False
-    assert is_sufficient(1.5 * misfit, 100.0, 2.0) is (misfit < 130.0)
+    assert is_sufficient(1.5 * misfit, 100.0, 2.0) is True
 
 
 def test_steps_that_change_more_than_a_twentieth_of_the_misfit_are_shortened():
@@ -190,9 +187,7 @@ def test_beside_free_tolerances_the_covariance_is_that_of_the_joint_least_square
     data = 0.2 * DATA
     best = np.linalg.solve(normal, joint.T @ data)
     assert np.all(np.abs(best[3:]) < 1.0)
-    found = minimise(
-        lambda v: data - RESPONSES @ v, space, np.zeros(3), np.full(3, 0.1), FAR, 10.0
-    )
+    found = minimise(lambda v: data - RESPONSES @ v, space, np.zeros(3), np.full(3, 0.1), FAR, 10.0)
     np.testing.assert_allclose(found.values, best[:3], rtol=1e-4)
     widths = np.sqrt(np.diag(np.linalg.inv(normal))[:3])
     np.testing.assert_allclose(found.widths, widths, rtol=1e-9)

@@ -85,9 +85,7 @@ def outstanding(
     ]
     machine: Any = SimpleNamespace(rows=rows, effects=lambda: effects)
     sensors = {name: Lvdt(**nominal) for name in names}
-    plant: Any = SimpleNamespace(
-        **sensors, drive=Motor(), quiet=LoadCell(white=0.0), mains=Mains()
-    )
+    plant: Any = SimpleNamespace(**sensors, drive=Motor(), quiet=LoadCell(white=0.0), mains=Mains())
     predicted = [np.tile(MOTION, (len(rows), 1))] * recordings
     found = find_outstanding(machine, [recording] * recordings, predicted, plant)
     for each in found:
@@ -102,7 +100,11 @@ def test_nominal_sensors_do_not_stand_out():
 
 @pytest.mark.parametrize(
     ("changes", "kind"),
-    [({"white": 1.8e-4}, "noise"), ({"hum": 5.4e-4}, "hum"), ({"resolution": 5e-4}, "quantisation")],
+    [
+        ({"white": 1.8e-4}, "noise"),
+        ({"hum": 5.4e-4}, "hum"),
+        ({"resolution": 5e-4}, "quantisation"),
+    ],
 )
 def test_more_than_1_6_times_the_nominal_value_stands_out(changes, kind):
     assert outstanding({"two": changes}) == [("two", kind)]

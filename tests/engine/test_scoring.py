@@ -35,8 +35,16 @@ def rows_of(recordings: int) -> np.ndarray:
 
 
 def products_of(rows: np.ndarray) -> np.ndarray:
-    """Return products of one signal and one band, shape (recordings, 1, 1, blocks, 3, 3)."""
-    return np.einsum("rbsi,rbsj->rbij", rows, rows)[:, None, None]
+    """Return products of two signals and three bands, shape (recordings, 2, 3, blocks, 3, 3)."""
+    recordings, blocks, _, columns = rows.shape
+    parts = rows.reshape(recordings, blocks, 2, 3, -1, columns)
+    return np.einsum("rbknsi,rbknsj->rknbij", parts, parts)
+
+
+def by_band(power: np.ndarray) -> np.ndarray:
+    """Sum squares, shape (recordings, blocks, samples), to (recordings, 2, 3) by signal and
+    band."""
+    return power.reshape(len(power), BLOCKS, 2, 3, -1).sum(axis=(1, 4))
 
 
 @pytest.mark.parametrize("recordings", [1, 3])
@@ -58,31 +66,33 @@ def test_what_is_left_out_is_predicted_by_a_fit_to_the_rest(recordings, settled,
         data = residual.ravel()
     still = -np.linalg.solve(whole, flat.T @ data + pull)
     assert np.allclose(still, 0.0, atol=1e-9) == settled
-    expected = np.full((recordings, 1, 1, BLOCKS), 1.7 * SAMPLES)
+    expected = np.full((recordings, 2, 3, BLOCKS), 1.7 * SAMPLES)
     levels, inside = _cross_validate(products_of(rows), expected, weights, pull)
     blocks = np.arange(BLOCKS)[None, :] + 0 * np.arange(recordings)[:, None]
     parts = blocks % 5 if recordings == 1 else np.arange(recordings)[:, None] + 0 * blocks
-    power = np.zeros(recordings)
+    power = np.zeros((recordings, 2, 3))
     for part in np.unique(parts):
         held = parts == part
         rest, target = responses[~held].reshape(-1, 2), residual[~held].ravel()
         normal = rest.T @ rest + np.diag(weights)
         move = -np.linalg.solve(normal, rest.T @ target + pull) - still
-        left = np.sum((residual + responses @ move) ** 2, axis=2)
-        power += np.where(held, left, 0.0).sum(axis=1)
+        left = (residual + responses @ move) ** 2
+        power += by_band(np.where(held[..., None], left, 0.0))
     total = 1.7 * SAMPLES * BLOCKS
-    np.testing.assert_allclose(levels[:, 0, 0], power / total, rtol=1e-6)
-    np.testing.assert_allclose(inside[:, 0, 0], np.sum(residual**2, axis=(1, 2)) / total)
+    np.testing.assert_allclose(levels, power / total, rtol=1e-6)
+    np.testing.assert_allclose(inside, by_band(residual**2) / total)
 
 
 def test_a_fit_without_effects_leaves_out_what_it_leaves():
     rows = rows_of(1)[..., 2:]
-    expected = np.full((1, 1, 1, BLOCKS), 2.0 * SAMPLES)
+    expected = np.full((1, 2, 3, BLOCKS), 2.0 * SAMPLES)
     levels, inside = _cross_validate(products_of(rows), expected, np.zeros(0), np.zeros(0))
     assert levels == pytest.approx(inside)
-    assert levels[0, 0, 0] == pytest.approx(np.sum(rows**2) / (2.0 * SAMPLES * BLOCKS))
+    assert levels == pytest.approx(by_band(rows[..., 0] ** 2) / (2.0 * SAMPLES * BLOCKS))
     none, _ = _cross_validate(products_of(rows), 0.0 * expected, np.zeros(0), np.zeros(0))
-    assert none[0, 0, 0] == 0.0
+    assert not np.any(none)
+    little, _ = _cross_validate(products_of(rows), 1e-9 * expected, np.zeros(0), np.zeros(0))
+    assert little == pytest.approx(1e9 * levels)
 
 
 def test_blocks_of_one_recording_interleave_and_several_recordings_take_turns():
@@ -92,6 +102,7 @@ def test_blocks_of_one_recording_interleave_and_several_recordings_take_turns():
         [0, 5, 10, 15],
         [1, 6, 11, 16],
     ]
+    assert len(_folds(2)) == 2
     several = _folds(3)
     assert [fold.all(axis=1).tolist() for fold in several] == np.eye(3, dtype=bool).tolist()
     assert [fold.any(axis=1).tolist() for fold in several] == np.eye(3, dtype=bool).tolist()
@@ -106,7 +117,7 @@ def test_standard_errors_are_the_larger_of_the_formal_and_the_sandwich_ones(scal
     rows[..., 2] = scale * RANDOM.standard_normal((1, BLOCKS, SAMPLES))
     rows[0, :, :, 2] += uneven * np.sin(np.arange(BLOCKS))[:, None] * rows[0, :, :, 0]
     prior = np.array([0.0, 40.0])
-    expected = np.full((1, 1, 1, BLOCKS), 1.0 * SAMPLES)
+    expected = np.full((1, 2, 3, BLOCKS), 1.0 * SAMPLES / 6.0)
     flat = rows.reshape(-1, 3)
     inverse = np.linalg.inv(flat[:, :2].T @ flat[:, :2] + np.diag(prior))
     excess = max(float(np.sum(flat[:, 2] ** 2)) / (SAMPLES * BLOCKS), 1.0)
@@ -174,14 +185,20 @@ class LinearFitter:
         return fit.values[0][0] > 1000.0
 
 
-def scored(columns: np.ndarray, values: tuple[float, ...]) -> tuple[Scored, Any, LinearFitter]:
+def scored(
+    columns: np.ndarray,
+    values: tuple[float, ...],
+    used: tuple[float, ...] = (),
+    beside: np.ndarray | float = 0.0,
+) -> tuple[Scored, Any, LinearFitter]:
     """Score the rail's friction at values; the data were made with 53 N and 8 Ns/m."""
-    data = 3.0 * FORCE + 8.0 * RATE + NOISE
+    data = 3.0 * FORCE + 8.0 * RATE + NOISE + beside
     evidence: Any = LinearEvidence([data], [(FORCE, RATE)])
     fitter: Any = LinearFitter(evidence, columns)
     effects = (COULOMB, VISCOUS)[: len(values)]
     each = tuple((value,) for value in values)
-    fit = Fit(effects, each, 0.0, each, with_values(PLANT, effects, each))
+    plant = with_values(PLANT, effects, each)
+    fit = Fit(effects, each, 0.0, each, plant, PLANT if used else None, used)
     return Scorer(fitter).score(fit), evidence, fitter
 
 
@@ -254,6 +271,69 @@ def test_tolerances_are_free_beside_the_effects_within_their_prior():
     assert result.inside[0, :, 0] == pytest.approx(powers)
 
 
+@pytest.mark.parametrize("used", [(), (0.3, -0.2)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_tolerance_at_its_bound_stays_there_while_the_other_is_free(used, sign):
+    """What is left is the residual plus C (used − t), and t is at ±1.2 or at its optimum."""
+    wave = 5.0 * np.sin(0.3 * np.arange(TICKS))
+    plain: Any = LinearEvidence([FORCE], [(FORCE, RATE)])
+    shape = plain.whiten([np.stack([wave, wave])])
+    columns = np.stack([0.1 * shape, SPACE[:, 1], 0.0 * shape], axis=1)
+    known = (*used, 0.0) if used else ()
+    result, evidence, _ = scored(columns, (53.0, 8.0), known, sign * wave)
+    data = evidence.residual(result.fit.plant) + columns @ np.array(known or (0.0, 0.0, 0.0))
+    # The wave takes 10 half widths of the first tolerance.
+    bound, second = sign * 1.2, columns[:, 1]
+    free = second @ (data - bound * columns[:, 0]) / (second @ second + 1.0)
+    assert abs(free) < 1.2
+    left = data - bound * columns[:, 0] - free * second
+    total = 2.0 * (TICKS // 2 - 1)
+    powers = np.sum(left.reshape(2, 2, -1) ** 2, axis=(0, 2)) / total
+    assert result.inside[0, :, 0] == pytest.approx(powers)
+    joint = np.column_stack([evidence.whiten([FORCE]), evidence.whiten([RATE]), second])
+    inverse = np.linalg.inv(joint.T @ joint + np.diag([0.0, 0.0, 1.0]))
+    products, _ = block_products(evidence, np.column_stack([-joint, left]))
+    gradients = products[..., :3, 3].sum(axis=(1, 2)).reshape(-1, 3)
+    sandwich = inverse @ (gradients.T @ gradients * 20.0 / 17.0) @ inverse
+    excess = max(left @ left / (2.0 * total), 1.0)
+    variance = np.maximum(np.diag(sandwich), excess * np.diag(inverse))[:2]
+    assert np.ravel(result.widths) == pytest.approx(np.sqrt(variance), rel=1e-4)
+
+
+def test_a_band_that_a_recording_does_not_have_has_no_independent_samples():
+    short = NOISE[:, :800]
+    empty = [(NOISE * 0.0, NOISE * 0.0), (short * 0.0, short * 0.0)]
+    evidence: Any = LinearEvidence([NOISE, short], empty, 0.0)
+    size = sum(4 * lines.weight.shape[1] for lines in evidence.lines)
+    fitter: Any = LinearFitter(evidence, np.zeros((size, 0)))
+    result = Scorer(fitter).score(Fit((), (), 0.0, (), PLANT))
+    assert not np.any(result.samples[1, :, 3])
+    assert not np.any(result.pieces[1, :, 3])
+    assert np.all(result.pieces[0] >= 60.0)
+
+
+def test_signals_count_without_their_means_and_derivatives_with_shortened_steps():
+    """The second step of a derivative is the first times √((0.05 χ² + 1e-6 p)/p), at most 1."""
+    data = 3.0 * FORCE + 8.0 * RATE + NOISE + 40.0
+    evidence: Any = LinearEvidence([data], [(FORCE, RATE)])
+    asked: list[float] = []
+    swings: list[np.ndarray] = []
+    residual, whiten = evidence.residual, evidence.whiten
+    evidence.residual = lambda plant: (asked.append(plant.rail.viscous), residual(plant))[1]
+    evidence.whiten = lambda parts: (swings.append(parts[0]), whiten(parts))[1]
+    fitter: Any = LinearFitter(evidence, np.zeros((SPACE.shape[0], 0)))
+    fitter.starts = lambda effect: SimpleNamespace(steps=np.array([50.0]))
+    scorer = Scorer(fitter)
+    np.testing.assert_allclose(swings[0].mean(axis=1), 0.0, atol=1e-12)
+    plant = with_values(PLANT, (VISCOUS,), ((8.0,),))
+    scorer.score(Fit((VISCOUS,), ((8.0,),), 0.0, ((1.0,),), plant))
+    left = residual(plant)
+    power = 2500.0 * np.sum(whiten([RATE]) ** 2)
+    share = np.sqrt((0.05 * left @ left + 1e-6 * power) / power)
+    assert share < 1.0
+    assert asked[:3] == pytest.approx([8.0, 58.0, 8.0 + 50.0 * share])
+
+
 def test_a_score_is_worked_out_once_and_a_fit_without_effects_has_no_widths():
     data = 3.0 * FORCE + NOISE
     evidence: Any = LinearEvidence([data], [(FORCE, RATE)])
@@ -263,5 +343,8 @@ def test_a_score_is_worked_out_once_and_a_fit_without_effects_has_no_widths():
     first = scorer.score(empty)
     assert scorer.score(empty) is first
     assert first.widths == ()
+    assert first.reach.shape == first.together.shape == (0, 0)
+    assert first.accounts.shape == first.rest.shape == (0,)
+    assert first.bounded is False
     assert first.levels == pytest.approx(first.inside)
     assert scorer.score(Fit((COULOMB,), ((1200.0,),), 0.0, ((1.0,),), PLANT)).bounded is True

@@ -56,7 +56,9 @@ def test_responses_are_projected_off_the_tolerances():
     np.testing.assert_allclose(found, projector @ responses, atol=1e-12)
 
 
-@pytest.mark.parametrize(("residual", "free"), [(SMALL, [0, 1, 2]), (LARGE, [1, 2])])
+@pytest.mark.parametrize(
+    ("residual", "free"), [(SMALL, [0, 1, 2]), (LARGE, [1, 2]), (-LARGE, [1, 2])]
+)
 @pytest.mark.parametrize("used", [np.zeros(3), USED])
 def test_curvature_and_slope_are_the_schur_complement_of_the_free_tolerances(residual, free, used):
     jacobian = RANDOM.standard_normal((30, 2))

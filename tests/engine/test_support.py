@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def test_confidence_at_its_anchors(probability, expected):
 
 
 def test_confidence_is_straight_between_its_anchors():
-    for (low, left), (high, right) in zip(ANCHORS[:-1], ANCHORS[1:], strict=True):
+    for (low, left), (high, right) in pairwise(ANCHORS):
         for part in (0.25, 0.5):
             expected = left + part * (right - left)
             assert confidence(low + part * (high - low)) == pytest.approx(expected)
@@ -30,5 +32,6 @@ def test_confidence_is_straight_between_its_anchors():
 def test_a_mimic_lowers_the_probability_before_it_is_calibrated(mimic):
     """confidence(p, m) = calibration(p (1 − m))."""
     for probability in np.linspace(0.1, 1.0, 7):
-        expected = np.interp(probability * (1.0 - mimic), *zip(*ANCHORS, strict=True))
+        places, heights = zip(*ANCHORS, strict=True)
+        expected = np.interp(probability * (1.0 - mimic), np.array(places), np.array(heights))
         assert confidence(float(probability), mimic) == pytest.approx(expected)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from controllers.formula import formula
@@ -15,6 +16,8 @@ from rigtwin.numerics.arrays import Array
 
 PERIOD = 1e-3
 """Time between ticks, s."""
+INTERPRETED = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+"""Whether compilation is switched off; what calls MuJoCo from compiled code cannot run then."""
 STIFF = 1e9
 """Stiffness of the spring in series with dry friction that counts as rigid, N/m."""
 

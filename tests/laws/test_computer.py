@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import pytest
 
@@ -10,9 +9,8 @@ from experiments import EXPERIMENTS
 from rigtwin.components import Computer, Mains, RigPlant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
+from tests.laws.joints import INTERPRETED
 from tests.laws.written import law_of
-
-INTERPRETED = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
 
 
 @law_of("missed_ticks", Computer)

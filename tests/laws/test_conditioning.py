@@ -1,4 +1,4 @@
-"""A command on its way: limits, delay, deadband, gain, saturation, rate limit, lag, in that order."""
+"""A command on its way: limits, delay, deadband, gain, saturation, rate limit, lag."""
 
 from __future__ import annotations
 

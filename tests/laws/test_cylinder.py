@@ -113,7 +113,13 @@ def test_looking_ahead_changes_nothing():
 def test_a_controller_is_told_the_transfer_function_and_the_whole_delay():
     cylinder = OTHER._replace(gain=1.1, lag=0.004, delay=0.006)
     parts = closed_loop(cylinder)
-    assert (parts.b0, parts.a3, parts.gain, parts.lag, parts.delay) == (5e5, 140.0, 1.1, 0.004, 0.006)
+    assert (parts.b0, parts.a3, parts.gain, parts.lag, parts.delay) == (
+        5e5,
+        140.0,
+        1.1,
+        0.004,
+        0.006,
+    )
     settings = told_settings(cylinder, before=0.003)
     assert settings["plate_delay"] == pytest.approx(0.009)
     assert settings["plate_gain"] == 1.1

@@ -78,7 +78,18 @@ def test_the_mounts_stretch_is_its_compliance_times_all_that_the_guide_does(guid
     if guide.coulomb == guide.stribeck == guide.load_coefficient == 0.0:
         slider = inner
     position, slid_to, lagging, force = give_way(
-        guide, friction(guide), SPRING, REST, share, STEP, inner, speed, slider, viscous, load, outer
+        guide,
+        friction(guide),
+        SPRING,
+        REST,
+        share,
+        STEP,
+        inner,
+        speed,
+        slider,
+        viscous,
+        load,
+        outer,
     )
     expected = written_resistance(guide, share, inner, slider, viscous, limits, position)
     assert force == pytest.approx(expected[0], abs=1e-9)
@@ -86,9 +97,7 @@ def test_the_mounts_stretch_is_its_compliance_times_all_that_the_guide_does(guid
     assert lagging == pytest.approx(expected[2], abs=1e-9)
     mismatch = position + guide.mount_compliance * force - outer
     assert abs(mismatch) <= 1.1e-9 * abs(outer - inner) + 1e-15
-    directly = resist_at(
-        guide, SPRING, REST, share, STEP, inner, slider, viscous, limits, position
-    )
+    directly = resist_at(guide, SPRING, REST, share, STEP, inner, slider, viscous, limits, position)
     assert directly == pytest.approx(expected, abs=1e-9)
 
 
@@ -156,7 +165,18 @@ def test_an_equilibrium_needs_few_evaluations_of_the_law(monkeypatch, guide, mos
         )
         counts.append(0)
         give_way(
-            guide, friction(guide), SPRING, REST, 1.0, STEP, inner, speed, slider, viscous, load, outer
+            guide,
+            friction(guide),
+            SPRING,
+            REST,
+            1.0,
+            STEP,
+            inner,
+            speed,
+            slider,
+            viscous,
+            load,
+            outer,
         )
     assert max(counts) <= most
 

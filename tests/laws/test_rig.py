@@ -86,7 +86,7 @@ def test_the_motors_force_stays_within_its_limits(motor, most):
 
 
 def wheel_under(plant: RigPlant, force: np.ndarray) -> np.ndarray:
-    """Return the wheel's position in m, shape (ticks,), under a force in N upwards, at still ground."""
+    """Return the wheel's position in m, shape (ticks,), under an upward force in N."""
     configuration = Configuration(plant=plant)
     return replay_carriage(configuration, np.zeros(len(force)), -force, 0.0)
 

@@ -1,4 +1,4 @@
-"""What a sensor makes of its quantity: delay, lag, gain, offset, drift; and its noise, hum, bits."""
+"""A sensor: delay, lag, gain, offset and drift of what it reads; its noise, hum and bits."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ RODS = [(30.0, 0.0, 14.0, 14.0), (30.0, 200.0, 20.0, 5.0), (-60.0, 50.0, 0.0, 0.
 
 
 def written_load(v: float, free: float, share: float, rod: tuple[float, ...]) -> float:
-    """Solve N = F − b s − R(s) for the rod's load, with the sliding speed s = free + share N − v."""
+    """Solve N = F − b s − R(s) with the sliding speed s = free + share N − v for the load N."""
     force, viscous, forward, backward = rod
     stuck = (v - free) / share
     if -forward <= stuck - force <= backward:
@@ -92,6 +92,7 @@ def test_carriage_and_plate_are_in_equilibrium_at_the_end_of_a_step(rod, seed):
             v = brentq(lambda speed: left(speed) - rail[1], -50.0, 0.0, xtol=1e-15)  # noqa: B023
         else:
             v = 0.0
+        assert isinstance(v, float)
         both = (float(rail[0]), float(rail[1]))
         found = solve_yielding(rhs, inertia, step, both, free, share, *rod)
         assert found[0] == pytest.approx(v, abs=1e-9)
