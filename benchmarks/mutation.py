@@ -23,8 +23,12 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
-LONGEST = 60
-"""Seconds that a mutant's tests may run; one that runs longer counts as noticed."""
+LONGEST = 10.0
+"""Times the tests' usual duration that a mutant may take; one that takes longer is noticed."""
+NOMINAL = "test_nominal_values.py"
+"""Tests of all components' nominal values."""
+SHORTEST = 60.0
+"""Seconds that a mutant may take at least."""
 TARGETS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "components": (
         "rigtwin.components",
@@ -153,8 +157,9 @@ def _graft(old: Any, new: Any) -> None:
 class Session:
     """A pytest plugin that runs the collected tests once for every mutant."""
 
-    def __init__(self, modules: Sequence[str], quiet: bool) -> None:
-        self._modules, self._quiet = modules, quiet
+    def __init__(self, modules: Sequence[str], quiet: bool, own: bool) -> None:
+        self.modules, self._quiet, self._own = modules, quiet, own
+        self._limit = SHORTEST
         self.outcomes: list[Outcome] = []
 
     def pytest_runtestloop(self, session: Any) -> bool:
@@ -166,8 +171,10 @@ class Session:
         if failing:
             print(f"a test fails without any change: {failing}", file=sys.stderr)
             raise session.Interrupted("a test fails without any change")
-        print(f"{len(session.items)} tests, {time.perf_counter() - started:.1f} s", flush=True)
-        for name in self._modules:
+        seconds = time.perf_counter() - started
+        self._limit = max(LONGEST * seconds, SHORTEST)
+        print(f"{len(session.items)} tests, {seconds:.1f} s", flush=True)
+        for name in self.modules:
             self._try_module(import_module(name), session.items)
         return True
 
@@ -177,24 +184,27 @@ class Session:
         short = module.__name__.rpartition(".")[2]
         # The tests of the same name first: they notice most.
         items = sorted(items, key=lambda item: f"test_{short}." not in item.nodeid)
+        if self._own:
+            own = (f"test_{short}.", NOMINAL)
+            items = [item for item in items if any(name in item.nodeid for name in own)]
         tree = ast.parse(Path(str(module.__file__)).read_text())
-        if _is_noticed(module, tree, items):
+        if not items or _is_noticed(module, tree, items, self._limit):
             raise RuntimeError(
                 f"{short}: the tests fail with the unchanged source put in its place"
             )
         started, first = time.perf_counter(), len(self.outcomes)
         for mutant in list_mutants(tree):
             mutant.apply()
-            noticed = _is_noticed(module, tree, items)
+            noticed = _is_noticed(module, tree, items, self._limit)
             mutant.undo()
             place = f"{short}.py:{mutant.line} {mutant.function}"
             self.outcomes.append(Outcome(place, mutant.sort, mutant.text, noticed))
             if not noticed and not self._quiet:
                 print(f"  not noticed: {place}: {mutant.text}", flush=True)
-        own = self.outcomes[first:]
+        tried = self.outcomes[first:]
         seconds = time.perf_counter() - started
-        caught = sum(outcome.noticed for outcome in own)
-        print(f"{short}: {caught} of {len(own)} noticed, {seconds:.0f} s", flush=True)
+        caught = sum(outcome.noticed for outcome in tried)
+        print(f"{short}: {caught} of {len(tried)} noticed, {seconds:.0f} s", flush=True)
 
 
 def _run(items: list[Any]) -> str:
@@ -209,13 +219,13 @@ def _run(items: list[Any]) -> str:
     return ""
 
 
-def _is_noticed(module: ModuleType, tree: ast.Module, items: list[Any]) -> bool:
-    """Run the tests on a changed module in a forked process."""
+def _is_noticed(module: ModuleType, tree: ast.Module, items: list[Any], limit: float) -> bool:
+    """Run the tests on a changed module in a forked process, for `limit` seconds at most."""
     child = os.fork()
     if child == 0:
         status = 1
         try:
-            signal.alarm(LONGEST)
+            signal.alarm(round(limit))
             silent = os.open(os.devnull, os.O_WRONLY)
             os.dup2(silent, 1)
             os.dup2(silent, 2)
@@ -248,15 +258,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("target", choices=TARGETS)
     parser.add_argument("modules", nargs="*", help="modules of the target; all by default")
     parser.add_argument("--quiet", action="store_true", help="print counts only")
-    asked = parser.parse_args(arguments)
+    parser.add_argument(
+        "--own", action="store_true", help="run only the tests named like the module"
+    )
+    asked = parser.parse_intermixed_args(arguments)
     if asked.target == "components":
         # Read when numba is imported: a changed Python function is then what the models call.
         os.environ["NUMBA_DISABLE_JIT"] = "1"
     import pytest
 
-    session = Session(_modules_of(asked.target, asked.modules), asked.quiet)
+    session = Session(_modules_of(asked.target, asked.modules), asked.quiet, asked.own)
     options = ["-p", "no:cacheprovider", "-p", "no:terminal", "--capture=no", "-o", "addopts="]
     tests = [str(ROOT / path) for path in TARGETS[asked.target][2]]
+    if asked.own:
+        names = {f"test_{name.rpartition('.')[2]}.py" for name in session.modules} | {NOMINAL}
+        tests = [
+            str(path)
+            for folder in tests
+            for path in Path(folder).glob("test_*.py")
+            if path.name in names
+        ]
     status = pytest.main([*options, "-m", "not slow", *tests], plugins=[session])
     print("\n".join(summarise(session.outcomes)))
     return int(status)
