@@ -23,6 +23,8 @@ GUIDES = [
     Guide(5.0, 100.0, viscous_asymmetry=40.0, drag=900.0, mount_compliance=1e-4),
     Guide(8.0, stribeck=4.0, load_coefficient=0.1, cogging=3.0, mount_compliance=2e-4),
     Guide(viscous=500.0, relaxation=0.02, drag=50.0, stiffness=500.0, mount_compliance=5e-4),
+    Guide(5.0, 400.0, 300.0, relaxation=0.02, mount_compliance=3e-4),
+    Guide(10.0, 100.0, 500.0, backlash=0.004, mount_compliance=2e-4, offset=3.0),
     Guide(0.5, cogging=8.0, cogging_pitch=0.002, cogging_phase=1.0, mount_compliance=2e-4),
 ]
 STATES = [
