@@ -106,10 +106,7 @@ def hold(conditioning: Actuator, command: float) -> ActuatorState:
     """The state in which `command` has been held for long."""
     command = min(max(command, conditioning.low), conditioning.high)
     state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
-    if conditioning.zero_centred:
-        state.memory[1] = 0.0
-    output = limit(conditioning, state, command)
-    state.memory[2] = state.memory[3] = output
+    state.memory[2:] = limit(conditioning, state, command)
     return state
 
 

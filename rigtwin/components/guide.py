@@ -67,10 +67,14 @@ class Guide(NamedTuple):
     force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v|
     +
     stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
-    is coulomb + load_coefficient·|force transmitted| +
+    is coulomb + load_coefficient·|load| +
     stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent), in positive direction ½·asymmetry more
     and in negative less, and acts through a play of `backlash` and a spring of `compliance` in
     series with it. All of it acts through a spring of `mount_compliance`.
+
+    Where the motion is given, the load is the force that reaches the guide from the body and from
+    the guide's own spring. Where the motion follows from a force, it is the actuator's force
+    (docs/theory.md, "Load friction").
     """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
@@ -140,7 +144,8 @@ def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, floa
     velocity
         m/s, of the motion that it resists.
     load
-        N, the force that what slides transmits.
+        Force that what slides transmits, N. The models differ in what they count as such a force
+        (docs/theory.md, "Load friction").
 
     Returns
     -------

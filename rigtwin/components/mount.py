@@ -1,8 +1,9 @@
 """What a guide is mounted on: a spring in series with everything the guide does.
 
 Behind a yielding mount the guide moves less than what is measured. All that resists is monotonic in
-the guide's own position, so its equilibrium with the spring is one number, found case by case and
-then between bounds.
+the guide's own position but for waves (cogging), so its equilibrium with the spring is one number,
+found case by case and then between bounds. Waves that are steeper than the mount is stiff,
+2π·cogging·mount_compliance > cogging_pitch, have several equilibria; one of them is returned.
 """
 
 from __future__ import annotations
@@ -125,8 +126,11 @@ def give_way(
     )
     error = position + compliance * force - outer
     # What resists grows with the position, so the guide is no further off than the error is large.
-    low, high = min(position, position - error), max(position, position - error)
+    # Only waves may fall while the position grows, by twice their amplitude at most.
+    waves = 2.0 * compliance * guide.cogging
+    low, high = min(position, position - error) - waves, max(position, position - error) + waves
     enough = CLOSE * abs(outer - inner) + ROUNDED * abs(outer)
+    halve = False
     for _ in range(MOST):
         if abs(error) <= enough:
             break
@@ -135,7 +139,7 @@ def give_way(
         else:
             low = position
         following = position - error / slope
-        if not low < following < high:
+        if halve or not low < following < high:
             following = 0.5 * (low + high)
         force, by, relaxed = resist_at(
             guide=guide,
@@ -152,6 +156,7 @@ def give_way(
         changed = following + compliance * force - outer
         if following != position:
             slope = max((changed - error) / (following - position), 1.0)
+        halve = waves > 0.0 and abs(changed) > 0.5 * abs(error)
         position, error = following, changed
     return position, slider + by, relaxed, force
 

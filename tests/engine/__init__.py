@@ -1,0 +1,1 @@
+"""The diagnosis' arithmetic against closed forms, on linear models that stand in for machines."""

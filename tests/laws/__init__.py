@@ -1,0 +1,1 @@
+"""The law of every component against an equation that the test writes out itself."""

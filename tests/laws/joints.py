@@ -1,0 +1,95 @@
+"""One joint that is moved as prescribed or pushed by a constant force, with a guide and a mass."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from controllers.formula import formula
+from rigtwin.components import Computer, ForceActuator, Guide, PositionSensor, Pusher
+from rigtwin.components.conditioning import actuator, hold
+from rigtwin.components.guide import friction
+from rigtwin.components.sensors import start_transducer, transducer
+from rigtwin.components.servo import push_law
+from rigtwin.models.guided import Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.numerics.arrays import Array
+
+PERIOD = 1e-3
+"""Time between ticks, s."""
+INTERPRETED = bool(numba.config.DISABLE_JIT)  # type: ignore[attr-defined]
+"""Whether compilation is switched off; what calls MuJoCo from compiled code cannot run then."""
+STIFF = 1e9
+"""Stiffness of the spring in series with dry friction that counts as rigid, N/m."""
+
+
+def inertia_of(mass: float, load: float = 0.0, rest: float = 0.0) -> Inertia:
+    """Return a mass in kg under a constant load in N; its guide's spring is slack at `rest`, m."""
+    return Inertia(mass, -10.0, 20.0, np.full(2, load), rest, turns=False)
+
+
+def force_to_move(
+    guide: Guide,
+    position: Array,
+    mass: float = 0.0,
+    load: float = 0.0,
+    spring: float = STIFF,
+    rest: float = 0.0,
+) -> Array:
+    """Return the force in N, shape (ticks,), that moves a joint through positions in m."""
+    speed = np.gradient(position, PERIOD)
+    motion = np.ascontiguousarray(np.stack([position, speed, np.gradient(speed, PERIOD)]))
+    force = np.empty(len(position))
+    inertia = inertia_of(mass, load, rest)
+    inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, force)
+    return force
+
+
+def motion_under(
+    guide: Guide,
+    command: Array,
+    mass: float,
+    mover: Pusher | None = None,
+    load: float = 0.0,
+    spring: float = STIFF,
+    start: tuple[float, float] = (0.0, 0.0),
+    steps: int = 4,
+) -> Array:
+    """Return position m, speed m/s and force N, shape (3, ticks), of a joint under a command.
+
+    The command is a force in N unless `mover` makes something else of it.
+    """
+    of = ForceActuator() if mover is None else mover
+    none = formula("0", {})
+    empty = np.zeros((1, 1))
+    loop = Loop(
+        closed=False,
+        program=none.program,
+        registers=none.program.registers.copy(),
+        memory=none.memory(),
+        recorded=empty,
+        noise=empty,
+        sensor=np.zeros(0, np.int64),
+    )
+    drive = actuator(of, Computer(), PERIOD / steps)
+    sensor = transducer(PositionSensor(), PERIOD)
+    motion = np.zeros((3, len(command)))
+    integrate_pushed(
+        guide=guide,
+        dry_friction=friction(guide),
+        inertia=inertia_of(mass, load),
+        spring=spring,
+        start=start,
+        law=push_law(of),
+        drive=drive,
+        held=hold(drive, float(command[0])),
+        sensors=(sensor,),
+        states=(start_transducer(sensor),),
+        kinds=np.zeros(1, np.int64),
+        loop=loop,
+        command=command.astype(float),
+        besides=np.zeros(len(command)),
+        period=PERIOD,
+        steps=steps,
+        out=motion,
+    )
+    return motion
