@@ -13,7 +13,7 @@ from experiments.thesis import (
     single_mass_stability,
     vehicles_stability,
 )
-from experiments.thesis.entry import Entry, share
+from experiments.thesis.entry import Entry, count_agreeing
 from experiments.thesis.loci import drawing, of_damping_ratio, of_wheel_mass
 
 MISPRINTED_LAG = "τ = 0.333 s"
@@ -53,7 +53,7 @@ def disagreeing(entries):
     ],
 )
 def test_tables_of_the_single_mass(single, table, expected):
-    assert share(of(single, table)) == expected
+    assert count_agreeing(of(single, table)) == expected
 
 
 def test_the_single_mass_disagrees_where_the_thesis_slips_alone(single):
@@ -82,7 +82,7 @@ def test_the_single_mass_disagrees_where_the_thesis_slips_alone(single):
     ],
 )
 def test_tables_of_the_quarter_car(quarter, table, expected):
-    assert share(of(quarter, table)) == expected
+    assert count_agreeing(of(quarter, table)) == expected
 
 
 def test_the_quarter_car_disagrees_where_the_thesis_contradicts_itself_alone(quarter):
@@ -119,7 +119,7 @@ def test_root_loci_disagree_where_a_lag_is_misprinted(loci):
     assert Counter(where for where, what in wrong if what == "lag of case 1") == {
         f"Table A{appendix}.{table}": 1 for appendix in (1, 2, 3) for table in (4, 5)
     }
-    assert share(loci) == "156 of 182"
+    assert count_agreeing(loci) == "156 of 182"
 
 
 @pytest.mark.slow
@@ -144,7 +144,7 @@ def test_crossings_found(loci):
 
 def test_table_6_1():
     entries = vehicles_stability.conclude({}).entries
-    assert share(of(entries, "Table 6.1")) == "4 of 5"
+    assert count_agreeing(of(entries, "Table 6.1")) == "4 of 5"
     assert disagreeing(entries) == [
         ("Table 6.1", "damping of the truck", "ζ = 0.506"),
         ("Figure 6.19", "car, four lags of 10 ms", "-0.724 ± 6.98j 1/s"),

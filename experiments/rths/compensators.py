@@ -36,7 +36,7 @@ def sample_controller() -> LinearLaw:
     back = (rate - pole) / (rate + pole)
     # States: the lead, the integral. The PI acts on e = ahead r + lead − y.
     lead, entry = np.array([1.0, 0.0]), np.array([ahead, -1.0])
-    # Tustin's integral adds half the old and half the new error, so K_i T/2 joins K_p in the output.
+    # Tustin's integral adds half the old and half the new error, so K_i T/2 joins K_p.
     half = 0.5 * SAMPLE_KI * PERIOD
     a = np.array([[back, 0.0], [2.0 * half, 1.0]])
     b = np.array([[behind + back * ahead, 0.0], 2.0 * half * entry])

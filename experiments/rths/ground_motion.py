@@ -29,6 +29,6 @@ def ground_motion(quake: str) -> Array:
     name = QUAKES[quake]
     with as_file(files("experiments.rths") / "earthquakes" / f"{name}NoScaling.mat") as path:
         time, acceleration = loadmat(path)[name]
-    # The records are sampled more slowly than the benchmark runs.
+    # The records have 50 to 200 samples a second, the benchmark 4096.
     ticks = np.arange(0.0, time[-1], PERIOD)
     return SHARE * np.interp(ticks, time, acceleration)

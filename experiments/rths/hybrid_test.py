@@ -159,7 +159,7 @@ def run_test(
 def _simulate(
     case: BuildingCase, ground: Array, law: Law, plant: Plant, noise: Noise, seed: int
 ) -> tuple[Array, int]:
-    """Return the signals of a test, shape (7, n), as `_loop` fills them, and the ticks completed."""
+    """Return the signals of a test, shape (7, n), see `_loop`, and its length in ticks."""
     # The simulated part knows the nominal specimen alone; the true one may differ.
     building = numerical_part(case, Specimen())
     linear, adaptive = _split_law(law)

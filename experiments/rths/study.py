@@ -114,7 +114,7 @@ def _table_entries(case: int, result: Result) -> list[Entry]:
     entries = []
     for name, printed, ours in zip(Criteria._fields, TABLE_3[case], median, strict=True):
         difference = float(ours) - number(printed)
-        # Small criteria are printed with one decimal; a relative tolerance alone would be too tight.
+        # Criteria are printed with one decimal; a relative tolerance alone would be too tight.
         agrees = abs(difference) <= max(SHARE * number(printed), POINTS)
         entries.append(
             Entry(

@@ -69,6 +69,17 @@ class Tunable:
     knobs: tuple[Knob, ...]
     make: Callable[..., Law]
 
+    def start(self) -> np.ndarray:
+        """Return the logarithms of the default values, shape (knobs,)."""
+        return np.log([knob.start for knob in self.knobs])
+
+    def values(self, point: np.ndarray) -> dict[str, float]:
+        """Return the parameters at a point of logarithms, shape (knobs,), moved into the bounds."""
+        lows, highs = np.log([(knob.low, knob.high) for knob in self.knobs]).T
+        # The simplex knows no bounds: a point outside counts as its projection.
+        inside = np.exp(np.clip(point, lows, highs))
+        return {knob.name: float(value) for knob, value in zip(self.knobs, inside, strict=True)}
+
 
 def _weighed(**weights: float) -> Law:
     """Return the Kalman inverse of the nominal plant with other weights."""
@@ -241,30 +252,24 @@ def tune_compensator(
     drawn, building = draw_plants(plants + held_out_plants, seed), find_case(case)
     tuning = _TestSeries(building, ground[: round(TUNED_SECONDS / PERIOD)], drawn[:plants])
     validation = _TestSeries(building, ground, drawn[plants:])
-    knobs = tunable.knobs
-    lows, highs = (np.log([getattr(k, end) for k in knobs]) for end in ("low", "high"))
-
-    def values(point: np.ndarray) -> dict[str, float]:
-        # The simplex knows no bounds: points outside are moved onto them.
-        inside = np.exp(np.clip(point, lows, highs))
-        return {knob.name: float(value) for knob, value in zip(knobs, inside, strict=True)}
 
     def objective(point: np.ndarray) -> float:
-        law = tunable.make(**values(point))
+        law = tunable.make(**tunable.values(point))
         progress(1)
         return tuning.worst_tracking(law) + tuning.noise_response(law)
 
     # Gains and weights act by their order of magnitude: the search runs over logarithms.
-    start = np.log([knob.start for knob in knobs])
+    start = tunable.start()
     first_criterion = objective(start)
     best, best_criterion = _descend(objective, start, evaluations)
     if best_criterion >= first_criterion:
         best, best_criterion = start, first_criterion
-    before, after = tunable.make(**values(start)), tunable.make(**values(best))
+    initial, tuned = tunable.values(start), tunable.values(best)
+    before, after = tunable.make(**initial), tunable.make(**tuned)
     return TunedCompensator(
         name=name,
-        before=values(start),
-        after=values(best),
+        before=initial,
+        after=tuned,
         criterion=(first_criterion, best_criterion),
         judged=(validation.worst_tracking(before), validation.worst_tracking(after)),
         noisy=(validation.noise_response(before), validation.noise_response(after)),

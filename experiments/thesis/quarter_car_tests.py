@@ -64,19 +64,19 @@ def _observations(test: Trial) -> dict[str, float]:
     while_hopping = slice(round(1.5 / period), round(4.0 / period))
     moving = [
         float(np.mean(np.abs(np.gradient(w, period)) > 1e-4))
-        for w in (test.wheel, test.should.wheel)
+        for w in (test.wheel, test.ideal.wheel)
     ]
     return {
-        "overshoot": float(np.min(test.should.structure[early]) - np.min(test.plate[early])),
+        "overshoot": float(np.min(test.ideal.structure[early]) - np.min(test.plate[early])),
         "swing at rest": float(np.ptp(test.force[late])),
         "hop": float(np.std(hop(test.wheel, period)[while_hopping])),
-        "ideal hop": float(np.std(hop(test.should.wheel, period)[while_hopping])),
+        "ideal hop": float(np.std(hop(test.ideal.wheel, period)[while_hopping])),
         "moving": moving[0],
         "ideal moving": moving[1],
-        "body frequency": _body_frequency(test.ran.commands[:, 1], period),
-        "ideal body frequency": _body_frequency(test.should.structure, period),
+        "body frequency": _body_frequency(test.simulation.commands[:, 1], period),
+        "ideal body frequency": _body_frequency(test.ideal.structure, period),
         "rest position": float(np.mean(test.plate[late])),
-        "ideal rest position": float(np.mean(test.should.structure[late])),
+        "ideal rest position": float(np.mean(test.ideal.structure[late])),
     }
 
 
@@ -100,8 +100,8 @@ def _spectra(test: Trial) -> dict[str, Array]:
     pairs = {
         "plate": test.plate,
         "travel": test.travel,
-        "ideal plate": test.should.structure,
-        "ideal travel": test.should.structure - test.should.wheel,
+        "ideal plate": test.ideal.structure,
+        "ideal travel": test.ideal.structure - test.ideal.wheel,
     }
     found = {
         f"spectrum {name}": 1e3 * np.sqrt(welch(signal[5000:], **options)[1])[1:82]

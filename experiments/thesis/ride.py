@@ -37,11 +37,11 @@ COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
 
 def states_of(test: Trial) -> Array:
     """The controller's packed state at every tick, shape (ticks, SIZE)."""
-    demands = test.ran.commands[:, :3]
+    demands = test.simulation.commands[:, :3]
     return states(
         test.configuration.controller,
         test.configuration.timing.period,
-        test.ran.measurements,
+        test.simulation.measurements,
         demands,
     )
 
@@ -59,24 +59,24 @@ def damping(test: Trial) -> Array:
     )
 
 
-def measures(test: Trial) -> dict[str, Array | float]:
+def ride_measures(test: Trial) -> dict[str, Array | float]:
     """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their
     means, switches of the damper a second, and the errors of appendix B."""
     period = test.configuration.timing.period
     late = slice(round(TAXIING / period), None)
     tyre, should_tyre = (
-        wheel - test.ran.commands[:, 0] for wheel in (test.wheel, test.should.wheel)
+        wheel - test.simulation.commands[:, 0] for wheel in (test.wheel, test.ideal.wheel)
     )
     found: dict[str, Array | float] = dict(errors(test))
     found |= {
         "acceleration": body_acceleration(test.plate, period),
         "everything": rms(np.diff(test.plate, 2) / period**2),
-        "ideal acceleration": body_acceleration(test.should.structure, period),
-        "ideal everything": rms(test.should.acceleration(period)),
+        "ideal acceleration": body_acceleration(test.ideal.structure, period),
+        "ideal everything": rms(test.ideal.acceleration(period)),
         "taxiing": body_acceleration(test.plate[late], period),
         "travel rms": float(np.std(test.travel)),
         "tyre rms": float(np.std(tyre)),
-        "ideal travel rms": float(np.std(test.should.structure - test.should.wheel)),
+        "ideal travel rms": float(np.std(test.ideal.structure - test.ideal.wheel)),
         "ideal tyre rms": float(np.std(should_tyre)),
     }
     if test.configuration.controller.skyhook == Skyhook.SEMI_ACTIVE:
@@ -87,16 +87,16 @@ def measures(test: Trial) -> dict[str, Array | float]:
     return found
 
 
-def kept(test: Trial, seed: int) -> Result:
+def job_result(test: Trial, seed: int) -> Result:
     """What a job keeps of a test; of the shown seed its curves too."""
-    found = measures(test)
+    found = ride_measures(test)
     if seed == SHOWN_SEED:
         found |= curves(test)
         found["asked damper"] = _damper(test)[::SHOWN]
-        if test.should.wing is not None:
+        if test.ideal.wing is not None:
             found |= {
                 "wing": 1e3 * _wing(test)[::SHOWN],
-                "ideal wing": 1e3 * (test.should.wing - test.should.wing[:, :1])[::SHOWN],
+                "ideal wing": 1e3 * (test.ideal.wing - test.ideal.wing[:, :1])[::SHOWN],
             }
     elif "damping" in found:
         del found["damping"]
@@ -110,7 +110,11 @@ def _wing(test: Trial) -> Array:
 def _damper(test: Trial) -> Array:
     """The part of the demanded force that is not the spring's, N."""
     settings, found = test.configuration.controller, states_of(test)
-    return test.ran.commands[:, 2] - settings.preload + settings.suspension_stiffness * found[:, 1]
+    return (
+        test.simulation.commands[:, 2]
+        - settings.preload
+        + settings.suspension_stiffness * found[:, 1]
+    )
 
 
 def reduction(
@@ -137,7 +141,7 @@ def remark(results: dict[str, Result], name: str) -> str:
     )
 
 
-def reduced(
+def reduction_entry(
     where: str,
     results: dict[str, Result],
     better: str,
@@ -158,7 +162,7 @@ def reduced(
     )
 
 
-def tracking(
+def tracking_entries(
     table: str,
     results: dict[str, Result],
     name: str,

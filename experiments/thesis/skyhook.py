@@ -26,7 +26,7 @@ TABLE_7_3 = {"passive": "0.2264", "semi-active": "0.0874", "active": "0.0819"}
 def _run(name: str, seed: int) -> Result:
     if name in GAINS:
         gain = GAINS[name]
-        return ride.kept(
+        return ride.job_result(
             trial(
                 "active",
                 seed,
@@ -34,7 +34,7 @@ def _run(name: str, seed: int) -> Result:
             ),
             seed,
         )
-    return ride.kept(trial(name, seed), seed)
+    return ride.job_result(trial(name, seed), seed)
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
@@ -70,12 +70,16 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
                 )
             )
     entries += [
-        ride.reduced("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
-        ride.reduced("§7.1.2", results, "active", "passive", "63.8", WITHIN),
+        ride.reduction_entry("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
+        ride.reduction_entry("§7.1.2", results, "active", "passive", "63.8", WITHIN),
         digits("§7.1.1", "61.4 % from Table 7.3 itself", "61.4", 100 * (1 - 0.0874 / 0.2264), "%"),
         digits("§7.1.2", "63.8 % from Table 7.3 itself", "63.8", 100 * (1 - 0.0819 / 0.2264), "%"),
-        *ride.tracking("Table B1.1", results, "semi-active", ("7.50", "286", "0.0593", "58"), 1.5),
-        *ride.tracking("Table B2.1", results, "active", ("8.47", "425", "0.0595", "58"), 1.5),
+        *ride.tracking_entries(
+            "Table B1.1", results, "semi-active", ("7.50", "286", "0.0593", "58"), 1.5
+        ),
+        *ride.tracking_entries(
+            "Table B2.1", results, "active", ("8.47", "425", "0.0595", "58"), 1.5
+        ),
     ]
     return entries + _statements(results)
 

@@ -41,7 +41,7 @@ def _run(name: str, seed: int) -> Result:
     found |= {"frequencies": frequencies, "response": ours, "ideal response": ideal}
     late = slice(0, 8000)
     found["overshoot"] = -float(
-        np.min(test.ran.commands[late, 1]) - np.min(test.should.structure[late])
+        np.min(test.simulation.commands[late, 1]) - np.min(test.ideal.structure[late])
     )
     if seed == SHOWN_SEED:
         found |= curves(test)
@@ -51,12 +51,12 @@ def _run(name: str, seed: int) -> Result:
 def _acceleration_response(test) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
     """Sprung acceleration per ground velocity, 1/s, up to 2 Hz (Fig. 3.18)."""
     period = test.configuration.timing.period
-    ground = np.gradient(test.ran.commands[:, 0], period)
+    ground = np.gradient(test.simulation.commands[:, 0], period)
     options = {"fs": 1 / period, "nperseg": 20_000, "noverlap": 15_000, "detrend": "linear"}
     frequencies, power = welch(ground, **options)
     shown = (frequencies > 0) & (frequencies <= 2.0)
     found = []
-    for position in (test.ran.commands[:, 1], test.should.structure):
+    for position in (test.simulation.commands[:, 1], test.ideal.structure):
         acceleration = np.gradient(np.gradient(position, period), period)
         with np.errstate(divide="ignore", invalid="ignore"):
             found.append(np.abs(csd(ground, acceleration, **options)[1][shown]) / power[shown])
