@@ -69,7 +69,7 @@ ERRORS = ("tracking", "numerical", "total")
 
 
 def _variants() -> dict[str, dict[str, object]]:
-    """Return the settings of every row of both tables, with the thesis' parameters, and the observer."""
+    """Return the settings of every table row, with the thesis' parameters, and of the observer."""
     variants: dict[str, dict[str, object]] = {"none": {}}
     for name, threshold in TABLE_4_1:
         if threshold:
@@ -285,7 +285,8 @@ def _timing(results: Mapping[str, Result]) -> list[Entry]:
         ):
             delay = float(detection["delay"])
             late = "none in time" if math.isnan(delay) else f"{1e3 * delay:.0f} ms late"
-            text = f"{detection['seen']:.0f} of {detection['reversals']:.0f}, {detection['false']:.0f} false, {late}"
+            counts = f"{detection['seen']:.0f} of {detection['reversals']:.0f}"
+            text = f"{counts}, {detection['false']:.0f} false, {late}"
             all_seen = detection["seen"] == detection["reversals"] and detection["false"] == 0
             note = "" if all_seen else NOISE
             entries.append(
@@ -322,7 +323,8 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
         remarks.append(
             f"calibrated with the {loop} loop (K_p {LOOPS[loop]['kp']:g}, "
             f"K_i {LOOPS[loop]['ki']:g} 1/s): "
-            f"F_c {calibrated['friction']:.1f} N, threshold {calibrated['setting spike_threshold']:.1f} N, "
+            f"F_c {calibrated['friction']:.1f} N, "
+            f"threshold {calibrated['setting spike_threshold']:.1f} N, "
             f"gradient {1e-3 * float(calibrated['setting spike_gradient']):.2f} N a tick "
             f"over {calibrated['setting spike_samples']:.0f} samples, "
             f"window {1e3 * float(calibrated['setting crossing_time']):.0f} ms; "
