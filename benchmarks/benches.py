@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from referee.bench_cases import Case, draw_case, record
+from referee.bench_cases import BenchCase, draw_case, record
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording
 
 
-def recording_of(case: Case, again: int = 0) -> Recording:
+def recording_of(case: BenchCase, again: int = 0) -> Recording:
     """The case as a file would hold it."""
     data = record(case, again)
     time = np.arange(len(data.first)) * case.period
@@ -28,7 +28,9 @@ def recording_of(case: Case, again: int = 0) -> Recording:
     return Recording(Path("damper"), "damper-bench", "", case.period, time, columns, {})
 
 
-def answered(number: int, seed: int) -> tuple[Case, str, frozenset[str], frozenset[str], float]:
+def answered(
+    number: int, seed: int
+) -> tuple[BenchCase, str, frozenset[str], frozenset[str], float]:
     """(the case, verdict, kinds named, those in any class, seconds)."""
     case = draw_case(number, seed)
     recording = recording_of(case)

@@ -9,7 +9,7 @@ import numpy as np
 
 from referee.benches import DamperTruth, damper_force, sample, wander
 
-TRUTH = DamperTruth(slip=85.0, spring=5e4, lost=2.4e-3, viscous=(640.0, 640.0))
+TRUTH = DamperTruth(slip=85.0, spring=5e4, play=2.4e-3, viscous=(640.0, 640.0))
 PERIOD, FINE, SECONDS = 2e-3, 8, 10.0
 
 

@@ -1,5 +1,4 @@
-"""How figures of the thesis are compared, which of them are covered, and that finished work is
-never lost or done twice."""
+"""Comparison and coverage of the thesis' results, and stored results of finished jobs."""
 
 from __future__ import annotations
 
@@ -58,7 +57,7 @@ def test_printed_digits(printed, value, agrees):
     assert digits("Table 1.1", "x", printed, value).agrees is agrees
 
 
-def test_what_a_printed_number_is():
+def test_a_printed_number_has_a_value_and_a_last_digit():
     assert number("−0.5") == -0.5
     assert last_digit("4.716e4") == pytest.approx(10.0)
     assert last_digit("0.00850") == pytest.approx(1e-5)
@@ -87,7 +86,7 @@ def test_every_numbered_table_is_covered():
     assert len(TABLES) == 51
 
 
-def test_studies_can_be_asked_for():
+def test_studies_are_selected_by_name_chapter_or_table():
     assert len(select_studies(None).studies) == len(STUDIES)
     assert [study.name for study in select_studies("skyhook").studies] == ["skyhook"]
     assert [study.name for study in select_studies("chapter 7").studies] == ["skyhook", "beams"]
@@ -101,7 +100,7 @@ def test_studies_can_be_asked_for():
         select_studies("table 9.9")
 
 
-def test_which_drawing_is_of_a_figure():
+def test_a_drawing_covers_the_figures_of_its_range():
     assert covers_figure("Figure 3.11 to 3.14", "Figure 3.12")
     assert not covers_figure("Figure 3.11 to 3.14", "Figure 3.15")
     assert covers_figure("Figure 7.7 to 7.9, B1.1 to B2.6", "Figure B1.1")
@@ -135,7 +134,7 @@ def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, l
     return study, ran
 
 
-def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
+def test_finished_jobs_are_not_run_again(tmp_path, monkeypatch):
     study, ran = counting(set(), monkeypatch)
     steps: list[tuple[int, int]] = []
     first = run_studies(
@@ -149,7 +148,7 @@ def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
     assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
 
 
-def test_a_broken_run_goes_on_where_it_was(tmp_path, monkeypatch):
+def test_an_interrupted_run_resumes(tmp_path, monkeypatch):
     study, ran = counting({"job/2"}, monkeypatch)
     with pytest.raises(RigtwinError, match="job/2 failed"):
         run_studies([study], 3, tmp_path, Here())
@@ -159,7 +158,7 @@ def test_a_broken_run_goes_on_where_it_was(tmp_path, monkeypatch):
     assert ran == ["job/2"]
 
 
-def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
+def test_text_document_and_page_agree(tmp_path, monkeypatch):
     study, _ = counting(set(), monkeypatch)
     chapters = [
         Chapter(study, study.conclude(run_studies([study], 3, tmp_path, Here())["counted"]))
@@ -180,7 +179,7 @@ def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
     ] == ["1 of 1"]
 
 
-def test_a_transfer_function_is_found_again():
+def test_a_fit_recovers_a_transfer_function():
     frequencies = np.arange(1.0, FITTED + 1.0)
     above, below = fit_transfer_function(
         frequencies, thesis_cylinder(frequencies) * 6.243e5 / 6.281e5, 2, 4
@@ -215,7 +214,7 @@ def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_what_the_thesis_sees_in_the_drop():
+def test_the_twin_shows_the_statements_about_the_drop():
     """Statements of section 6.3 that the twin shows, of one run each."""
     results = {key: job() for key, job in quarter_car_tests.jobs(1).items()}
     entries = {
