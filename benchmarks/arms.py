@@ -114,6 +114,7 @@ def record(joints: int, seconds: float) -> Recording:
     torque = np.empty_like(travel[0])
     for tick in range(torque.shape[1]):
         data.qpos[:], data.qvel[:], data.qacc[:] = (each[:, tick] for each in travel)
+        # Inverse dynamics: the torque that makes the arm follow the motion exactly.
         mujoco.mj_inverse(model, data)
         torque[:, tick] = data.qfrc_inverse
     random, sensors = np.random.default_rng([joints, 2]), {}

@@ -131,6 +131,7 @@ def _law(coefficients: list[float], period: float, corner: float, span: float) -
     motion_filter = state_filter(order, corner, period)
     units = motion_filter.corner ** np.arange(order, dtype=np.float64)
     start = np.asarray(coefficients, dtype=np.float64) * units
+    # Bounds keep a wrong estimate from making the loop unstable.
     reach = span * np.abs(start)
     points = order + 1
     stencils = np.array([derivative_weights(power, points, period) for power in range(order)])
@@ -190,6 +191,7 @@ def step_adaptive(law: AdaptiveLaw, memory: Array, desired: float, measured: flo
         for index in range(points):
             derivative += law.stencils[power, index] * history[index]
         command += theta[power] * derivative
+    # The next tick filters the command that acts during this one.
     last[0], last[1] = command, measured
     return command
 

@@ -218,6 +218,7 @@ def at_start(settings: Settings, model: Modes) -> Six:
     The beams are straight, or bent by the share `beam_sag` of the preload.
     """
     angular = 2 * math.pi * model.frequencies[1:]
+    # Static deflection of mode i under a force F at the centre: φ_i F/ω_i².
     bent = settings.beam_sag * settings.preload * model.centre[1:] / angular**2
     heave = (settings.start - model.centre[1:] @ bent) / model.centre[0]
     return (

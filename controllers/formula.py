@@ -130,6 +130,7 @@ def formula(text: str, settings: Mapping[str, float]) -> Formula:
         raise ValueError(
             f"{text!r} is not a formula; expected an expression such as kp * x"
         ) from None
+    # Order of first appearance: it defines the order of the inputs' registers.
     inputs = tuple(dict.fromkeys(_names(tree, settings)))
     builder = _Builder(inputs, settings)
     try:

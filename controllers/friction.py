@@ -162,6 +162,7 @@ def step_compensator(
 
     travel: raw travel of the motor, m; error: demanded minus filtered force, N; period: s.
     """
+    # Without a previous sample there is no difference to filter.
     velocity, acceleration = 0.0, 0.0
     if not math.isnan(state.travel):
         velocity = low_pass(
@@ -175,6 +176,7 @@ def step_compensator(
         )
     velocities = (velocity,) + velocities[:-1]  # noqa: RUF005, compiled code does not unpack
     errors = (error,) + errors[:-1]  # noqa: RUF005
+    # The window stays open for a while after the last prediction of a crossing.
     window, open_for = state.window, state.open_for - period
     coming = expected_direction(settings, velocities, acceleration, period)
     if coming != 0.0:

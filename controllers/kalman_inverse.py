@@ -90,6 +90,7 @@ def sampled_actuator(actuator: Actuator, period: float) -> tuple[Array, Array, A
     length = whole + 1 if fraction > 1e-9 else whole
     a, b, c = np.zeros((size + length,) * 2), np.zeros(size + length), np.zeros(size + length)
     a[:size, :size], c[:size] = augmented[:size, :size], actuator.c
+    # A delay between two ticks applies both neighbouring commands, weighted linearly.
     for share, age in ((1.0 - fraction, whole), (fraction, whole + 1)):
         if age == 0:
             b[:size] += share * augmented[:size, size]
@@ -118,9 +119,11 @@ def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> Linea
     outputs = np.zeros((2, total))
     outputs[0, desired], outputs[1, :size] = 1.0, c
     noise = np.zeros((total, total))
+    # Disturbances act at the input, where friction and valve errors act.
     noise[:size, :size] = weights.state_noise**2 * np.outer(b, b)
     noise[offset, offset] = weights.offset_walk**2
     noise[-1, -1] = 1.0
+    # The desired motion is known almost exactly; its noise only regularises the filter.
     measured = np.diag([weights.desired_noise**2, weights.sensor_noise**2])
     # Steady-state filter: P from the Riccati equation, L = P Hᵀ (H P Hᵀ + R)⁻¹.
     covariance = solve_discrete_are(whole.T, outputs.T, noise, measured)

@@ -170,6 +170,7 @@ def update(
     sample, travel, velocity, force = _filter_measurements(controller, state, measured, demand)
     modal, modal_rates = state.modal, state.modal_rates
     memory = state.plate
+    # Imposed tests bypass the models, and with them the delay compensation.
     if settings.mode == Mode.IMPOSED:
         demanded = demand.force
         position, structure_velocity = demand.structure, 0.0
@@ -198,6 +199,7 @@ def update(
     compensation, velocities, errors = state.compensation, state.velocities, state.errors
     if settings.compensator == Compensator.OBSERVER:
         compensation = observe_friction(settings, compensation, measured.load_cell, period)
+    # Both compensators run before the force loop, whose output they add to.
     elif settings.compensator != Compensator.NONE:
         compensation, velocities, errors = step_compensator(
             settings,

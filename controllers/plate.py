@@ -64,6 +64,7 @@ def plate(settings: Settings, period: float) -> Plate:
     kind = PlateCompensator(settings.plate_compensator)
     if kind == PlateCompensator.NONE:
         return compensation(NO_LAW, period)
+    # Only the Kalman inverse uses the weights; the other laws need the cylinder alone.
     weights = settings.plate_effort, settings.plate_roughness, settings.plate_noise
     return compensation(_law(kind, cylinder_model(settings), weights, period), period)
 
@@ -137,6 +138,7 @@ def compensate(plate: Plate, memory: Array, wanted: float, measured: float) -> t
     if math.isnan(next_memory[size + 1]):
         next_memory[size + 1] = wanted
     start = next_memory[size + 1]
+    # Differences from the start: an offset of the sensor is no tracking error.
     desired = wanted - start
     compensated = step_linear(plate.law, next_memory[:size], desired, measured - start)
     next_memory[size] = min(next_memory[size] + plate.set_in, 1.0)

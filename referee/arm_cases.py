@@ -240,6 +240,7 @@ def build_arm(case: ArmCase) -> DefectiveArm:
     random = np.random.default_rng([case.seed, case.number, 11])
     arm = _vary(NOMINAL[case.machine], random)
     travel = draw_travel(case.machine, np.random.default_rng([case.seed, case.number, 17]))
+    # Forces without defects set the scale of every defect.
     swings = np.std(motor_forces(arm, travel), axis=1)
     gains, zeros = np.ones(len(swings)), np.zeros(len(swings))
     unmodelled: list[tuple[str, int, float]] = []
@@ -284,6 +285,7 @@ def record_arm(case: ArmCase, again: int = 0) -> ArmTest:
     force = motor_forces(defective.arm, travel)
     for word, joint, size in defective.unmodelled:
         force[joint] += _unmodelled_force(word, joint, travel, force[joint], size)
+    # Noise in proportion to the force, as from a current sensor of suitable range.
     noise = _spread(random, *NOISE) * defective.swings
     force = defective.gains[:, None] * force + noise[:, None] * random.standard_normal(force.shape)
     readings = travel.position + defective.zeros[:, None]
@@ -378,5 +380,6 @@ def _unmodelled_force(word: str, joint: int, travel: Travel, usual: Array, size:
         neighbour = travel.position[joint - 1 if joint else 1]
         pull = np.tanh(3.0 * (neighbour - np.mean(neighbour)) / np.std(neighbour))
         return size * pull * np.cos(travel.position[joint])
+    # A force that saturates softly at 2.5 standard deviations, as a sagging supply does.
     limit = 2.5 * float(np.std(usual))
     return limit * np.tanh(usual / limit) - usual

@@ -105,6 +105,7 @@ def wander(
         np.sin(2 * math.pi * f * time + p) / (1.0 + f)
         for f, p in zip(frequencies, phases, strict=True)
     )
+    # Smoothstep over the first half second: the motion starts at rest.
     eased = np.clip(time / 0.5, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(time / 0.5, 0.0, 1.0))
     motion = np.asarray(motion) * eased
     return reach * motion / float(np.max(np.abs(motion)))

@@ -86,6 +86,7 @@ def check(
         If the referee fails, or its key does not match its commitment.
     """
     recordings = folder / f"seed-{seed}"
+    # The seed is part of the path: two checks never mix their recordings.
     recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
     # Block SIGINT while the referee starts: Ctrl-C would end it in its imports.
@@ -118,6 +119,7 @@ def check(
         referee.stdin.flush()
         salt = referee.stdout.readline().partition(" ")[2].strip()
         opened = referee.stdout.readline().strip()
+    # The key was fixed before the first answer only if its hash matches.
     if hashlib.sha256((salt + opened).encode()).hexdigest() != commitment:
         raise RigtwinError("the referee's key does not match its commitment")
     (recordings / "key.json").write_text(opened + "\n")

@@ -90,6 +90,7 @@ def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
 
     def stribeck() -> Defect:
         value, speed = scale * _log_uniform(random, 10.0, 60.0), _log_uniform(random, 0.004, 0.05)
+        # Both common forms of the Stribeck curve: exponential and Gaussian.
         shape = float(random.choice([1.0, 2.0]))
         change = _replace_fields(component, peak=value, peak_speed=speed, peak_shape=shape)
         return Defect("stribeck", component, value, 0.0, True, change)
@@ -132,6 +133,7 @@ def _actuator(
         return Defect("delay", component, value, 0.0, True, _replace_fields(path, delay=value))
 
     def saturation() -> Defect:
+        # A limit above the largest command would be invisible.
         value = largest * random.uniform(0.5, 0.85)
         return Defect(
             "saturation", component, value, np.inf, True, _replace_fields(path, limit=value)

@@ -232,6 +232,7 @@ def solve(
     Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with impulses in Ns. The left side rises
     monotonically with v, with jumps where rail or rod stick, so bisection always converges.
     """
+    # No friction can move the carriage beyond these bounds: they bracket the root.
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
     for guess in (0.0, plate):
@@ -365,6 +366,7 @@ def pass_command(
     wanted *= drive.gain * (1.0 - drive.fading * time / 60.0)
     wanted = max(-drive.limit, min(drive.limit, wanted))
     most = drive.rate * STEP
+    # Rate limit before the lag, as an amplifier limits its input.
     memory[0] += max(-most, min(most, wanted - memory[0]))
     if drive.lag > 0.0:
         memory[1] += STEP / (drive.lag + STEP) * (memory[0] - memory[1])
@@ -395,6 +397,7 @@ def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) 
         share = 0.5 * STEP if half == 0 else STEP
         z0, z1, z2, z3 = z[0] + share * d0, z[1] + share * d1, z[2] + share * d2, z[3] + share * d3
     z[0], z[1], z[2], z[3] = z0, z1, z2, z3
+    # The servo valve saturates: the piston follows the linear response up to its largest speed.
     most = cylinder.speed * STEP
     return plate + max(-most, min(most, z0 - plate)) + cylinder.creep * STEP
 
@@ -694,6 +697,7 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
 
         # Forces on the carriage at the old position, with the velocities over this step.
         deflection = ground + ground_yield - x
+        # Rates over this step come from differences, so yielding and play are included.
         squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
         tyre, relaxed = tyre_force(truth, deflection, squeeze, relaxed)
 
@@ -746,6 +750,7 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
             v, smooth_rod, rod_force = slide(
                 truth, v, plate, carriage_force, rail_up, rail_down, rod_up, rod_down
             )
+        # The acceleration feeds the crosstalk of the load cell.
         acceleration = (v - previous_v) / STEP
         x += STEP * v
         # Exact step of the motor's lag, with the voltage constant over it.
@@ -753,6 +758,7 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
             truth.motor_constant * voltage - force
         )
         cell = force + ripple - smooth_rod - rod_force
+        # The yielding of a step ago gives the plate's velocity in the next step.
         ground_before, structure_before = ground_yield, structure_yield
         ground_yield += (
             STEP

@@ -43,6 +43,7 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     """Return the 95 % score interval of a share (Wilson, JASA 22 (1927) 209)."""
     if count == 0:
         return 0.0, 1.0
+    # z is the 97.5 % quantile of the normal distribution.
     z, share = 1.959964, hits / count
     middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
     half = z * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2)) / (1 + z**2 / count)
@@ -91,6 +92,7 @@ def _error(entry: dict[str, Any], answer: dict[str, Any]) -> float:
     truth = entry["effects"][0]
     value = next(iter(answer["effects"][0]["parameters"].values()))["value"]
     nominal = truth["nominal"] or 0.0
+    # Relative to the defect itself: 1 % of the total stiffness may be all of a defect.
     return abs(value - truth["value"]) / max(abs(truth["value"] - nominal), 1e-12)
 
 

@@ -90,6 +90,7 @@ def draw_rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator
         Rig, defect, and the random generator, which continues with the rig's recording.
     """
     random = np.random.default_rng([seed, 6, number])
+    # Tolerances differ from rig to rig, as they would in a laboratory.
     plain = draw_tolerated(random)
     drawn = [make() for make in friction("motor", random)]
     options = [defect for defect in drawn if defect.kind in KINDS]

@@ -179,6 +179,7 @@ def _imposed_force(
             speed += h * rider_force / elastic.rider
             rider += h * speed
             force[n] += rider_force
+        # Second difference of the prescribed motion: the inertia of the moved end.
         if n > 1:
             force[n] += mass * (x[n] - 2.0 * x[n - 1] + x[n - 2]) / (h * h)
     return force
@@ -385,6 +386,7 @@ def _follow_command(
         after_play = min(max(after_play, command[n] - play), command[n] + play)
         error = after_play - position
         fade_speed = lag * (1.0 + lag_growth * abs(error))
+        # Exact step of the lag, so any lag is stable.
         rate = error * (1.0 - math.exp(-h / fade_speed)) / h if lag > 0.0 else error / h
         if speed_limit > 0.0:
             rate = speed_limit * math.tanh(rate / speed_limit)
@@ -402,6 +404,7 @@ def follow_command(truth: FollowerTruth, command: Array, period: float) -> Array
     """Return the position of the actuator at every tick, m, with the command held over a tick."""
     h = period / FINE
     held = np.repeat(command, FINE)
+    # The gain falls linearly during the test.
     held *= 1.0 - truth.gain_loss * np.arange(len(held)) * h
     delay_steps = round(truth.delay / h)
     if delay_steps:

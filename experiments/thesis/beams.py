@@ -205,6 +205,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     # Curves are stored every 20 ms: the first 100 samples are the drop.
     swings = np.ptp(heights[: round(2.0 / 0.02)], axis=0)
     text = " < ".join(f"{swing:.0f} mm" for swing in swings[1:])
+    # Points of one mode move in phase: every pair correlates.
     correlation = np.corrcoef(heights[10:100, 1:].T).min()
     entries += [
         statement(

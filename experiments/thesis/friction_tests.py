@@ -94,6 +94,7 @@ def spikes(test: Trial) -> Array:
         (np.diff(reversals, prepend=-window) > window)
         & (np.diff(reversals, append=len(velocity) + window) > window)
     ]
+    # The first second and the end have no complete surroundings.
     reversals = reversals[(reversals > 1000) & (reversals < len(velocity) - window)]
     filtered = filter_lag(np.ascontiguousarray(test.force), settings.filter_force, period)
     error = test.simulation.commands[:, 2] - filtered

@@ -238,6 +238,7 @@ def _friction_entries(results: Mapping[str, Result]) -> list[Entry]:
     swing, hop_rms, ideal_hop = (
         _median(results, "drop", key) for key in ("swing at rest", "hop", "ideal hop")
     )
+    # Double integration turns a constant force error into a drift of the position.
     drift = over_seeds(results, "drop", "rest position") - over_seeds(
         results, "drop", "ideal rest position"
     )

@@ -70,6 +70,7 @@ def ride_measures(test: Trial) -> dict[str, Array | float]:
     """
     period = test.configuration.timing.period
     late = slice(round(TAXIING / period), None)
+    # Tyre deflection is wheel minus ground; its rms measures road holding.
     tyre, should_tyre = (
         wheel - test.simulation.commands[:, 0] for wheel in (test.wheel, test.ideal.wheel)
     )

@@ -552,6 +552,7 @@ def _rest() -> float:
 def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
     """Return the remarks on Tables 3.2 and 3.3 and on the pseudo-dynamic test."""
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
+    # Forces scale with 1/t² of the time scale, and the gas pressure with them.
     pressures = [
         1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure
         for each in (real, slow)

@@ -28,6 +28,7 @@ FILTER = 0.01
 def formulas() -> list[Entry]:
     """Return the entries of critical lags, Cardano's formula and the two lags of §5.1.6."""
     random = np.random.default_rng(0)
+    # Log-normal factors with σ = 2: the formulas must hold far from the printed values.
     masses = [SingleMass(*map(float, np.exp(random.normal(0.0, 2.0, 3)) * MASS)) for _ in range(20)]
     criticals = [critical_lag(single_mass(mass)) for mass in masses]
     # τ_c k/b − 1, and ω_c/√(k/m) − 1: both vanish if (5.28) holds.

@@ -44,6 +44,7 @@ def _run(name: str, seed: int) -> Result:
     frequencies, ours, ideal = _acceleration_response(test)
     result |= {"frequencies": frequencies, "response": ours, "ideal response": ideal}
     early = slice(0, 8000)
+    # The drop goes down: an overshoot is a minimum below the ideal one.
     result["overshoot"] = -float(
         np.min(test.simulation.commands[early, 1]) - np.min(test.ideal.structure[early])
     )

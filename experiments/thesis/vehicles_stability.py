@@ -151,6 +151,7 @@ def _all_dampings(cars: Mapping[str, QuarterCar]) -> list[Entry]:
     """Judge §6.2: `The system was actually unstable for all damping values`."""
     entries = []
     for name, car in cars.items():
+        # Six decades about the printed damping.
         dampings = car.suspension_damping * np.logspace(-3.0, 3.0, 601)
         real = np.array(
             [growth(car._replace(suspension_damping=float(damping))).real for damping in dampings]
@@ -178,6 +179,7 @@ def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
         for axis, numbered, part in zip(row, (body, wheel), ("body", "wheel"), strict=True):
             axis.plot(time, 1e3 * moved[part], linewidth=0.9, label="on the rig")
             axis.plot(time, 1e3 * ideal[part], color="0.6", linewidth=0.9, zorder=1, label="ideal")
+            # The fastest growing mode dominates soon; its envelope is e^(σ t).
             height = 1e3 * _share(car, part) * np.exp(rate * time)
             axis.plot(
                 time,
