@@ -53,7 +53,7 @@ def run_command(
         check=False,
     )
     whole = time.perf_counter() - start
-    # Codes 3 and 4 are results of a diagnosis, not failures.
+    # Codes 3 and 4 report a trip and an alarm: results, not failures.
     if finished.returncode not in (0, 3, 4):
         sys.exit(f"{' '.join(arguments)}: {finished.stderr.strip() or finished.returncode}")
     first_look = FIRST_LOOK.search(finished.stderr)

@@ -116,7 +116,7 @@ class Claim:
     judge : callable
         Judge of the locus, see `experiments.thesis.judges`.
     note : str
-        Which of two contradictory passages is right.
+        Correct one of two contradictory passages.
     """
 
     where: str
@@ -220,8 +220,8 @@ def _draw(axis: Axes, case: LocusCase, panel: Panel) -> None:
     _draw_ideal_poles(axis, case.locus)
     _draw_poles(axis, case.locus)
     if panel.view is not None:
-        left, right, height = panel.view
-        axis.set_xlim(left, right)
+        lowest, highest, height = panel.view
+        axis.set_xlim(lowest, highest)
         axis.set_ylim(-height, height)
     axis.set_title(f"Figure {panel.name}: {case.title}", fontsize=8)
     _annotate(axis, case)
