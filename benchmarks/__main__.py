@@ -1,5 +1,4 @@
-"""`python -m benchmarks`: every speed that the project promises, beside what it is measured
-against."""
+"""`python -m benchmarks`: every promised run time beside its reference, in alternating rounds."""
 
 from __future__ import annotations
 
@@ -37,13 +36,13 @@ DEMANDS = DROP.demands(CONFIGURATION, 0)
 
 @kernel
 def _steps(model: int, data: int, count: int) -> None:
+    """Run `mj_step` many times; model and data are addresses."""
     for _ in range(count):
         step(model, data)
 
 
 def _bare() -> None:
-    """As many mj_step of the same model, from the same start, as a drop test takes; plates at
-    rest."""
+    """Run as many bare `mj_step` of the model as a drop test takes, with the plates at rest."""
     settings = CONFIGURATION.controller
     simulation = Simulation(
         CONFIGURATION.plant, CONFIGURATION.timing.timestep, 4, 0.0, settings.start, settings.preload
@@ -54,17 +53,20 @@ def _bare() -> None:
 
 
 def _closed_loop(block: int = BLOCK) -> None:
+    """Run a drop test on the twin; block: ticks per compiled call."""
     for _ in run_compiled(Twin(CONFIGURATION, 0.0, 0), CONFIGURATION, DEMANDS, block):
         pass
 
 
-def _sixteen(threads: int) -> None:
+def _sixteen_rigs(threads: int) -> None:
+    """Run sixteen rigs on some threads."""
     with ThreadPoolExecutor(threads) as pool:
         for _ in pool.map(_closed_loop, [len(DEMANDS)] * 16):
             pass
 
 
-def _long(recorded: bool) -> None:
+def _long_test(recorded: bool) -> None:
+    """Run a test of 45 s, recorded or not."""
     experiment = EXPERIMENTS["single-mass"]
     configuration = experiment.configuration
     demands = experiment.demands(configuration, 0)
@@ -78,15 +80,15 @@ def _long(recorded: bool) -> None:
 
 @kernel
 def _beam_ticks(model: Modes, start: Six, ticks: int) -> float:
-    at, rates = start, start
+    displacements, rates = start, start
     for tick in range(ticks):
-        at, rates = beam(model, at, rates, float(tick % 7))
-    # Of all modes, or what is not asked for would not be worked out.
-    return centre(model, at)
+        displacements, rates = beam(model, displacements, rates, float(tick % 7))
+    # The result uses all modes; the compiler would remove unused ones.
+    return centre(model, displacements)
 
 
 def _beams() -> None:
-    """One tick of the reduced structure, compiled."""
+    """Print the run time of one compiled tick of the beam model."""
     model, ticks = modes(CONFIGURATION.controller, 1e-3), 200_000
     _beam_ticks(model, AT_REST, 10)
     took = (
@@ -97,7 +99,7 @@ def _beams() -> None:
 
 
 def _loaded_loop() -> None:
-    """The closed loop with every optional part of the controller at work."""
+    """Run the closed loop with every optional part of the controller."""
     settings = CONFIGURATION.controller._replace(
         structure=Structure.BEAM, compensator=Compensator.TWO_STEP, beam_sag=1.0
     )
@@ -107,16 +109,19 @@ def _loaded_loop() -> None:
 
 
 def _help() -> None:
+    """Run `rigtwin --help` in a new process."""
     subprocess.run(
         [sys.executable, "-m", "rigtwin.cli", "--help"], check=True, stdout=subprocess.DEVNULL
     )
 
 
 def _python() -> None:
+    """Start and end a bare Python."""
     subprocess.run([sys.executable, "-c", "pass"], check=True)
 
 
 def _seconds(work: Callable[[], object]) -> float:
+    """Return the run time of a function, s."""
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
@@ -129,12 +134,12 @@ def _side_by_side(
     against: Callable[[], object],
     rounds: int = 7,
 ) -> None:
-    """Medians of alternating rounds, and the ratio's spread over the rounds."""
+    """Print the medians of alternating rounds, and the spread of their ratio."""
     ours()
     against()
     pairs = [(_seconds(ours), _seconds(against)) for _ in range(rounds)]
     mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
-    ratios = sorted(one / other for one, other in pairs)
+    ratios = sorted(first / second for first, second in pairs)
     spread = f"{ratios[0]:.2f} to {ratios[-1]:.2f}"
     print(
         f"{title:58s} {mine:7.3f} s / {theirs:7.3f} s = {statistics.median(ratios):5.2f} "
@@ -144,8 +149,7 @@ def _side_by_side(
 
 
 def _diagnosed(seconds: float) -> Callable[[], object]:
-    """The whole library on an imposed test of that length with one effect, and its report's
-    figures."""
+    """Return a function that diagnoses an imposed test with one effect; seconds: its length."""
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=seconds))
     rig, demands = find("suspension-rig"), imposed.demands(configuration, 0)
@@ -155,6 +159,7 @@ def _diagnosed(seconds: float) -> Callable[[], object]:
 
 
 def _twenty_runs() -> None:
+    """Run the twin twenty times for 30 s."""
     imposed = EXPERIMENTS["imposed"]
     configuration = imposed.configuration._replace(timing=Timing(duration=30.0))
     demands = imposed.demands(configuration, 0)
@@ -164,8 +169,10 @@ def _twenty_runs() -> None:
 
 
 def _diagnosis() -> None:
-    """A diagnosis of 30 s beside a thousand bare runs of the twin of that length, of which twenty
-    are timed."""
+    """Print the run time of a diagnosis of 30 s beside a thousand runs of the twin.
+
+    Twenty runs are timed and scaled up.
+    """
     once, _ = _diagnosed(30.0), _diagnosed(30.0)()
     pairs = [(_seconds(once), _seconds(_twenty_runs)) for _ in range(3)]
     mine, theirs = (statistics.median(column) for column in zip(*pairs, strict=True))
@@ -183,6 +190,7 @@ def _diagnosis() -> None:
 
 
 def main() -> None:
+    """Print all comparisons."""
     print(f"mujoco {mujoco.__version__}, numpy {np.__version__}, alternating rounds")
     _side_by_side("closed loop with all controllers / bare mj_step", "<= 1.5", _closed_loop, _bare)
     _side_by_side(
@@ -190,10 +198,17 @@ def main() -> None:
     )
     _beams()
     _side_by_side(
-        "16 rigs, one thread / two threads", ">= 1.7", lambda: _sixteen(1), lambda: _sixteen(2), 3
+        "16 rigs, one thread / two threads",
+        ">= 1.7",
+        lambda: _sixteen_rigs(1),
+        lambda: _sixteen_rigs(2),
+        3,
     )
     _side_by_side(
-        "45 s test recorded / not recorded", "<= 1.2", lambda: _long(True), lambda: _long(False)
+        "45 s test recorded / not recorded",
+        "<= 1.2",
+        lambda: _long_test(True),
+        lambda: _long_test(False),
     )
     _side_by_side("rigtwin --help / starting Python", "< 0.5 s", _help, _python)
     _diagnosis()

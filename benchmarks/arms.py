@@ -1,9 +1,10 @@
-"""What a diagnosis of joints that act on each other costs: `python -m benchmarks.arms`, against the
-number of joints and the length of the recording.
+"""Run time of a diagnosis of coupled joints, over their number and the length of the recording.
 
-The arms hang joint behind joint, with axes across each other, and carry a payload that nobody told
-of. Each joint has a guide, a rotor, an encoder that may be off zero and a motor whose current may
-be read wrong, so nothing falls apart and all joints are searched at once: the dearest case.
+python -m benchmarks.arms
+
+The joints of the arms are in series with crossed axes, and carry an undeclared payload. Every joint
+has a guide, a rotor, an encoder with an unknown offset and a current sensor with an unknown gain.
+The search cannot be split into parts, which is the most expensive case.
 """
 
 from __future__ import annotations
@@ -22,43 +23,43 @@ from rigtwin.recording import Recording
 
 PERIOD = 1e-3
 LENGTHS, MASSES = (0.0, 0.4, 0.35, 0.1, 0.1, 0.08), (6.0, 5.0, 3.5, 1.5, 1.0, 0.6)
-"""m from one joint to the next, and kg of each link."""
+"""Distance from one joint to the next, m, and mass of the links, kg."""
 AXES = ("0 0 1", "0 1 0", "0 1 0", "0 0 1", "0 1 0", "1 0 0")
 ROTORS = (0.36, 0.36, 0.1, 0.03, 0.04, 0.01)
-"""kg m², behind the gears."""
+"""Rotor inertia reflected through the gears, kg m²."""
 PAYLOAD, PLACE = 0.3, (0.02, 0.0, -0.06)
-"""kg, and m in the last link's frame."""
+"""Mass of the payload, kg, and its position in the frame of the last link, m."""
 ANGLE_NOISE, TORQUE_NOISE = 1e-5, 0.01
-"""rms: rad, and a share of each torque's swing."""
+"""Noise of the angles, rad rms, and of the torques, as a share of their standard deviation."""
 COULOMB, VISCOUS = 2.0, 1.0
-"""Nm and Nms/rad at a rotor of 0.1 kg m², in proportion to its root at others."""
+"""Friction at a rotor of 0.1 kg m², Nm and Nms/rad; it scales with the root of the inertia."""
 SWEPT_JOINTS, SWEPT_SECONDS = (3, 4, 5, 6), (5.0, 10.0, 20.0)
 
 
 def friction(joint: int) -> tuple[float, float]:
-    """Coulomb, Nm, and viscous friction, Nms/rad, of a joint."""
+    """Return Coulomb, Nm, and viscous friction, Nms/rad, of a joint."""
     share = (ROTORS[joint] / 0.1) ** 0.5
     return COULOMB * share, VISCOUS * share
 
 
 def write_mjcf(joints: int, loaded: bool) -> str:
-    """The bodies of an arm, with what it carries or without."""
+    """Return the MJCF of an arm, with or without its payload."""
     bodies = sensors = ""
     for joint in range(joints):
         mass, length = MASSES[joint], max(LENGTHS[joint], 0.1)
-        about = mass * length**2 / 12.0
+        inertia = mass * length**2 / 12.0
         bodies += (
             f'<body name="link_{joint}" pos="0 0 {-LENGTHS[joint]}">'
             f'<joint name="joint_{joint}" axis="{AXES[joint]}" armature="{ROTORS[joint]}"/>'
             f'<inertial mass="{mass}" pos="0.01 0.02 {-0.4 * length}" '
-            f'diaginertia="{about} {about} {0.5 * about}"/>'
+            f'diaginertia="{inertia} {inertia} {0.5 * inertia}"/>'
         )
         sensors += (
             f'<jointpos name="angle_{joint}" joint="joint_{joint}"/>'
             f'<jointactuatorfrc name="torque_{joint}" joint="joint_{joint}"/>'
         )
     if loaded:
-        place = " ".join(str(each) for each in PLACE)
+        place = " ".join(str(coordinate) for coordinate in PLACE)
         bodies += (
             f'<body pos="{place}"><inertial mass="{PAYLOAD}" pos="0 0 0" '
             'diaginertia="1e-9 1e-9 1e-9"/></body>'
@@ -70,7 +71,7 @@ def write_mjcf(joints: int, loaded: bool) -> str:
 
 
 def describe(joints: int, folder: Path) -> rigtwin.Machine:
-    """An arm as it was told to be."""
+    """Return the described machine: an arm without payload."""
     (folder / "arm.xml").write_text(write_mjcf(joints, loaded=False))
     lines = ["[machine]", 'name = "arm"', 'model = "arm.xml"', 'nominal = "known"']
     for joint in range(joints):
@@ -92,36 +93,39 @@ def describe(joints: int, folder: Path) -> rigtwin.Machine:
 
 
 def move(joints: int, seconds: float) -> tuple[Array, Array, Array]:
-    """Angles, rates and accelerations, shape (joints, ticks) each: sines, each joint's its own."""
+    """Return angles, rates and accelerations, each of shape (joints, ticks): sums of sines."""
     random = np.random.default_rng([joints, 1])
     t = np.arange(round(seconds / PERIOD)) * PERIOD
     rates = 2.0 * np.pi * np.exp(random.uniform(np.log(0.15), np.log(1.5), (joints, 5, 1)))
     sizes = random.uniform(0.5, 1.0, (joints, 5, 1)) / rates**0.8
     sizes *= 0.8 / np.sum(sizes, axis=1, keepdims=True)
-    turned = rates * t + random.uniform(-np.pi, np.pi, (joints, 5, 1))
+    phases = rates * t + random.uniform(-np.pi, np.pi, (joints, 5, 1))
     return (
-        np.sum(sizes * np.sin(turned), axis=1),
-        np.sum(sizes * rates * np.cos(turned), axis=1),
-        -np.sum(sizes * rates**2 * np.sin(turned), axis=1),
+        np.sum(sizes * np.sin(phases), axis=1),
+        np.sum(sizes * rates * np.cos(phases), axis=1),
+        -np.sum(sizes * rates**2 * np.sin(phases), axis=1),
     )
 
 
 def record(joints: int, seconds: float) -> Recording:
-    """A test of the loaded arm."""
+    """Record a test of the loaded arm."""
     model = mujoco.MjModel.from_xml_string(write_mjcf(joints, loaded=True))
-    data, moved = mujoco.MjData(model), move(joints, seconds)
-    torque = np.empty_like(moved[0])
+    data, travel = mujoco.MjData(model), move(joints, seconds)
+    torque = np.empty_like(travel[0])
     for tick in range(torque.shape[1]):
-        data.qpos[:], data.qvel[:], data.qacc[:] = (each[:, tick] for each in moved)
+        data.qpos[:], data.qvel[:], data.qacc[:] = (each[:, tick] for each in travel)
+        # Inverse dynamics: the torque that makes the arm follow the motion exactly.
         mujoco.mj_inverse(model, data)
         torque[:, tick] = data.qfrc_inverse
     random, sensors = np.random.default_rng([joints, 2]), {}
     for joint in range(joints):
         coulomb, viscous = friction(joint)
-        own = torque[joint] + coulomb * np.sign(moved[1][joint]) + viscous * moved[1][joint]
-        noise = random.standard_normal((2, len(own)))
-        sensors[f"angle_{joint}"] = moved[0][joint] + ANGLE_NOISE * noise[0]
-        sensors[f"torque_{joint}"] = own + TORQUE_NOISE * np.std(own) * noise[1]
+        motor_torque = (
+            torque[joint] + coulomb * np.sign(travel[1][joint]) + viscous * travel[1][joint]
+        )
+        noise = random.standard_normal((2, len(motor_torque)))
+        sensors[f"angle_{joint}"] = travel[0][joint] + ANGLE_NOISE * noise[0]
+        sensors[f"torque_{joint}"] = motor_torque + TORQUE_NOISE * np.std(motor_torque) * noise[1]
     ticks = np.arange(torque.shape[1]) * PERIOD
     return Recording(Path("arm"), "arm", "", PERIOD, ticks, {"/sensor": sensors}, {})
 

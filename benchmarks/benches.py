@@ -1,5 +1,7 @@
-"""How often the diagnosis is right on benches that it never saw: `python -m benchmarks.benches
---cases 80 --seed 2027`."""
+"""Accuracy of the diagnosis on random benches.
+
+python -m benchmarks.benches --cases 80 --seed 2027
+"""
 
 from __future__ import annotations
 
@@ -11,14 +13,14 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from referee.bench_cases import Case, draw_case, record
+from referee.bench_cases import BenchCase, draw_case, record
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.recording import Recording
 
 
-def recording_of(case: Case, again: int = 0) -> Recording:
-    """The case as a file would hold it."""
+def recording_of(case: BenchCase, again: int = 0) -> Recording:
+    """Return the recording of a case; again: number of the repetition."""
     data = record(case, again)
     time = np.arange(len(data.first)) * case.period
     if case.machine == "actuator":
@@ -28,24 +30,27 @@ def recording_of(case: Case, again: int = 0) -> Recording:
     return Recording(Path("damper"), "damper-bench", "", case.period, time, columns, {})
 
 
-def answered(number: int, seed: int) -> tuple[Case, str, frozenset[str], frozenset[str], float]:
-    """(the case, verdict, kinds named, those in any class, seconds)."""
+def diagnose_case(
+    number: int, seed: int
+) -> tuple[BenchCase, str, frozenset[str], frozenset[str], float]:
+    """Return case, verdict, named kinds, kinds in a look-alike class, and time, s."""
     case = draw_case(number, seed)
     recording = recording_of(case)
     machine = find(recording.machine)
-    found = diagnose(machine, [recording], held_out=[recording_of(case, 1)])
-    named = frozenset(effect.name.kind for effect in found.effects)
-    member = frozenset(name.kind for effect in found.effects for name in effect.alternatives)
-    return case, found.verdict, named, member, found.answer.seconds
+    diagnosis = diagnose(machine, [recording], held_out=[recording_of(case, 1)])
+    named = frozenset(effect.name.kind for effect in diagnosis.effects)
+    member = frozenset(name.kind for effect in diagnosis.effects for name in effect.alternatives)
+    return case, diagnosis.verdict, named, member, diagnosis.answer.seconds
 
 
 def main() -> None:
+    """Print how often the diagnosis names exactly the effects of a bench."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=80)
     parser.add_argument("--seed", type=int, default=2027)
     parsed = parser.parse_args()
     with ProcessPoolExecutor(2) as pool:
-        jobs = [pool.submit(answered, number, parsed.seed) for number in range(parsed.cases)]
+        jobs = [pool.submit(diagnose_case, number, parsed.seed) for number in range(parsed.cases)]
         answers = [job.result() for job in tqdm(jobs, disable=None, leave=False)]
     count = Counter()
     for case, verdict, named, member, _ in answers:

@@ -1,4 +1,4 @@
-"""How long whole commands take, from the shell and back, beside those of another checkout.
+"""Run time of whole commands from the shell, compared with another checkout.
 
 python -m benchmarks.commands                                # --help, info, plot, run
 python -m benchmarks.commands rig.mcap --against ../older    # and diagnose, with its first look
@@ -19,22 +19,32 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-HERE = Path(__file__).parents[1]
+CHECKOUT = Path(__file__).parents[1]
 PROGRAM = "import sys; from rigtwin.cli import main; sys.exit(main(sys.argv[1:]))"
 FIRST_LOOK = re.compile(r"first look, ([0-9.]+) s")
 
 
-class Taken(NamedTuple):
-    """s. look: until a diagnosis told its first look; none if it tells none."""
+class RunTime(NamedTuple):
+    """Run time of one command.
+
+    Attributes
+    ----------
+    whole : float
+        Run time, s.
+    look : float or None
+        Time until a diagnosis printed its first look, s. None if it printed none.
+    """
 
     whole: float
     look: float | None
 
 
-def take(checkout: Path, arguments: Sequence[str], environment: Mapping[str, str]) -> Taken:
-    """One command of a checkout, in a process of its own."""
-    began = time.perf_counter()
-    done = subprocess.run(
+def run_command(
+    checkout: Path, arguments: Sequence[str], environment: Mapping[str, str]
+) -> RunTime:
+    """Run a command of a checkout in a new process and return its run time."""
+    start = time.perf_counter()
+    finished = subprocess.run(
         [sys.executable, "-c", PROGRAM, *arguments],
         cwd=checkout,
         env={**environment, "PYTHONPATH": str(checkout)},
@@ -42,27 +52,28 @@ def take(checkout: Path, arguments: Sequence[str], environment: Mapping[str, str
         text=True,
         check=False,
     )
-    whole = time.perf_counter() - began
-    if done.returncode not in (0, 3, 4):
-        sys.exit(f"{' '.join(arguments)}: {done.stderr.strip() or done.returncode}")
-    told = FIRST_LOOK.search(done.stderr)
-    return Taken(whole, None if told is None else float(told[1]))
+    whole = time.perf_counter() - start
+    # Codes 3 and 4 report a trip and an alarm: results, not failures.
+    if finished.returncode not in (0, 3, 4):
+        sys.exit(f"{' '.join(arguments)}: {finished.stderr.strip() or finished.returncode}")
+    first_look = FIRST_LOOK.search(finished.stderr)
+    return RunTime(whole, None if first_look is None else float(first_look[1]))
 
 
 def commands(folder: Path, recordings: Sequence[Path]) -> dict[str, list[str]]:
-    """What is measured: name → arguments. The run comes first, as others read its file."""
-    own = folder / "road10.mcap"
+    """Return the arguments of the measured commands by name; later ones read the run's file."""
+    recording = folder / "road10.mcap"
     return {
-        "run road10, 45 s": ["run", "road10", "--seed", "3", "--out", str(own)],
+        "run road10, 45 s": ["run", "road10", "--seed", "3", "--out", str(recording)],
         "--help": ["--help"],
-        "info": ["info", str(own)],
-        "plot": ["plot", str(own), "-o", str(folder / "plot.png")],
-        **{f"diagnose {each.name}": ["diagnose", str(each.resolve())] for each in recordings},
+        "info": ["info", str(recording)],
+        "plot": ["plot", str(recording), "-o", str(folder / "plot.png")],
+        **{f"diagnose {path.name}": ["diagnose", str(path.resolve())] for path in recordings},
     }
 
 
 def main() -> None:
-    """Prints a table: each round, and the median."""
+    """Print a table of all rounds and their median."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -71,34 +82,35 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3, metavar="N")
     parser.add_argument("--cold", action="store_true", help="with nothing compiled before")
     parsed = parser.parse_args()
-    checkouts = {"here": HERE}
+    checkouts = {"here": CHECKOUT}
     if parsed.against is not None:
         checkouts["there"] = parsed.against.resolve()
     print(f"{'command':34} {'of':6} {'median':>7}   s in each round")
     with TemporaryDirectory() as work:
         for name, arguments in commands(Path(work), parsed.recordings).items():
-            found: dict[str, list[Taken]] = {each: [] for each in checkouts}
-            for turn in range(parsed.rounds + 1):
-                # In turns, so that a slow minute slows both.
-                for each, checkout in checkouts.items():
+            times: dict[str, list[RunTime]] = {label: [] for label in checkouts}
+            for round_number in range(parsed.rounds + 1):
+                # Alternating: a slow minute slows both checkouts.
+                for label, checkout in checkouts.items():
                     with TemporaryDirectory() as empty:
                         environment = dict(os.environ)
                         if parsed.cold:
                             environment["XDG_CACHE_HOME"] = empty
-                        taken = take(checkout, arguments, environment)
-                    # Before the first round both compile what they need.
-                    if turn or parsed.cold:
-                        found[each].append(taken)
-            for each, several in found.items():
-                _tell(name, each, [one.whole for one in several])
-                looks = [one.look for one in several if one.look is not None]
+                        run_time = run_command(checkout, arguments, environment)
+                    # Round 0 compiles and is not counted.
+                    if round_number or parsed.cold:
+                        times[label].append(run_time)
+            for label, runs in times.items():
+                _print_row(name, label, [run.whole for run in runs])
+                looks = [run.look for run in runs if run.look is not None]
                 if looks:
-                    _tell("    its first look", each, looks)
+                    _print_row("    its first look", label, looks)
 
 
-def _tell(name: str, of: str, seconds: Sequence[float]) -> None:
-    told = "  ".join(f"{each:.2f}" for each in seconds)
-    print(f"{name:34.34} {of:6} {statistics.median(seconds):7.2f}   {told}", flush=True)
+def _print_row(name: str, label: str, seconds: Sequence[float]) -> None:
+    """Print one row of the table."""
+    rounds = "  ".join(f"{value:.2f}" for value in seconds)
+    print(f"{name:34.34} {label:6} {statistics.median(seconds):7.2f}   {rounds}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How soon a page of `rigtwin look` follows a drag, and what a thousand drags leave in memory.
+"""Latency of the page of `rigtwin look` during a drag, and memory after a thousand drags.
 
 python -m benchmarks.look
 """
@@ -22,47 +22,48 @@ DRAGS = 1000
 TIMED = 20
 WINDOW = (1600, 1000)
 SMALL = {"width": 1000, "height": 450, "deviceScaleFactor": 1, "mobile": False}
-"""A window whose picture is soon drawn without a graphics card, for many drags."""
+"""Small window: without a graphics card its picture is drawn quickly."""
 
 
 def resident() -> float:
-    """Memory of this process, MB."""
+    """Return the memory of this process, MB."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def heap(tab: Tab) -> float:
-    """Memory of the page's JavaScript, MB."""
+    """Return the memory of the page's JavaScript, MB."""
     tab.call("HeapProfiler.collectGarbage")
     return tab.call("Runtime.getHeapUsage")["usedSize"] / 1e6
 
 
 def time_drags(tab: Tab, name: str) -> None:
-    """Prints how soon the text of the error and the trace are seen to change."""
+    """Print the latency of the error's text and of the trace during drags."""
     width, height = tab.ask("[innerWidth, innerHeight]")
     print(f"  window of {width} x {height}")
     drag(tab, name, [0.02, 0.04])
     tab.ask("late = {text: [], trace: []}; true")
     drag(tab, name, [0.05 + 0.9 * n / TIMED for n in range(TIMED)])
-    for what, late in tab.ask("late").items():
+    for element, late in tab.ask("late").items():
         print(
-            f"  {what}: {np.median(late):.0f} ms in the median, {max(late):.0f} ms at most "
+            f"  {element}: {np.median(late):.0f} ms in the median, {max(late):.0f} ms at most "
             f"({len(late)} drags)"
         )
 
 
 def drag_on(tab: Tab, name: str, drags: int) -> None:
-    """Moves a slider to and fro as fast as the page takes it."""
-    left, y, width, _ = tab.wait_for(f"track('{name}', 1)")
-    tab.mouse("Pressed", left + 0.1 * width, y)
+    """Move a slider to and fro as fast as the page accepts it."""
+    x, y, width, _ = tab.wait_for(f"track('{name}', 1)")
+    tab.mouse("Pressed", x + 0.1 * width, y)
     for n in range(drags):
-        tab.mouse("Moved", left + (0.1 + 0.8 * (n % 97) / 97) * width, y)
+        tab.mouse("Moved", x + (0.1 + 0.8 * (n % 97) / 97) * width, y)
         time.sleep(0.02)
-    tab.mouse("Released", left + 0.1 * width, y)
+    tab.mouse("Released", x + 0.1 * width, y)
 
 
 def main() -> None:
+    """Print latency and memory for two machines."""
     with tempfile.TemporaryDirectory() as folder:
         bench = described(Path(folder), "slide", NOISY)
         for machine, experiment, name in (
@@ -83,6 +84,7 @@ def main() -> None:
                 tab.call("Emulation.setDeviceMetricsOverride", **SMALL)
                 time.sleep(1.0)
                 time_drags(tab, name)
+                # The first drags fill caches; only growth after them counts.
                 drag_on(tab, name, 100)
                 before, page_before = resident(), heap(tab)
                 drag_on(tab, name, DRAGS)

@@ -1,8 +1,9 @@
-"""Real machines: what the diagnosis names of them, what that leaves of recordings that it was not
-fitted to, and how long it takes: `python -m benchmarks.real_machines FOLDER [NAME ...]`.
+"""Diagnosis of real machines: named effects, errors on held-out recordings, and run time.
 
-The folder holds a folder a machine, with its data, its description and its map. The data do not
-come with the project; docs/diagnosis.md says where they are from.
+python -m benchmarks.real_machines FOLDER [NAME ...]
+
+FOLDER holds one folder per machine with its data, description and map. The data are not part of the
+project; docs/diagnosis.md names their sources.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ name = "held"
 moved_by = "servo"
 observe = ["encoder"]
 """
-"""The pendulum's description in a closed loop: the recorded voltage is the formula's."""
+"""Description of the pendulum in a closed loop, whose formula gives the recorded voltage."""
 SERVO = """
 [machine]
 name = "pendulum-servo"
@@ -63,9 +64,9 @@ name = "held"
 moved_by = "servo"
 observe = ["encoder"]
 """
-"""The same as a servo whose voltage nobody recorded, at the gain of 400."""
+"""Description of the pendulum as a servo with a gain of 400 and an unrecorded voltage."""
 MOTOR = '<motor name="servo" joint="shaft" gear="0.06785"/>'
-"""Of the pendulum's MJCF: Nm/V."""
+"""Motor in the pendulum's MJCF, Nm/V."""
 HELD_MAP = """
 machine = "pendulum-servo"
 time = {{ column = "t" }}
@@ -85,26 +86,35 @@ time = { column = "t" }
 
 
 def position_actuator(gain: float) -> str:
-    """What stands in the motor's place: torque by the angle's error, Nm/rad, up to 7.4 V."""
+    """Return the MJCF of a position actuator in place of the motor; gain: Nm/rad, up to 7.4 V."""
     return f'<position name="servo" joint="shaft" kp="{gain}" forcerange="-0.502 0.502"/>'
 
 
 def write_descriptions(folder: Path) -> None:
-    """Adds the pendulum's in a closed loop to its own."""
+    """Write the descriptions of the pendulum in a closed loop beside its own one."""
     (folder / "held.toml").write_text(HELD)
     (folder / "servo.toml").write_text(SERVO)
     (folder / "servo_400.toml").write_text(SERVO_MAP)
     model = (folder / "pendulum.xml").read_text()
-    # As its firmware has it: 0.0212926 V for each rad and unit of its gain.
+    # The firmware gives 0.0212926 V per rad and unit of gain.
     (folder / "servo.xml").write_text(model.replace(MOTOR, position_actuator(0.578)))
     for kp in (100, 200, 400, 800):
         (folder / f"held_{kp}.toml").write_text(HELD_MAP.format(kp))
 
 
 @dataclass(frozen=True)
-class Case:
-    """folder, description, map: in the data's folder; fitted, held_out: files without their ending;
-    settings: other nominal values."""
+class MachineCase:
+    """Data and description of one machine.
+
+    Attributes
+    ----------
+    folder, description, map : str
+        Folder of the machine, and description and map within it.
+    fitted, held_out : tuple of str
+        Files for the fit and for its validation, without suffix.
+    settings : dict
+        Nominal values that differ from the description.
+    """
 
     folder: str
     description: str
@@ -114,29 +124,31 @@ class Case:
     settings: dict[str, dict[str, float]] = field(default_factory=dict)
 
 
-def damper(viscous: float) -> Case:
-    """The friction damper from another nominal viscous friction, Ns/m."""
+def damper(viscous: float) -> MachineCase:
+    """Return the friction damper with another nominal viscous friction, Ns/m."""
     settings = {"damper": {"viscous": viscous}}
     files = (DAMPER, DAMPER_HELD_OUT)
-    return Case("friction_damper", "damper.toml", "map.toml", *files, settings)
+    return MachineCase("friction_damper", "damper.toml", "map.toml", *files, settings)
 
 
-def bench(part: str, description: str, map_name: str) -> Case:
-    """A body of the quarter car on its bench."""
-    fitted, held_out = ([f"{part}_{each}" for each in names] for names in (BENCH, BENCH_HELD_OUT))
-    return Case("quarter_car_bench", description, map_name, tuple(fitted), tuple(held_out))
+def bench(part: str, description: str, map_name: str) -> MachineCase:
+    """Return one body of the quarter car on its bench."""
+    fitted, held_out = ([f"{part}_{name}" for name in names] for names in (BENCH, BENCH_HELD_OUT))
+    return MachineCase("quarter_car_bench", description, map_name, tuple(fitted), tuple(held_out))
 
 
-def pendulum(test: str, description: str, map_name: str) -> Case:
-    """The pendulum on its servo, fitted at two gains and judged at two others."""
+def pendulum(test: str, description: str, map_name: str) -> MachineCase:
+    """Return the pendulum on its servo, fitted at two gains and validated at two others."""
     fitted, held_out = ([f"{test}_{kp}" for kp in gains] for gains in ((200, 400), (100, 800)))
-    return Case("pendulum_servo", description, map_name, tuple(fitted), tuple(held_out))
+    return MachineCase("pendulum_servo", description, map_name, tuple(fitted), tuple(held_out))
 
 
-def servo(gain: float) -> Case:
-    """The pendulum as a servo of that nominal gain, Nm/rad; each half judges the other."""
+def servo(gain: float) -> MachineCase:
+    """Return the pendulum as a servo of a nominal gain, Nm/rad, with cross-validated halves."""
     settings = {"servo": {"position_gain": gain}}
-    return Case("pendulum_servo", "servo.toml", "servo_{}.toml", ("sin_sin_400",), (), settings)
+    return MachineCase(
+        "pendulum_servo", "servo.toml", "servo_{}.toml", ("sin_sin_400",), (), settings
+    )
 
 
 CASES = {
@@ -150,12 +162,12 @@ CASES = {
     "held": pendulum("sin_sin", "held.toml", "held_{}.toml"),
     "servo": servo(0.578),
     "servo-weaker": servo(0.4),
-    "emps": Case("emps", "emps", "", ("DATA_EMPS",), ("DATA_EMPS_PULSES",)),
+    "emps": MachineCase("emps", "emps", "", ("DATA_EMPS",), ("DATA_EMPS_PULSES",)),
 }
 
 
-def imported(case: Case, name: str, folder: Path) -> rigtwin.Recording:
-    """One of a case's files as a recording."""
+def import_file(case: MachineCase, name: str, folder: Path) -> rigtwin.Recording:
+    """Import one file of a case as a recording."""
     data = next(path for path in folder.iterdir() if path.stem == name)
     if case.description == "quarter-car-bench":
         mapping = SHIPPED / "maps" / f"{case.map}.toml"
@@ -172,19 +184,29 @@ def errors(
     settings: rigtwin.Configuration,
     corrected: rigtwin.Configuration,
 ) -> str:
-    """100 · rms(measured − predicted) / std(measured) of each recording, worst signal."""
+    """Return 100 · rms(measured − predicted) / std(measured) of every recording, worst signal."""
     configurations = [machine.configuration_of(recording, settings) for recording in recordings]
     evidence = Evidence(machine, recordings, configurations)
-    found = []
+    worst = []
     for line, predicted in zip(evidence.lines, evidence.predict(corrected.plant), strict=True):
         rms = np.sqrt(np.mean((line.measured - predicted) ** 2, axis=1))
-        found.append(f"{100.0 * np.max(rms / np.std(line.measured, axis=1)):.1f}")
-    return ", ".join(found)
+        worst.append(f"{100.0 * np.max(rms / np.std(line.measured, axis=1)):.1f}")
+    return ", ".join(worst)
 
 
 @dataclass(frozen=True)
-class Told:
-    """What came of a case. before, after: errors of the held-out records; seconds: it took."""
+class CaseResult:
+    """Result of a case.
+
+    Attributes
+    ----------
+    answer : Diagnosis
+        Diagnosis.
+    before, after : str
+        Errors of the held-out recordings before and after the correction, %.
+    seconds : float
+        Run time, s.
+    """
 
     answer: rigtwin.Diagnosis
     before: str
@@ -192,40 +214,48 @@ class Told:
     seconds: float
 
 
-def judge(name: str, data: Path) -> Told:
-    """Diagnoses a case whose data are in this folder."""
+def judge(name: str, data: Path) -> CaseResult:
+    """Diagnose a case; data: folder of all machines."""
     case = CASES[name]
     with tempfile.TemporaryDirectory() as work:
         folder = Path(shutil.copytree(data / case.folder, Path(work) / case.folder))
+        # The data may be read-only; the copy must be writable for the import.
         for path in (folder, *folder.iterdir()):
             path.chmod(0o755)
         if case.folder == "pendulum_servo":
             write_descriptions(folder)
-        own = folder / case.description
-        on = rigtwin.machine(own if own.is_file() else case.description)
-        fitted = [imported(case, each, folder) for each in case.fitted]
-        held_out = [imported(case, each, folder) for each in case.held_out]
-        nominal = override(on.configuration, case.settings)
-        began = time.perf_counter()
-        answer = rigtwin.diagnose(fitted, machine=on, settings=case.settings, held_out=held_out)
-        seconds = time.perf_counter() - began
+        description = folder / case.description
+        machine = rigtwin.machine(description if description.is_file() else case.description)
+        fitted = [import_file(case, stem, folder) for stem in case.fitted]
+        held_out = [import_file(case, stem, folder) for stem in case.held_out]
+        nominal = override(machine.configuration, case.settings)
+        start = time.perf_counter()
+        answer = rigtwin.diagnose(
+            fitted, machine=machine, settings=case.settings, held_out=held_out
+        )
+        seconds = time.perf_counter() - start
         judged = held_out or fitted
-        before = errors(on, judged, nominal, nominal)
-        return Told(answer, before, errors(on, judged, nominal, answer.corrected), seconds)
+        before = errors(machine, judged, nominal, nominal)
+        return CaseResult(
+            answer, before, errors(machine, judged, nominal, answer.corrected), seconds
+        )
 
 
-def tell(name: str, told: Told) -> None:
-    """Prints what came of a case."""
-    print(f"{name}: {told.answer.verdict}, {told.before} -> {told.after} %, {told.seconds:.0f} s")
-    for effect in told.answer.effects:
-        values = ", ".join(f"{each.value:.4g} {each.unit}" for each in effect.parameters.values())
-        alike = [str(each) for each in effect.alternatives if str(each) != str(effect.name)]
-        other = f", or {', '.join(alike)}" if alike else ""
-        print(f"    {effect.name} {values}{other}: {100 * effect.confidence:.0f} %")
+def print_result(name: str, result: CaseResult) -> None:
+    """Print the result of a case."""
+    print(
+        f"{name}: {result.answer.verdict}, {result.before} -> {result.after} %, "
+        f"{result.seconds:.0f} s"
+    )
+    for effect in result.answer.effects:
+        values = ", ".join(f"{p.value:.4g} {p.unit}" for p in effect.parameters.values())
+        look_alikes = [str(name) for name in effect.alternatives if str(name) != str(effect.name)]
+        alternatives = f", or {', '.join(look_alikes)}" if look_alikes else ""
+        print(f"    {effect.name} {values}{alternatives}: {100 * effect.confidence:.0f} %")
 
 
 def main() -> None:
-    """Prints a table."""
+    """Print one result per machine."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(CASES))
@@ -236,7 +266,7 @@ def main() -> None:
     for name in parsed.names or CASES:
         if not (parsed.folder / CASES[name].folder).is_dir():
             parser.error(f"{parsed.folder} holds no folder {CASES[name].folder!r}")
-        tell(name, judge(name, parsed.folder))
+        print_result(name, judge(name, parsed.folder))
 
 
 if __name__ == "__main__":

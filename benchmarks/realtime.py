@@ -1,6 +1,10 @@
-"""`python -m benchmarks.realtime [--seconds S] [--tests NAME ...]`: what a tick costs on the way to
-the card, beside a loop that adds up numbers for as long and does nothing else, which is what the
-computer itself does to a loop; and how late a loop in real time is here."""
+"""Work of a tick on the way to the card, and lateness of a loop in real time.
+
+python -m benchmarks.realtime [--seconds S] [--tests NAME ...]
+
+The reference is a loop that adds up numbers for the same time. It shows the disturbance by the
+computer itself.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +41,7 @@ TESTS = ("road1.6", "semi-active", "beam-semi-active", "imposed")
 
 
 class _Taped:
-    """Terminals that note what a session reads, and then play it back at no cost."""
+    """Terminals that record what a session reads, and then play it back at no cost."""
 
     def __init__(self, terminals: Terminals) -> None:
         self._terminals, self._tape, self._place = terminals, [terminals.volts.copy()], 0
@@ -57,9 +61,11 @@ class _Taped:
 
 
 class _Timed:
-    """A card, and the time of each tick from its beginning to the end of all its work, less what
-    the virtual card takes to answer, which stands for the driver and the hardware. pacer: None for
-    ticks one after the other, without a pause."""
+    """Card that measures the work of every tick.
+
+    The answering time of the virtual card is subtracted; it stands for driver and hardware. Without
+    a pacer, ticks follow one another without a pause.
+    """
 
     def __init__(self, card: Card, device: VirtualCard, pacer: Pacer | None) -> None:
         self._card, self._pacer, self.missed, self.late = card, pacer, 0, 0.0
@@ -95,7 +101,7 @@ class _Timed:
 
 
 def idle(work: float, period: float, seconds: float, paced: bool) -> Array:
-    """s of each tick of a loop that adds up numbers, about as many as take `work` s."""
+    """Return the time of every tick of a loop that adds up numbers for about `work`, s."""
     numbers = [float(number) for number in range(50_000)]
     begun = perf_counter()
     for _ in range(200):
@@ -113,8 +119,11 @@ def idle(work: float, period: float, seconds: float, paced: bool) -> Array:
 
 
 def _test(name: str, seconds: float) -> Test:
-    """Without the class a shared computer may keep a loop waiting for longer than a rig could bear;
-    here nothing moves."""
+    """Return a test that tolerates missed ticks.
+
+    Without real-time scheduling a shared computer may delay a loop for longer than a rig tolerates;
+    here nothing moves.
+    """
     experiment = EXPERIMENTS[name]
     configuration = from_assignments(
         experiment.configuration, [f"timing.duration={seconds}", "safety.missed=1e5"]
@@ -123,9 +132,11 @@ def _test(name: str, seconds: float) -> Test:
 
 
 def compute(name: str, folder: Path, paced: bool, seconds: float = SECONDS) -> Array:
-    """s of each tick of a test on the virtual card: driver's client, conversion, limits,
-    controller, recording; not the twin, not the card. paced: one tick a period, from a cold cache
-    as on the rig, or one after the other."""
+    """Return the time of every tick of a test on the virtual card, s.
+
+    It covers the driver's client, conversion, limits, controller and recording, without twin and
+    card. With `paced` there is one tick per period, with a cold cache as on the rig.
+    """
     test = _test(name, seconds)
     tape = _Taped(test.terminals())
     card, _ = open_virtual_card(test, tape)
@@ -133,18 +144,18 @@ def compute(name: str, folder: Path, paced: bool, seconds: float = SECONDS) -> A
     tape.rewind()
     card, device = open_virtual_card(test, tape)
     timed = _Timed(card, device, Pacer(test.configuration.timing.period) if paced else None)
-    # Without a pause the kernel would stop a FIFO loop for 50 ms of each second.
+    # The kernel stops a FIFO loop without pauses for 50 ms of every second.
     ended = record_in_real_time(
         timed, test, folder / "timed.mcap", lambda: None, guarded=False, fifo=paced
     )
     if ended.cause.name != "completed":
         sys.exit(f"{name} ended after {ended.ticks} ticks: {ended.cause.reason}")
+    # The first ticks run with cold caches and uncompiled imports.
     return np.array(timed.times[400:])
 
 
 def late(fifo: bool, folder: Path) -> dict[str, str]:
-    """Figures of a recording's lateness, of the twin in real time, with the scheduling class or
-    without."""
+    """Return the lateness of the twin in real time, with or without FIFO scheduling."""
     test = _test("road1.6", SECONDS)
     twin = InRealTime(WiredTwin(test.terminals(), test.table), test.configuration.timing.period)
     path = folder / f"{fifo}.mcap"
@@ -153,12 +164,14 @@ def late(fifo: bool, folder: Path) -> dict[str, str]:
 
 
 def _show(name: str, times: Array, paced: bool) -> None:
+    """Print the percentiles of some times, us."""
     figures = 1e6 * np.array([*np.percentile(times, [50, 99, 99.9]), times.max()])
     how = "one a ms" if paced else "without a pause"
     print(f"{name:16s} {how:16s} " + " ".join(f"{value:7.1f}" for value in figures), flush=True)
 
 
 def main() -> None:
+    """Print the work of a tick, and the lateness of a loop."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=SECONDS, help="of each loop")
     parser.add_argument("--tests", nargs="+", default=TESTS, metavar="NAME")
@@ -176,14 +189,14 @@ def main() -> None:
         print("\nlateness of the twin in real time, us")
         print("scheduling    median  99.9 %    most  missed of 20 000")
         for fifo in (True, False):
-            found = late(fifo, folder)
-            figures = (1e6 * float(found[f"late_{key}"]) for key in ("median", "999", "max"))
+            lateness = late(fifo, folder)
+            figures = (1e6 * float(lateness[f"late_{key}"]) for key in ("median", "999", "max"))
             print(
                 f"{'FIFO' if fifo else 'default':12s} "
                 + " ".join(f"{value:7.1f}" for value in figures)
-                + f"  {found['missed']}"
+                + f"  {lateness['missed']}"
             )
-            print(f"  {found['scheduling']}\n  {found['histogram']}")
+            print(f"  {lateness['scheduling']}\n  {lateness['histogram']}")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""Reports of every sort of answer, opened in a browser:
-`python -m benchmarks.reports OUT [FOLDER]`.
+"""Reports of every kind of answer, checked in a browser.
 
-OUT gets each as HTML, PDF and PNG, and a sheet of their first screens (sheet.png). FOLDER holds the
-data of real machines, a folder each (docs/diagnosis.md says where they are from); without it the
-twin's own tests are all there is.
+python -m benchmarks.reports OUT [FOLDER]
+
+OUT gets every report as HTML, PDF and PNG, and a sheet of their first screens (sheet.png). FOLDER
+holds one folder of data per real machine (docs/diagnosis.md names the sources). Without it only
+tests of the twin are reported.
 """
 
 from __future__ import annotations
@@ -24,30 +25,32 @@ from tests.helpers.browser import looked_at
 from tests.helpers.recordings import replace_sensors
 
 WIDTHS = (1280, 390)
-"""Of the windows, px: a screen and a telephone."""
+"""Widths of the windows, px: a screen and a telephone."""
 COLUMNS = 4
-"""Of the sheet."""
+"""Columns of the sheet."""
 
 
 def recorded(**effects: float) -> Recording:
-    """30 s of the suspension rig."""
+    """Record 30 s of the suspension rig with some effects, named `kind_at_component`."""
     named = {name.replace("_at_", "@"): value for name, value in effects.items()}
     settings = {"timing": {"duration": 30.0}}
     return rigtwin.run("suspension-rig", "imposed", seed=4, settings=settings, effects=named)
 
 
 def drifting() -> Recording:
-    """Of a load cell that drifts, which nothing in the library stands for."""
+    """Return a recording with a drifting load cell, an effect without a name in the library."""
     sound = recorded()
     return replace_sensors(sound, load_cell=sound["/sensor.load_cell"] + 4.0 * sound.time)
 
 
 def in_millimetres() -> Recording:
+    """Return a recording with one channel in the wrong unit."""
     sound = recorded()
     return replace_sensors(sound, suspension_lvdt=1e3 * sound["/sensor.suspension_lvdt"])
 
 
 def arm(folder: Path) -> rigtwin.Diagnosis:
+    """Return the diagnosis of the TX40 robot."""
     files = [folder / "tx40" / f"{name}_data.csv" for name in ("pos_read", "curr")]
     with tempfile.TemporaryDirectory() as work:
         made = rigtwin.import_data(files, SHIPPED / "maps/tx40.toml", Path(work) / "tx40.mcap")
@@ -69,41 +72,43 @@ REAL: dict[str, Callable[[Path], rigtwin.Diagnosis]] = {
 
 
 def show(name: str, answer: rigtwin.Diagnosis, out: Path) -> None:
-    """Writes a report, opens it, and prints what came of it."""
+    """Write a report, check it in a browser, and print the result."""
     path = answer.report(out / f"{name}.html")
     page = path.read_text(encoding="utf-8")
-    began = time.perf_counter()
+    start = time.perf_counter()
     answer.report(out / f"{name}.pdf")
-    seconds = time.perf_counter() - began
+    seconds = time.perf_counter() - start
     answer.report(out / f"{name}.png")
-    said = []
+    findings = []
     for width in WIDTHS:
         with tempfile.TemporaryDirectory() as folder:
-            seen = looked_at(page, width, Path(folder))
-        serious = ", ".join(seen["serious"]) or "nothing serious"
-        said.append(f"{width} px: {seen['wide']} wide, {seen['drawn']} drawn, {serious}")
+            checked = looked_at(page, width, Path(folder))
+        serious = ", ".join(checked["serious"]) or "nothing serious"
+        findings.append(f"{width} px: {checked['wide']} wide, {checked['drawn']} drawn, {serious}")
     size = len(page.encode()) / 1e6
-    print(f"{name}: {answer.verdict}, {size:.1f} MB, PDF in {seconds:.1f} s; {'; '.join(said)}")
+    print(f"{name}: {answer.verdict}, {size:.1f} MB, PDF in {seconds:.1f} s; {'; '.join(findings)}")
 
 
 def lay_out(pictures: Sequence[Path], path: Path) -> None:
-    """The first screens of reports side by side."""
+    """Write a sheet with the first screens of some reports."""
     width, height = 480, 600
     sheet = Image.new("RGB", (width * COLUMNS, height * -(-len(pictures) // COLUMNS)), "white")
-    for number, each in enumerate(pictures):
-        with Image.open(each) as picture:
+    for number, path_of_picture in enumerate(pictures):
+        with Image.open(path_of_picture) as picture:
             scale = width / picture.width
             shown = min(picture.height, round(height / scale))
             screen = picture.convert("RGB").crop((0, 0, picture.width, shown))
             size = (width, round(shown * scale))
-            place = (width * (number % COLUMNS), height * (number // COLUMNS))
-            sheet.paste(screen.resize(size, Image.Resampling.LANCZOS), place)
+            corner = (width * (number % COLUMNS), height * (number // COLUMNS))
+            sheet.paste(screen.resize(size, Image.Resampling.LANCZOS), corner)
     sheet.quantize(128, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
 
 
 def main() -> None:
-    """Prints a line a report. Fails if the browser's console has an error, or a page asks for
-    anything from elsewhere."""
+    """Print one line per report.
+
+    Fails if the browser's console reports an error or a page requests anything from the network.
+    """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("folder", type=Path, nargs="?")
@@ -115,8 +120,9 @@ def main() -> None:
             show(name, rigtwin.diagnose(RIG[name]()), parsed.out)
         elif parsed.folder is not None:
             show(name, REAL[name](parsed.folder), parsed.out)
-    made = [each for name in (*RIG, *REAL) if (each := parsed.out / f"{name}.png").exists()]
-    lay_out(made, parsed.out / "sheet.png")
+    paths = [parsed.out / f"{name}.png" for name in (*RIG, *REAL)]
+    pictures = [path for path in paths if path.exists()]
+    lay_out(pictures, parsed.out / "sheet.png")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""The vehicles of thesis Table 6.1 on the rig, plain and compensated: how far each test is from the
-ideal vehicle, and why: `python -m benchmarks.vehicles [--picture F.png]`.
+"""Errors of the vehicles of thesis Table 6.1 on the rig, plain and compensated, and their causes.
 
-The motor is as strong as the vehicle asks: the lab's bears 1860 N, less than the heavy ones weigh.
-Everything else is the rig's. The ideal vehicle is on the ground as it moved.
+python -m benchmarks.vehicles [--picture F.png]
+
+The motor is as strong as a vehicle requires: the lab's motor has 1860 N, less than the heavy ones
+weigh. Everything else is the rig's. The ideal vehicle drives over the measured ground motion.
 """
 
 from __future__ import annotations
@@ -26,84 +27,98 @@ from rigtwin.studies.stability.tested import rig_as, set_for_compensation, sized
 TESTS = ("drop", "road1.6", "road10")
 SECONDS, SEED = 10.0, 1
 GROUND, FORCE = 60.0, 30.0
-"""Hz; up to which the ground's sensor is taken for its motion, and forces are compared."""
+"""Cut-off frequencies of the measured ground motion and of the compared forces, Hz."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """position, force: standard deviation of the error over that of the ideal, not numbers where
-    the test did not reach its end."""
+    """Errors of a test relative to the ideal vehicle.
+
+    Attributes
+    ----------
+    position, force : float
+        Standard deviation of the error over that of the ideal. NaN if the test diverged.
+    """
 
     position: float
     force: float
 
     @property
     def text(self) -> str:
-        """In %."""
+        """Errors in %, as text."""
         if not np.isfinite(self.position):
-            return "ran away"
+            return "diverged"
         return f"{100.0 * self.position:.1f} / {100.0 * self.force:.1f}"
 
 
 def low_pass(signal: Array, frequency: float, period: float) -> Array:
-    """Without a phase."""
+    """Return a signal after a low pass without phase lag; frequency: Hz, period: s."""
     sos = butter(2, frequency, fs=1.0 / period, output="sos")
     return sosfiltfilt(sos, signal)
 
 
 def silent(plant: RigPlant) -> RigPlant:
-    """The rig with sensors that neither hum nor hiss."""
+    """Return the rig with noiseless sensors."""
     names = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
     sensors = {name: getattr(plant, name)._replace(white=0.0, hum=0.0) for name in names}
     return plant._replace(**sensors)
 
 
 def smooth_rail(plant: RigPlant) -> RigPlant:
-    """The rig whose rail does not rub."""
+    """Return the rig without friction of the rail."""
     return plant._replace(rail=plant.rail._replace(coulomb=0.0))
 
 
 def configure(vehicle: str, test: str) -> Configuration:
-    """That vehicle in that test, on a rig that is strong enough."""
+    """Return the configuration of a vehicle in a test, on a rig with a strong enough motor."""
     base = find(test).configuration
     timing = base.timing._replace(duration=SECONDS)
     return sized(rig_as(find_vehicle(vehicle)))._replace(road=base.road, timing=timing)
 
 
 def run(configuration: Configuration, test: str, compensated: bool) -> Errors:
-    """The errors of one test."""
+    """Run one test and return its errors."""
     if compensated:
         configuration = set_for_compensation(configuration)
     experiment = replace(find(test), configuration=configuration)
-    made = rigtwin.run("suspension-rig", experiment, seed=SEED)
+    recording = rigtwin.run("suspension-rig", experiment, seed=SEED)
     period = configuration.timing.period
-    ideal = simulate_ideal(configuration, low_pass(made["/sensor.ground_lvdt"], GROUND, period))
-    position = np.std(made["/sensor.structure_lvdt"] - ideal.structure) / np.std(ideal.structure)
-    off = low_pass(made["/sensor.load_cell"] - ideal.force, FORCE, period)
-    force = float(np.std(off) / np.std(ideal.force))
+    ideal = simulate_ideal(
+        configuration, low_pass(recording["/sensor.ground_lvdt"], GROUND, period)
+    )
+    position = np.std(recording["/sensor.structure_lvdt"] - ideal.structure) / np.std(
+        ideal.structure
+    )
+    force_error = low_pass(recording["/sensor.load_cell"] - ideal.force, FORCE, period)
+    force = float(np.std(force_error) / np.std(ideal.force))
+    # A diverged or tripped test has no meaningful error; NaN is caught as well.
     if not position < 10.0:
         return Errors(np.nan, np.nan)
     return Errors(float(position), force)
 
 
 def print_table() -> None:
-    """A line a vehicle and test: plain, compensated, with silent sensors, without the rail's
-    friction too. Position / force, %."""
+    """Print the errors of position / force, %, one line per vehicle and test.
+
+    The columns are plain, compensated, with noiseless sensors, and without rail friction as well.
+    """
     print("position / force, %: plain, compensated, and sensors silent, and rail smooth")
     for vehicle in (*VEHICLES, TABLE_6_2):
         for test in TESTS:
-            own = configure(vehicle, test)
-            quiet = own._replace(plant=silent(own.plant))
-            clean = own._replace(plant=smooth_rail(quiet.plant))
-            found = [
-                run(own, test, False),
-                *(run(each, test, True) for each in (own, quiet, clean)),
+            nominal = configure(vehicle, test)
+            quiet = nominal._replace(plant=silent(nominal.plant))
+            clean = nominal._replace(plant=smooth_rail(quiet.plant))
+            errors = [
+                run(nominal, test, False),
+                *(run(setup, test, True) for setup in (nominal, quiet, clean)),
             ]
-            print(f"{vehicle:12s} {test:8s}", *(f"{each.text:>15s}" for each in found), flush=True)
+            print(
+                f"{vehicle:12s} {test:8s}", *(f"{error.text:>15s}" for error in errors), flush=True
+            )
 
 
 def draw_region(out: Path) -> None:
-    """Where a body on a suspension is stable, plain and compensated, with the vehicles in it."""
+    """Draw the stability region over sprung mass and stiffness, plain and compensated."""
     from matplotlib.figure import Figure
 
     from rigtwin.studies.stability.mapping import Axis, stability_map
@@ -112,20 +127,20 @@ def draw_region(out: Path) -> None:
     across = Axis("sprung_mass", np.logspace(0.7, 3.3, 27))
     up = Axis("suspension_stiffness", np.logspace(2.0, 5.5, 28))
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
-    for place, (model, title) in enumerate(
+    for column, (model, title) in enumerate(
         (("sampled", "as it is"), ("compensated", "the plate's delay compensated")), start=1
     ):
-        found = stability_map(model, car, 0.01, across, up)
-        axes = figure.add_subplot(1, 2, place)
+        region = stability_map(model, car, 0.01, across, up)
+        axes = figure.add_subplot(1, 2, column)
         axes.contourf(
             across.values,
             up.values,
-            found.rightmost,
+            region.rightmost,
             [-1e9, 0.0, 1e9],
             colors=["#cfe8cf", "#f2d0cc"],
         )
         axes.contour(
-            across.values, up.values, found.rightmost, [0.0], colors="black", linewidths=1.0
+            across.values, up.values, region.rightmost, [0.0], colors="black", linewidths=1.0
         )
         axes.plot(car.sprung_mass, car.suspension_stiffness, "ko", label="Table 6.2")
         axes.set(xscale="log", yscale="log", xlabel="sprung mass, kg", title=title)
@@ -135,7 +150,7 @@ def draw_region(out: Path) -> None:
 
 
 def main() -> None:
-    """Prints the table, or draws the picture."""
+    """Print the table, or draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--picture", type=Path, metavar="F.png")
     parsed = parser.parse_args()

@@ -1,4 +1,4 @@
-"""How often a watch raises an alarm where nothing is wrong, and how soon where something is.
+"""False alarms of a watch on nominal tests, and its delay on tests with an effect.
 
 python -m benchmarks.watch --hours 10            # nominal tests, one seed each
 python -m benchmarks.watch --effects             # each effect from the middle of a test on
@@ -34,11 +34,11 @@ TESTS = (
     "gas-spring",
 )
 STEP = 4.0
-"""s that are judged at a time: eight times as fast as at the pace of a test, by the same blocks."""
+"""Length of a judged piece, s. It is eight times faster than real time, with the same blocks."""
 JUDGED = 34.0
-"""s of a test that are judged, in the mean of `TESTS`."""
+"""Mean judged length of `TESTS`, s."""
 LATER = 10.0
-"""s, from when on an effect is there."""
+"""Start of an effect within its test, s."""
 MOVING = ("imposed", "road10")
 EFFECTS = {
     "coulomb@rail": 60.0,
@@ -57,7 +57,7 @@ EFFECTS = {
 
 
 def watch_nominal(case: tuple[str, int]) -> tuple[str, int, float, float, str]:
-    """One nominal test: name, seed, the s that were judged, the highest level, the alarm if any."""
+    """Watch a nominal test: return name, seed, judged time, s, highest level, and alarm."""
     name, seed = case
     with TemporaryDirectory() as folder:
         path = Path(folder) / "test.mcap"
@@ -67,7 +67,7 @@ def watch_nominal(case: tuple[str, int]) -> tuple[str, int, float, float, str]:
 
 
 def watch_effect(case: tuple[str, float, str, int]) -> str:
-    """One effect in a test: a row of the table."""
+    """Watch a test with an effect and return its row of the table."""
     name, value, test, seed = case
     with TemporaryDirectory() as folder:
         path = Path(folder) / "test.mcap"
@@ -81,11 +81,11 @@ def watch_effect(case: tuple[str, float, str, int]) -> str:
         )
         first: list[str] = []
 
-        def told(now: rigtwin.Watch) -> None:
+        def note_first_suspect(now: rigtwin.Watch) -> None:
             if now.alarm is not None and now.alarm.suspects and not first:
                 first.append(_describe(now.alarm))
 
-        alarm = rigtwin.watch(path, told=told).alarm
+        alarm = rigtwin.watch(path, told=note_first_suspect).alarm
         if alarm is None:
             return f"| {name} = {value:g} | {test} | none | | |"
         after = f"{alarm.time - LATER:.2f} s"
@@ -93,37 +93,39 @@ def watch_effect(case: tuple[str, float, str, int]) -> str:
 
 
 def _describe(alarm: rigtwin.Alarm) -> str:
-    """The likeliest suspect."""
+    """Return the most probable suspect of an alarm, as text."""
     if not alarm.suspects:
         return "none"
     return f"{alarm.suspects[0].effect}, {100.0 * alarm.suspects[0].probability:.0f} %"
 
 
 def _nominal_cases(hours: float, seed: int) -> Iterator[tuple[str, int]]:
+    """Yield test and seed until the judged time reaches `hours`."""
     wanted = math.ceil(3600.0 * hours / JUDGED)
     return islice(((name, seed + n) for n in count() for name in TESTS), wanted)
 
 
 def main() -> int:
+    """Print the alarms of effects, and of nominal tests."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=0.0)
     parser.add_argument("--effects", action="store_true")
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--workers", type=int, default=2)
-    given = parser.parse_args()
-    with ProcessPoolExecutor(given.workers) as pool:
-        if given.effects:
+    parsed = parser.parse_args()
+    with ProcessPoolExecutor(parsed.workers) as pool:
+        if parsed.effects:
             print("| effect | test | alarm after | first suspect | at the end |")
             print("|---|---|---|---|---|")
             cases = [
-                (name, value, test, given.seed)
+                (name, value, test, parsed.seed)
                 for test in MOVING
                 for name, value in EFFECTS.items()
             ]
             for row in pool.map(watch_effect, cases):
                 print(row, flush=True)
         total, alarms, highest = 0.0, 0, 0.0
-        nominal = list(_nominal_cases(given.hours, given.seed))
+        nominal = list(_nominal_cases(parsed.hours, parsed.seed))
         for name, seed, length, level, alarm in tqdm(
             pool.map(watch_nominal, nominal), total=len(nominal), disable=not nominal or None
         ):

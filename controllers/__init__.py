@@ -1,7 +1,7 @@
-"""Controllers of the rig: plain functions of (settings, state, input) that run as Python or
-compiled, on twin or rig.
+"""The controllers of the rig: plain functions of settings, state and input.
 
-They know nothing of the twin. `update` is one tick of the whole controller.
+They run as Python or compiled, on the rig and on the twin, and import nothing of the twin.
+`update` is one tick of the whole controller.
 """
 
 from controllers.mil import (

@@ -1,19 +1,20 @@
-"""Adaptive inverse of the actuator: the command from the desired motion and its derivatives, with
-coefficients that are estimated while the test runs.
+"""Adaptive inverse of an actuator, with coefficients estimated while the test runs.
+
+The command is a combination of the desired motion and its derivatives:
 
     u = θ_0 r + θ_1 r' + ... + θ_n r^(n);   estimated from  u ≈ θ_0 y + θ_1 y' + ... + θ_n y^(n)
 
-with u and y through the same filter, whose states are the derivatives. Two estimators:
+u and y pass the same filter, whose states are the derivatives. There are two estimators:
 
-- adaptive time series: least squares over the last second or so, n = 2 (Chae, Kazemibidokhti,
-  Ricles, Earthquake Eng. Struct. Dyn. 42 (2013) 1697). There the window is cut off, here it fades
-  exponentially, and the start coefficients hold it where there is no motion yet;
-- adaptive model-based: gradient, θ' = Γ φ (u − θᵀφ)/(ν² + φᵀφ), n = 3 (Chen, Ricles, Karavasilis,
-  Chae, Sause, Eng. Struct. 36 (2012); Fermandois 2019; Galmez, Fermandois 2022). Normalised here,
-  so that one Γ serves small motions and large.
+- Adaptive time series: least squares over about one second, n = 2 (Chae, Kazemibidokhti, Ricles,
+  Earthquake Eng. Struct. Dyn. 42 (2013) 1697). Their window is cut off; here it fades
+  exponentially, and the start coefficients act as a prior until there is motion.
+- Adaptive model-based: gradient, θ' = Γ φ (u − θᵀφ)/(ν² + φᵀφ), n = 3 (Chen, Ricles, Karavasilis,
+  Chae, Sause, Eng. Struct. 36 (2012); Fermandois 2019; Galmez, Fermandois 2022). It is normalised
+  here, so the same Γ suits small and large motions.
 
-Both need start coefficients, a nominal actuator's, and motion to learn from. Noise on r reaches the
-command by θ_n T^−n; noise on y does so slowly, by the coefficients.
+Both need start coefficients from a nominal actuator, and motion to learn from. Noise on r reaches
+the command amplified by θ_n T^−n. Noise on y reaches it slowly, through the coefficients.
 """
 
 from __future__ import annotations
@@ -31,13 +32,28 @@ Array = NDArray[np.float64]
 
 
 class AdaptiveLaw(NamedTuple):
-    """One adaptive inverse, n + 1 coefficients.
+    """Adaptive inverse with n + 1 coefficients.
 
-    least_squares: 1 if by least squares, else 0; start, low, high: coefficients and their bounds,
-    shape (n+1,), each in s^order times the filter's corner^order; stencils: shape (n+1, points),
-    derivatives of the desired motion by backward differences, divided by corner^order; fading: of
-    the window in a tick; hold: (m²) weight of the start coefficients; rate: of the gradient a tick;
-    size: ν, m.
+    Coefficients are scaled: each is in s^order times the filter's corner^order.
+
+    Attributes
+    ----------
+    least_squares : float
+        1 for least squares, 0 for the gradient.
+    start, low, high : ndarray
+        Initial coefficients and their bounds, shape (n + 1,).
+    stencils : ndarray
+        Backward differences of the desired motion, divided by corner^order, shape (n + 1, points).
+    filter : StateFilter
+        Filter of command and measurement.
+    fading : float
+        Factor by which the window fades per tick.
+    hold : float
+        Weight of the start coefficients, m².
+    rate : float
+        Gain of the gradient per tick.
+    size : float
+        Regularisation ν of the normalisation, m.
     """
 
     least_squares: float
@@ -60,8 +76,23 @@ def adaptive_time_series(
     hold: float = 1e-6,
     span: float = 0.5,
 ) -> AdaptiveLaw:
-    """By least squares. coefficients: to start from, s^order; corner: of the filter, Hz; window:
-    s; hold: (m²) how much motion outweighs the start; span: how far coefficients may go, share."""
+    """Return an adaptive inverse by least squares.
+
+    Parameters
+    ----------
+    coefficients : list of float
+        Initial coefficients, in s^order, lowest order first.
+    period : float
+        Period of the ticks, s.
+    corner : float
+        Corner frequency of the filter, Hz. Defaults to 30.
+    window : float
+        Time constant of the fading window, s. Defaults to 1.
+    hold : float
+        Weight of the initial coefficients against motion, m². Defaults to 1e-6.
+    span : float
+        Largest relative change of a coefficient. Defaults to 0.5.
+    """
     law = _law(coefficients, period, corner, span)
     return law._replace(least_squares=1.0, fading=float(np.exp(-period / window)), hold=hold)
 
@@ -74,16 +105,33 @@ def adaptive_model(
     size: float = 1e-4,
     span: float = 0.5,
 ) -> AdaptiveLaw:
-    """By gradient. coefficients: to start from, s^order; corner: of the filter, Hz; rate: Γ, 1/s;
-    size: ν, m; span: how far coefficients may go, share."""
+    """Return an adaptive inverse by gradient.
+
+    Parameters
+    ----------
+    coefficients : list of float
+        Initial coefficients, in s^order, lowest order first.
+    period : float
+        Period of the ticks, s.
+    corner : float
+        Corner frequency of the filter, Hz. Defaults to 30.
+    rate : float
+        Adaptation gain Γ, 1/s. Defaults to 2.
+    size : float
+        Regularisation ν, m: motions below it adapt slowly. Defaults to 1e-4.
+    span : float
+        Largest relative change of a coefficient. Defaults to 0.5.
+    """
     return _law(coefficients, period, corner, span)._replace(rate=rate * period, size=size)
 
 
 def _law(coefficients: list[float], period: float, corner: float, span: float) -> AdaptiveLaw:
+    """Return the parts that both estimators share."""
     order = len(coefficients)
-    one = state_filter(order, corner, period)
-    units = one.corner ** np.arange(order, dtype=np.float64)
+    motion_filter = state_filter(order, corner, period)
+    units = motion_filter.corner ** np.arange(order, dtype=np.float64)
     start = np.asarray(coefficients, dtype=np.float64) * units
+    # Bounds keep a wrong estimate from making the loop unstable.
     reach = span * np.abs(start)
     points = order + 1
     stencils = np.array([derivative_weights(power, points, period) for power in range(order)])
@@ -93,7 +141,7 @@ def _law(coefficients: list[float], period: float, corner: float, span: float) -
         low=start - reach,
         high=start + reach,
         stencils=stencils / units[:, None],
-        filter=one,
+        filter=motion_filter,
         fading=1.0,
         hold=0.0,
         rate=0.0,
@@ -102,8 +150,11 @@ def _law(coefficients: list[float], period: float, corner: float, span: float) -
 
 
 def adaptive_memory(law: AdaptiveLaw) -> Array:
-    """Of a law before its first tick: coefficients; last desired motions; filtered command,
-    filtered measurement; last command and measurement; the window's sums."""
+    """Return the memory of a law before its first tick, one array of all numbers.
+
+    It holds the coefficients, the last desired motions, the filtered command and measurement, the
+    last command and measurement, and the sums of the window.
+    """
     order, points = law.stencils.shape
     return np.concatenate(
         [law.start, np.zeros(points + 2 * order + 2), np.zeros(order * order + order)]
@@ -112,57 +163,71 @@ def adaptive_memory(law: AdaptiveLaw) -> Array:
 
 @compilable
 def step_adaptive(law: AdaptiveLaw, memory: Array, desired: float, measured: float) -> float:
-    """One tick: returns the command. memory: of `adaptive_memory`, advanced in place."""
+    """Return the command of one tick, m; memory: of `adaptive_memory`, advanced in place."""
     order, points = law.stencils.shape
     theta = memory[:order]
     history = memory[order : order + points]
     first = order + points
-    commanded, moved = memory[first : first + order], memory[first + order : first + 2 * order]
+    filtered_command, filtered_motion = (
+        memory[first : first + order],
+        memory[first + order : first + 2 * order],
+    )
     last = memory[first + 2 * order : first + 2 * order + 2]
     sums = memory[first + 2 * order + 2 :]
-    step_filter(law.filter, commanded, last[0])
-    # Held commands are exact; the motion between two samples is taken as straight.
-    step_filter(law.filter, moved, 0.5 * (last[1] + measured))
+    step_filter(law.filter, filtered_command, last[0])
+    # The command is held over a tick, so its filter is exact. The motion is not: its mean over the
+    # tick is the best constant.
+    step_filter(law.filter, filtered_motion, 0.5 * (last[1] + measured))
     if law.least_squares > 0.0:
-        _fit(law, theta, sums, moved, commanded[0])
+        _fit(law, theta, sums, filtered_motion, filtered_command[0])
     else:
-        _descend(law, theta, moved, commanded[0])
-    for place in range(points - 1, 0, -1):
-        history[place] = history[place - 1]
+        _descend(law, theta, filtered_motion, filtered_command[0])
+    for index in range(points - 1, 0, -1):
+        history[index] = history[index - 1]
     history[0] = desired
     command = 0.0
     for power in range(order):
         derivative = 0.0
-        for place in range(points):
-            derivative += law.stencils[power, place] * history[place]
+        for index in range(points):
+            derivative += law.stencils[power, index] * history[index]
         command += theta[power] * derivative
+    # The next tick filters the command that acts during this one.
     last[0], last[1] = command, measured
     return command
 
 
 @compilable
-def _descend(law: AdaptiveLaw, theta: Array, moved: Array, commanded: float) -> None:
-    error, size = commanded, law.size**2
+def _descend(
+    law: AdaptiveLaw, theta: Array, filtered_motion: Array, filtered_command: float
+) -> None:
+    """Update the coefficients in place by one gradient step."""
+    error, size = filtered_command, law.size**2
     for power in range(len(theta)):
-        error -= theta[power] * moved[power]
-        size += moved[power] ** 2
+        error -= theta[power] * filtered_motion[power]
+        size += filtered_motion[power] ** 2
     for power in range(len(theta)):
-        after = theta[power] + law.rate * error * moved[power] / size
-        theta[power] = min(max(after, law.low[power]), law.high[power])
+        updated = theta[power] + law.rate * error * filtered_motion[power] / size
+        theta[power] = min(max(updated, law.low[power]), law.high[power])
 
 
 @compilable
-def _fit(law: AdaptiveLaw, theta: Array, sums: Array, moved: Array, commanded: float) -> None:
+def _fit(
+    law: AdaptiveLaw, theta: Array, sums: Array, filtered_motion: Array, filtered_command: float
+) -> None:
+    """Update the coefficients in place by recursive least squares with a fading window."""
+    # (Σ λ^k φ φᵀ + h I) θ = Σ λ^k φ u + h θ_0: the prior keeps the system regular at rest.
     order = len(theta)
-    square, beside = sums[: order * order].reshape(order, order), sums[order * order :]
-    system, right = np.empty((order, order)), np.empty(order)
+    square, cross = sums[: order * order].reshape(order, order), sums[order * order :]
+    system, right_side = np.empty((order, order)), np.empty(order)
     for row in range(order):
         for column in range(order):
-            square[row, column] = law.fading * square[row, column] + moved[row] * moved[column]
+            square[row, column] = (
+                law.fading * square[row, column] + filtered_motion[row] * filtered_motion[column]
+            )
             system[row, column] = square[row, column]
-        beside[row] = law.fading * beside[row] + moved[row] * commanded
+        cross[row] = law.fading * cross[row] + filtered_motion[row] * filtered_command
         system[row, row] += law.hold
-        right[row] = beside[row] + law.hold * law.start[row]
-    found = np.linalg.solve(system, right)
+        right_side[row] = cross[row] + law.hold * law.start[row]
+    solution = np.linalg.solve(system, right_side)
     for row in range(order):
-        theta[row] = min(max(found[row], law.low[row]), law.high[row])
+        theta[row] = min(max(solution[row], law.low[row]), law.high[row])

@@ -1,5 +1,6 @@
-"""A hydraulic cylinder under position control as one transfer function: what the twin's cylinder is
-and what a delay compensator is told of it have these parameters in common.
+"""A hydraulic cylinder under position control as one transfer function.
+
+The twin's cylinder and the model in a delay compensator have these parameters in common.
 
     H(s) = (b2 s² + b1 s + b0) / (s⁴ + a3 s³ + a2 s² + a1 s + a0),   scaled to unit static gain
 """
@@ -31,7 +32,7 @@ Delay = Annotated[float, LATE]
 
 
 class ClosedLoop(NamedTuple):
-    """H(s) with what stands before it: a gain, a lag and a delay. Nominal is the rig's."""
+    """Gain, lag and delay before H(s). Defaults are those of the rig; units are in the types."""
 
     b2: B2 = 1817.0
     b1: B1 = 7.719e4
@@ -49,7 +50,7 @@ NOMINAL = ClosedLoop()
 
 
 def state_space(loop: ClosedLoop) -> tuple[Array, Array, Array]:
-    """Controllable form (A, B, C) of H(s)/H(0) alone; shapes (4, 4), (4,), (4,)."""
+    """Return the controllable form A, (4, 4), B, (4,), and C, (4,), of H(s)/H(0) alone."""
     a = np.diag(np.ones(3), 1)
     a[3] = [-loop.a0, -loop.a1, -loop.a2, -loop.a3]
     b = np.array([0.0, 0.0, 0.0, 1.0])
@@ -58,7 +59,7 @@ def state_space(loop: ClosedLoop) -> tuple[Array, Array, Array]:
 
 
 def with_lag(loop: ClosedLoop) -> tuple[Array, Array, Array]:
-    """(A, B, C) of gain, lag and H(s); the delay is left out."""
+    """Return A, B and C of gain, lag and H(s), without the delay; the lag adds a fifth state."""
     inner, entry, out = state_space(loop)
     if loop.lag <= 0.0:
         return inner, entry * loop.gain, out
@@ -69,11 +70,14 @@ def with_lag(loop: ClosedLoop) -> tuple[Array, Array, Array]:
 
 
 def transfer(loop: ClosedLoop) -> tuple[list[float], list[float]]:
-    """Numerator and denominator of gain, lag and H(s), from the highest power down; the delay is
-    left out."""
+    """Return numerator and denominator of gain, lag and H(s), highest power first.
+
+    The delay is left out.
+    """
+    # Scaled to H(0) = 1: b0 and a0 are identified separately and differ by 0.6 %.
     scale = loop.gain * loop.a0 / loop.b0
-    above = [scale * each for each in (loop.b2, loop.b1, loop.b0)]
-    below = [1.0, loop.a3, loop.a2, loop.a1, loop.a0]
+    numerator = [scale * b for b in (loop.b2, loop.b1, loop.b0)]
+    denominator = [1.0, loop.a3, loop.a2, loop.a1, loop.a0]
     if loop.lag > 0.0:
-        below = np.convolve([loop.lag, 1.0], below).tolist()
-    return above, below
+        denominator = np.convolve([loop.lag, 1.0], denominator).tolist()
+    return numerator, denominator

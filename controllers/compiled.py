@@ -1,5 +1,4 @@
-"""One source, two ways to run: called from Python a function stays Python; called from a compiled
-loop it is compiled."""
+"""One source that runs as Python or compiled, depending on its caller."""
 
 from __future__ import annotations
 
@@ -13,21 +12,23 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compilable(function: Function) -> Function:
-    """Marks a plain function of numbers and NamedTuples as usable inside compiled code; returns it
-    unchanged.
+    """Mark a function of numbers and NamedTuples as usable in compiled code; return it unchanged.
 
-    Compiled, a division by zero gives what it gives in numpy, not an exception: to check every
-    division takes its time, and whatever is commanded is looked at anyway."""
+    A compiled division by zero gives infinity or NaN, as in NumPy, instead of an exception.
+    Checking every division would take time, and the limits judge every command anyway.
+    """
     return register_jitable(error_model="numpy")(function)
 
 
 def compiled(function: Function) -> Function:
-    """Compiles a plain function of numbers and arrays wherever it is called from: a loop over an
-    array, which Python is slow at. It must call nothing of ours in another file, or what is kept on
-    disk would not be made anew when that changes."""
+    """Compile a function of numbers and arrays for all callers: a loop that Python is slow at.
+
+    The function must call no function of another file of this project. Numba checks only the date
+    of this file before it reuses code from the disk, so a change elsewhere would go unnoticed.
+    """
     try:
-        made: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        dispatcher: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:
-        # Nowhere to keep it.
-        made = numba.njit(nogil=True, error_model="numpy")(function)
-    return made
+        # No folder is writable: compile without the cache.
+        dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
+    return dispatcher

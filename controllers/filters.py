@@ -7,6 +7,8 @@ from controllers.compiled import compilable
 
 @compilable
 def low_pass(output: float, sample: float, time_constant: float, period: float) -> float:
-    """Next output of a backward-Euler first-order lag: y + T/(τ+T)·(x − y). τ and T in s; τ = 0
-    passes the sample."""
+    """Return the next output of a first-order lag by backward Euler: y + T/(τ + T)·(x − y).
+
+    τ = `time_constant` and T = `period` are in s. With τ = 0 the sample passes.
+    """
     return output + period / (time_constant + period) * (sample - output)

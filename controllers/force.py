@@ -6,8 +6,7 @@ from controllers.compiled import compilable
 from controllers.settings import Settings
 
 MOTOR_CONSTANT = 186.0
-"""N/V: the force per volt that the controller assumes of the amplifier and motor (±10 V ↔ ±1860
-N)."""
+"""Force per volt of amplifier and motor that the controller assumes, N/V (±10 V ↔ ±1860 N)."""
 
 
 @compilable
@@ -19,11 +18,13 @@ def force_loop(
     added: float,
     period: float,
 ) -> tuple[float, float]:
-    """One tick. demanded, measured, integral, added (against friction) in N; returns (integral in
-    N, voltage in V).
+    """Return the integral, N, and the voltage, V, of one tick of the force loop.
 
-    When the voltage reaches its limit this tick's increment of the integral is discarded.
+    u = (K_ff F_d + K_p e + K_i ∫ e dt + F_a)/K_m, e = F_d − F.
+
+    demanded, measured: F_d and F, N; added: F_a against friction, N; period: s.
     """
+    # Anti-windup: at the voltage limit this tick's increment of the integral is discarded.
     error = demanded - measured
     increment = settings.ki * error * period
     voltage = (

@@ -1,7 +1,7 @@
 """Controllers written as a formula: `kp * (reference - position) - kv * derivative(position)`.
 
-A formula is compiled into a short program of blocks, which the same function runs from Python and
-inside compiled loops. Every block that remembers something starts at rest at its first sample.
+A formula is compiled into a short program of operations, which one function runs from Python and in
+compiled loops. Every block with a memory starts at rest at its first sample.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from controllers.compiled import compilable, compiled
 
 LONGEST = 4096
-"""Ticks that a block remembers at most."""
+"""Largest number of ticks in the memory of a block."""
 
+# Codes of the operations; `run` tells them apart.
 ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE = range(5)
 ABSOLUTE, SIGN, SINE, COSINE, ROOT, SMALLER, LARGER = range(5, 12)
-DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, LATE, CLIP = range(12, 18)
+DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, DELAY, CLIP = range(12, 18)
 PLAIN = {
     "abs": (ABSOLUTE, 1),
     "sign": (SIGN, 1),
@@ -32,20 +33,37 @@ PLAIN = {
 }
 PLAIN |= {"min": (SMALLER, 2), "max": (LARGER, 2), "limit": (CLIP, 3)}
 BLOCKS = {
-    "derivative": (DERIVATIVE, 1, "derivative(x): of its last two samples"),
-    "integral": (INTEGRAL, 1, "integral(x): sum of its samples times the period"),
+    "derivative": (
+        DERIVATIVE,
+        1,
+        "derivative(x): difference of the last two samples over the period",
+    ),
+    "integral": (INTEGRAL, 1, "integral(x): sum of the samples times the period"),
     "low_pass": (LOW_PASS, 2, "low_pass(x, time_constant): first-order lag"),
-    "mean": (MEAN, 2, "mean(x, n): of its last n samples"),
-    "late": (LATE, 2, "late(x, n): n samples ago"),
+    "mean": (MEAN, 2, "mean(x, n): mean of the last n samples"),
+    "delay": (DELAY, 2, "delay(x, n): value n samples ago"),
 }
 OPERATORS = {ast.Add: ADD, ast.Sub: SUBTRACT, ast.Mult: MULTIPLY, ast.Div: DIVIDE}
 FUNCTIONS = (*PLAIN, *BLOCKS)
+"""Names of all functions: those without a memory, then the blocks."""
 
 
 class Program(NamedTuple):
-    """A compiled formula. Registers hold inputs, then settings, then numbers, then each operation's
-    result; operations: code, three registers, and where its memory begins, shape (operations, 5);
-    registers: as they start, shape (registers,)."""
+    """Compiled formula.
+
+    Registers hold the inputs, then the settings, the numbers, and the result of every operation.
+
+    Attributes
+    ----------
+    operations : ndarray
+        Code, three argument registers and start of the memory, shape (operations, 5).
+    registers : ndarray
+        Initial values of the registers, shape (registers,).
+    inputs : int
+        Number of inputs.
+    memory : int
+        Size of the memory of all blocks.
+    """
 
     operations: NDArray[np.int64]
     registers: NDArray[np.float64]
@@ -55,8 +73,19 @@ class Program(NamedTuple):
 
 @dataclass(frozen=True)
 class Formula:
-    """A controller. inputs: names in the order in which `run` takes their values; settings: name →
-    value."""
+    """Formula with its settings.
+
+    Attributes
+    ----------
+    text : str
+        Source.
+    inputs : tuple of str
+        Names of the inputs, in the order of their registers.
+    settings : mapping
+        Values of the settings by name.
+    program : Program
+        Compiled program.
+    """
 
     text: str
     inputs: tuple[str, ...]
@@ -64,17 +93,20 @@ class Formula:
     program: Program
 
     def with_settings(self, settings: Mapping[str, float]) -> Program:
-        """The program with other values of its settings."""
+        """Return the program with other values of its settings."""
         registers = self.program.registers.copy()
-        for place, name in enumerate(self.settings, start=len(self.inputs)):
-            registers[place] = settings.get(name, self.settings[name])
+        for register, name in enumerate(self.settings, start=len(self.inputs)):
+            registers[register] = settings.get(name, self.settings[name])
         return self.program._replace(registers=registers)
 
     def replayed(
         self, settings: Mapping[str, float], inputs: Sequence[NDArray[Any]], period: float
     ) -> NDArray[np.float64]:
-        """Its value at every tick. inputs: in their order, shape (ticks,) each; of a formula
-        without any, one signal of which only the length counts."""
+        """Return the value of the formula at every tick, shape (ticks,).
+
+        inputs: signals in the order of `self.inputs`, each of shape (ticks,). For a formula
+        without inputs, one signal gives the number of ticks. period: s.
+        """
         program, ticks = self.with_settings(settings), len(inputs[0])
         out = np.empty(ticks)
         table = np.ascontiguousarray(np.stack(inputs, axis=1), np.float64)
@@ -82,17 +114,23 @@ class Formula:
         return out
 
     def memory(self) -> NDArray[np.float64]:
-        """What its blocks remember, before the first sample."""
+        """Return the memory of the blocks before the first sample: NaN marks an empty one."""
         return np.full(max(self.program.memory, 1), math.nan)
 
 
 def formula(text: str, settings: Mapping[str, float]) -> Formula:
-    """Compiles a formula. Every name that is no setting is an input. Raises ValueError saying what
-    is wrong and where."""
+    """Compile a formula; every name that is not a setting is an input.
+
+    Raises ValueError, saying what is wrong and where, for an invalid formula.
+    """
+    # Python's parser gives the precedence of the operators; nothing is evaluated as Python.
     try:
         tree = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{text!r} is no formula") from None
+        raise ValueError(
+            f"{text!r} is not a formula; expected an expression such as kp * x"
+        ) from None
+    # Order of first appearance: it defines the order of the inputs' registers.
     inputs = tuple(dict.fromkeys(_names(tree, settings)))
     builder = _Builder(inputs, settings)
     try:
@@ -100,7 +138,7 @@ def formula(text: str, settings: Mapping[str, float]) -> Formula:
     except RecursionError:
         raise ValueError(f"{text[:40]!r}... is nested too deeply") from None
     if not builder.operations:
-        # The formula is one name or number: pass it on.
+        # A formula of a single name or number has no operation; adding 0 gives it one.
         builder.operation(ADD, builder.result(tree), builder.number(0.0))
     registers = np.array([*([0.0] * len(inputs)), *settings.values(), *builder.numbers], float)
     first = len(registers)
@@ -112,22 +150,23 @@ def formula(text: str, settings: Mapping[str, float]) -> Formula:
         np.int64,
     )
     program = Program(
-        table, np.concatenate([registers, np.zeros(len(table))]), len(inputs), builder.remembered
+        table, np.concatenate([registers, np.zeros(len(table))]), len(inputs), builder.memory_size
     )
     return Formula(text, inputs, dict(settings), program)
 
 
 def _names(tree: ast.expr, settings: Mapping[str, float]) -> list[str]:
+    """Return the names of the inputs in the order of their first appearance."""
     calls = {id(node.func) for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = [
+    nodes = [
         node for node in ast.walk(tree) if isinstance(node, ast.Name) and id(node) not in calls
     ]
-    found.sort(key=lambda node: (node.lineno, node.col_offset))
-    return [node.id for node in found if node.id not in settings]
+    nodes.sort(key=lambda node: (node.lineno, node.col_offset))
+    return [node.id for node in nodes if node.id not in settings]
 
 
 def _finite(value: float) -> float:
-    """A number of a formula. Raises ValueError if it is too large to be one."""
+    """Return a number of a formula as float. Raises ValueError if it is not finite."""
     try:
         number = float(value)
     except OverflowError:
@@ -138,7 +177,7 @@ def _finite(value: float) -> float:
 
 
 def _number_of(node: ast.expr) -> float | None:
-    """The value of a number in a formula, with its sign; None of anything else."""
+    """Return the value of a literal number with its sign; None for another expression."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         inner = _number_of(node.operand)
         return None if inner is None else -inner
@@ -147,27 +186,34 @@ def _number_of(node: ast.expr) -> float | None:
 
 
 class _Builder:
-    """Registers of results are counted −1, −2, …, since how many numbers there are is known only at
-    the end."""
+    """Builder of a program.
+
+    Results have the provisional registers −1, −2, …, because the count of literal numbers, which
+    stand before them, is known only at the end.
+    """
 
     def __init__(self, inputs: Sequence[str], settings: Mapping[str, float]) -> None:
-        self._place = {name: number for number, name in enumerate([*inputs, *settings])}
+        self._registers = {name: number for number, name in enumerate([*inputs, *settings])}
         self._settings = settings
         self.numbers: list[float] = []
         self.operations: list[tuple[int, int, int, int, int]] = []
-        self.remembered = 0
+        self.memory_size = 0
 
     def number(self, value: float) -> int:
+        """Add a literal number and return its register."""
         self.numbers.append(value)
-        return len(self._place) + len(self.numbers) - 1
+        return len(self._registers) + len(self.numbers) - 1
 
-    def operation(self, code: int, one: int, two: int = 0, three: int = 0, memory: int = 0) -> int:
-        self.operations.append((code, one, two, three, self.remembered))
-        self.remembered += memory
+    def operation(
+        self, code: int, first: int, second: int = 0, third: int = 0, memory: int = 0
+    ) -> int:
+        """Add an operation and return its provisional register; memory: numbers it stores."""
+        self.operations.append((code, first, second, third, self.memory_size))
+        self.memory_size += memory
         return -len(self.operations)
 
     def result(self, node: ast.expr) -> int:
-        """The register that a part of the formula ends in."""
+        """Add the operations of a part of the formula and return the register of its result."""
         if (
             isinstance(node, ast.Constant)
             and isinstance(node.value, int | float)
@@ -175,7 +221,7 @@ class _Builder:
         ):
             return self.number(_finite(node.value))
         if isinstance(node, ast.Name):
-            return self._place[node.id]
+            return self._registers[node.id]
         if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
             return self.operation(
                 OPERATORS[type(node.op)], self.result(node.left), self.result(node.right)
@@ -190,22 +236,27 @@ class _Builder:
         )
 
     def _value_of(self, node: ast.expr) -> float | None:
-        """Of a number or a setting; None of anything else."""
+        """Return the value of a number or a setting; None for another expression."""
         if isinstance(node, ast.Name):
             return self._settings.get(node.id)
         return _number_of(node)
 
-    def _call(self, name: str, given: list[ast.expr]) -> int:
+    def _call(self, name: str, arguments: list[ast.expr]) -> int:
+        """Add a function call, with its arguments checked as far as they are constant."""
+        if name == "late":
+            raise ValueError(
+                "unknown function 'late'; write delay(x, n) for the value n samples ago"
+            )
         if name not in FUNCTIONS:
             raise ValueError(f"unknown function {name!r}; there are {', '.join(FUNCTIONS)}")
         code, count = PLAIN[name] if name in PLAIN else BLOCKS[name][:2]
-        if len(given) != count:
+        if len(arguments) != count:
             raise ValueError(
-                f"{name} takes {count} value{'s' if count > 1 else ''}, not {len(given)}"
+                f"{name} takes {count} value{'s' if count > 1 else ''}, not {len(arguments)}"
             )
         memory = 2 if name in BLOCKS else 0
-        if name in ("mean", "late"):
-            last = given[1]
+        if name in ("mean", "delay"):
+            last = arguments[1]
             whole = last.value if isinstance(last, ast.Constant) else None
             if not isinstance(whole, int) or not 1 <= whole <= LONGEST:
                 raise ValueError(
@@ -213,7 +264,7 @@ class _Builder:
                     f"1 to {LONGEST}, not {ast.unparse(last)}"
                 )
             memory = whole + 2
-        numbers = [self._value_of(each) for each in given]
+        numbers = [self._value_of(argument) for argument in arguments]
         if name == "low_pass" and numbers[1] is not None and not numbers[1] > 0.0:
             raise ValueError(f"low_pass: expected a time constant above 0 s, not {numbers[1]:g}")
         if name == "limit" and None not in numbers[1:] and not numbers[1] <= numbers[2]:  # type: ignore[operator]
@@ -221,78 +272,81 @@ class _Builder:
                 f"limit: expected a lower limit below the upper one, not {numbers[1]:g} and "
                 f"{numbers[2]:g}"
             )
-        used = [self.result(each) for each in given]
+        used = [self.result(argument) for argument in arguments]
         return self.operation(code, *used, *([0] * (3 - len(used))), memory=memory)
 
 
 @compilable
 def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
-    """The formula's value at this tick. operations: of its program; registers: the program's, with
-    the inputs' values written into its first places; memory: what its blocks remember, of a mean or
-    a delay where its ring of samples stands, then the ring. Both are changed."""
+    """Return the value of a formula at one tick; registers and memory are changed.
+
+    operations: of the program; registers: of the program, with the inputs in the first places;
+    memory: of the blocks; a mean or a delay stores the position in its ring, then the ring.
+    """
     count = len(operations)
     first = len(registers) - count
     value = 0.0
     for number in range(count):
         code = operations[number, 0]
-        one = registers[operations[number, 1]]
-        two = registers[operations[number, 2]]
-        three = registers[operations[number, 3]]
-        at = operations[number, 4]
+        x = registers[operations[number, 1]]
+        y = registers[operations[number, 2]]
+        z = registers[operations[number, 3]]
+        slot = operations[number, 4]
         if code == ADD:
-            value = one + two
+            value = x + y
         elif code == SUBTRACT:
-            value = one - two
+            value = x - y
         elif code == MULTIPLY:
-            value = one * two
+            value = x * y
         elif code == DIVIDE:
-            value = one / two if two != 0.0 else 0.0
+            # A formula must not stop the loop: x/0 is 0.
+            value = x / y if y != 0.0 else 0.0
         elif code == NEGATE:
-            value = -one
+            value = -x
         elif code == ABSOLUTE:
-            value = abs(one)
+            value = abs(x)
         elif code == SIGN:
-            value = 0.0 if one == 0.0 else math.copysign(1.0, one)
+            value = 0.0 if x == 0.0 else math.copysign(1.0, x)
         elif code == SINE:
-            value = math.sin(one)
+            value = math.sin(x)
         elif code == COSINE:
-            value = math.cos(one)
+            value = math.cos(x)
         elif code == ROOT:
-            value = math.sqrt(max(one, 0.0))
+            value = math.sqrt(max(x, 0.0))
         elif code == SMALLER:
-            value = min(one, two)
+            value = min(x, y)
         elif code == LARGER:
-            value = max(one, two)
+            value = max(x, y)
         elif code == CLIP:
-            value = min(max(one, two), three)
+            value = min(max(x, y), z)
         elif code == DERIVATIVE:
-            value = 0.0 if math.isnan(memory[at]) else (one - memory[at]) / period
-            memory[at] = one
+            value = 0.0 if math.isnan(memory[slot]) else (x - memory[slot]) / period
+            memory[slot] = x
         elif code == INTEGRAL:
-            before = 0.0 if math.isnan(memory[at]) else memory[at]
-            value = before + one * period
-            memory[at] = value
+            previous = 0.0 if math.isnan(memory[slot]) else memory[slot]
+            value = previous + x * period
+            memory[slot] = value
         elif code == LOW_PASS:
-            before = one if math.isnan(memory[at]) else memory[at]
-            value = before + period / (two + period) * (one - before)
-            memory[at] = value
+            previous = x if math.isnan(memory[slot]) else memory[slot]
+            value = previous + period / (y + period) * (x - previous)
+            memory[slot] = value
         else:
-            # A ring of samples, one longer than what is remembered. Not in a function of its own:
-            # to hand on the arrays costs as much as the rest of a tick.
-            length, ring = int(two), at + 1
-            if math.isnan(memory[at]):
-                memory[at] = 0.0
-                for place in range(length + 1):
-                    memory[ring + place] = one
-            place = int(memory[at])
-            memory[ring + place] = one
-            memory[at] = place + 1 if place < length else 0
-            if code == LATE:
-                value = memory[ring + (place + 1 if place < length else 0)]
+            # Delay and mean: a ring of samples, one longer than the memory. It stays inline:
+            # passing the arrays to a function costs as much as the rest of a tick.
+            length, ring = int(y), slot + 1
+            if math.isnan(memory[slot]):
+                memory[slot] = 0.0
+                for index in range(length + 1):
+                    memory[ring + index] = x
+            index = int(memory[slot])
+            memory[ring + index] = x
+            memory[slot] = index + 1 if index < length else 0
+            if code == DELAY:
+                value = memory[ring + (index + 1 if index < length else 0)]
             else:
                 value = 0.0
                 for back in range(length):
-                    value += memory[ring + place - back + (0 if place >= back else length + 1)]
+                    value += memory[ring + index - back + (0 if index >= back else length + 1)]
                 value /= length
         registers[first + number] = value
     return value
@@ -307,6 +361,7 @@ def _replayed(
     period: float,
     out: np.ndarray,
 ) -> None:
+    """Run a formula over all ticks; `out` is written in place."""
     for tick in range(len(out)):
         for number in range(program.inputs):
             registers[number] = inputs[tick, number]

@@ -1,12 +1,13 @@
-"""Inverse model: what the actuator needs to follow, by its inverse from the desired motion's
-derivatives, and what remains by feedback of the error.
+"""Inverse model: feedforward by the actuator's inverse, and feedback of the remaining error.
 
     u = c_0 r + c_1 r' + ... + c_n r^(n) + K_p e + K_i ∫ e dt,   e = r − y
 
-c are the coefficients of the inverse 1/P(s), cut off at n. Carrion, Spencer: Model-based strategies
-for real-time hybrid testing, NSEL Report 6, University of Illinois (2007); Phillips, Spencer:
-Model-based multiactuator control for real-time hybrid simulation, J. Eng. Mech. 139 (2013) 219.
-Needs the actuator's transfer function. White noise on r is amplified by about c_n T^−n.
+c are the Taylor coefficients of the inverse 1/P(s), up to order n. Carrion, Spencer: Model-based
+strategies for real-time hybrid testing, NSEL Report 6, University of Illinois (2007); Phillips,
+Spencer: Model-based multiactuator control for real-time hybrid simulation, J. Eng. Mech. 139 (2013)
+219.
+
+The law needs the actuator's transfer function. It amplifies white noise on r by about c_n T^−n.
 """
 
 from __future__ import annotations
@@ -25,8 +26,11 @@ def inverse_model(
     proportional: float = 0.0,
     integral: float = 0.0,
 ) -> LinearLaw:
-    """The law of the inverse's coefficients, of s⁰ upwards (s^i each), the feedback's gains (1,
-    1/s) and the period, s."""
+    """Return the law of an inverse with feedback.
+
+    coefficients: of the inverse, in s^i, from s⁰ upwards; proportional, integral: gains of the
+    feedback, 1 and 1/s; period: s.
+    """
     points = len(coefficients) + 1
     weights = np.zeros(points)
     for order, coefficient in enumerate(coefficients):
@@ -37,17 +41,21 @@ def inverse_model(
 def inverse_coefficients(
     numerator: Sequence[float], denominator: Sequence[float], delay: float, order: int
 ) -> list[float]:
-    """Taylor coefficients of s⁰ to s^order of 1/P for P = e^(−delay s) numerator/denominator, both
-    from the highest power down; delay: s."""
-    below = np.zeros(order + 1)
-    above = np.zeros(order + 1)
-    for into, polynomial in ((below, numerator), (above, denominator)):
+    """Return the Taylor coefficients of 1/P, of s⁰ to s^order, in s^i.
+
+    P = e^(−delay s) numerator/denominator, both polynomials from the highest power down; delay: s.
+    """
+    divisor = np.zeros(order + 1)
+    dividend = np.zeros(order + 1)
+    for series, polynomial in ((divisor, numerator), (dividend, denominator)):
         rising = np.asarray(polynomial, dtype=float)[::-1][: order + 1]
-        into[: len(rising)] = rising
-    steps = np.cumprod([1.0, *(delay / power for power in range(1, order + 1))])
-    above = np.convolve(above, steps)[: order + 1]
-    found: list[float] = []
+        series[: len(rising)] = rising
+    # 1/P = e^(delay s) denominator/numerator; e^(θ s) = Σ θ^k s^k/k!.
+    exponential = np.cumprod([1.0, *(delay / power for power in range(1, order + 1))])
+    dividend = np.convolve(dividend, exponential)[: order + 1]
+    coefficients: list[float] = []
     for power in range(order + 1):
-        known = sum(below[power - i] * found[i] for i in range(power))
-        found.append(float((above[power] - known) / below[0]))
-    return found
+        # Long division of power series: numerator · result = denominator · e^(θ s).
+        known = sum(divisor[power - i] * coefficients[i] for i in range(power))
+        coefficients.append(float((dividend[power] - known) / divisor[0]))
+    return coefficients

@@ -1,15 +1,17 @@
-"""Kalman-filtered inverse: the command that makes the actuator follow best, from estimates of its
-state, of an offset at its input, and of the desired motion and its derivatives.
+"""Kalman-filtered inverse: the optimal command from estimates of actuator and desired motion.
+
+The estimated states are those of the actuator, an offset at its input, and the desired motion with
+its derivatives:
 
     actuator     x' = A x + B (u(t − θ) + w),   y = C x;   w a slow random walk
     desired      (d/dt + λ)^m r = white noise
     cost         Σ (C x − r)² + ρ (u − r)²
 
-One Kalman filter estimates all from r and y, one linear-quadratic regulator follows; both from
-discrete Riccati equations. Anderson, Moore: Optimal Control: Linear Quadratic Methods (1990), ch.
-8, 9. Needs the actuator as it is: what a diagnosis found of its lag and delay goes straight into A,
-B and θ. How far noise gets into the command is weighed by the filter: `sensor_noise` large against
-`offset_walk` trusts the model, small the measurement.
+A Kalman filter estimates them from r and y, and a linear-quadratic regulator computes the command.
+Both follow from discrete Riccati equations (Anderson, Moore: Optimal Control: Linear Quadratic
+Methods (1990), ch. 8, 9). The law needs the true actuator: the lag and delay of a diagnosis go
+straight into A, B and θ. The filter weighs noise: a `sensor_noise` that is large against
+`offset_walk` trusts the model, a small one the measurement.
 """
 
 from __future__ import annotations
@@ -27,8 +29,15 @@ Array = NDArray[np.float64]
 
 
 class Actuator(NamedTuple):
-    """Continuous, from command to position, unit gain within a few per cent: a (n, n), b (n,), c
-    (n,); delay: s, of the command."""
+    """Continuous model from command to position, with a gain of about 1.
+
+    Attributes
+    ----------
+    a, b, c : ndarray
+        Matrices of the state space, shapes (n, n), (n,) and (n,).
+    delay : float
+        Delay of the command, s.
+    """
 
     a: Array
     b: Array
@@ -37,11 +46,20 @@ class Actuator(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """What the filter and the regulator weigh.
+    """Weights of the filter and the regulator.
 
-    effort: ρ, 1; derivatives: m; decay: λ, 1/s; desired_noise: rms of the noise on r over that of
-    its m-th derivative, s^m; sensor_noise, offset_walk, state_noise: rms of the noise on y, of the
-    offset's steps and of disturbances of the input in a tick, m.
+    Attributes
+    ----------
+    effort : float
+        Weight ρ of the deviation of the command from the desired motion, 1.
+    derivatives : int
+        Number m of states of the desired motion.
+    decay : float
+        Decay λ of the desired motion, 1/s.
+    desired_noise : float
+        Noise of r relative to that of its m-th derivative, s^m.
+    sensor_noise, offset_walk, state_noise : float
+        Noise of y, of the offset's steps and of the input's disturbance in a tick, m rms.
     """
 
     effort: float = 1e-4
@@ -54,67 +72,75 @@ class Weights(NamedTuple):
 
 
 def first_order(lag: float, delay: float) -> Actuator:
-    """An actuator of unit gain with a lag and a delay, s, as a diagnosis gives them."""
+    """Return an actuator of unit gain with a lag and a delay, s, such as a diagnosis reports."""
     return Actuator(np.array([[-1.0 / lag]]), np.array([1.0 / lag]), np.array([1.0]), delay)
 
 
 def sampled_actuator(actuator: Actuator, period: float) -> tuple[Array, Array, Array]:
-    """A, B, C at the period, s, with the command held; commands under way are states. A delay
-    between ticks is interpolated."""
+    """Return A, B and C at a period, s, with the command held.
+
+    Delayed commands are additional states. A delay of a fraction of a tick is interpolated.
+    """
     size = len(actuator.a)
-    both = np.zeros((size + 1,) * 2)
-    both[:size, :size], both[:size, size] = actuator.a, actuator.b
-    both = expm(both * period)
+    augmented = np.zeros((size + 1,) * 2)
+    augmented[:size, :size], augmented[:size, size] = actuator.a, actuator.b
+    augmented = expm(augmented * period)
     whole = math.floor(actuator.delay / period + 1e-9)
-    part = max(actuator.delay / period - whole, 0.0)
-    length = whole + 1 if part > 1e-9 else whole
+    fraction = max(actuator.delay / period - whole, 0.0)
+    length = whole + 1 if fraction > 1e-9 else whole
     a, b, c = np.zeros((size + length,) * 2), np.zeros(size + length), np.zeros(size + length)
-    a[:size, :size], c[:size] = both[:size, :size], actuator.c
-    for share, age in ((1.0 - part, whole), (part, whole + 1)):
+    a[:size, :size], c[:size] = augmented[:size, :size], actuator.c
+    # A delay between two ticks applies both neighbouring commands, weighted linearly.
+    for share, age in ((1.0 - fraction, whole), (fraction, whole + 1)):
         if age == 0:
-            b[:size] += share * both[:size, size]
+            b[:size] += share * augmented[:size, size]
         elif age <= length:
-            a[:size, size + age - 1] += share * both[:size, size]
+            a[:size, size + age - 1] += share * augmented[:size, size]
     if length:
         b[size] = 1.0
-    for place in range(1, length):
-        a[size + place, size + place - 1] = 1.0
+    for index in range(1, length):
+        a[size + index, size + index - 1] = 1.0
     return a, b, c
 
 
 def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> LinearLaw:
-    """The law for an actuator, the period in s and what is weighed."""
+    """Return the law for an actuator, a period, s, and weights."""
     a, b, c = sampled_actuator(_balanced(actuator), period)
-    # The chain of derivatives in units of the decay-free period, or its numbers differ by T^m.
+    # Derivatives in units of 50 periods: in SI units they would differ by factors of T^m.
     order, unit = weights.derivatives, 50.0 * period
     chain = np.eye(order, k=1) - weights.decay * unit * np.eye(order)
     chain = expm(chain * period / unit)
     size, total = len(a), len(a) + 1 + order
-    offset, wanted = size, size + 1
+    offset, desired = size, size + 1
     whole = np.asarray(block_diag(a, np.eye(1), chain))
-    # The offset enters where the command enters.
+    # The offset acts at the same place as the command.
     whole[:size, offset] = b
     entry = np.append(b, np.zeros(1 + order))
-    seen = np.zeros((2, total))
-    seen[0, wanted], seen[1, :size] = 1.0, c
+    outputs = np.zeros((2, total))
+    outputs[0, desired], outputs[1, :size] = 1.0, c
     noise = np.zeros((total, total))
+    # Disturbances act at the input, where friction and valve errors act.
     noise[:size, :size] = weights.state_noise**2 * np.outer(b, b)
     noise[offset, offset] = weights.offset_walk**2
     noise[-1, -1] = 1.0
+    # The desired motion is known almost exactly; its noise only regularises the filter.
     measured = np.diag([weights.desired_noise**2, weights.sensor_noise**2])
-    spread = solve_discrete_are(whole.T, seen.T, noise, measured)
-    gain = spread @ seen.T @ np.linalg.inv(seen @ spread @ seen.T + measured)
-    cost, cross, effort = _cost(c, total, offset, wanted, weights.effort)
+    # Steady-state filter: P from the Riccati equation, L = P Hᵀ (H P Hᵀ + R)⁻¹.
+    covariance = solve_discrete_are(whole.T, outputs.T, noise, measured)
+    gain = covariance @ outputs.T @ np.linalg.inv(outputs @ covariance @ outputs.T + measured)
+    cost, cross, effort = _cost(c, total, offset, desired, weights.effort)
     regulator = _regulator(whole, entry, cost, cross, effort)
     # From the prediction x⁻: x = x⁻ + L (z − H x⁻), u = −K x, x⁻ next = A x + B u.
-    corrected = np.eye(total) - gain @ seen
+    corrected = np.eye(total) - gain @ outputs
     closed = whole - np.outer(entry, regulator)
     return LinearLaw(closed @ corrected, closed @ gain, -regulator @ corrected, -regulator @ gain)
 
 
 def _balanced(actuator: Actuator) -> Actuator:
-    """The same actuator in states of one size; companion forms differ by decades in theirs, which
-    no Riccati equation survives."""
+    """Return the same actuator in balanced states.
+
+    The states of a companion form differ by decades, which makes the Riccati equations fail.
+    """
     a, change = matrix_balance(actuator.a, permute=False)
     b = np.asarray(np.linalg.solve(change, actuator.b), dtype=np.float64)
     c = actuator.c @ change
@@ -123,22 +149,28 @@ def _balanced(actuator: Actuator) -> Actuator:
 
 
 def _cost(
-    c: Array, total: int, offset: int, wanted: int, effort: float
+    c: Array, total: int, offset: int, desired: int, effort: float
 ) -> tuple[Array, Array, float]:
-    """Of (c x − r)² + ρ (u + w − r)²: of the states, of states with command, of the command."""
+    """Return the quadratic cost of (c x − r)² + ρ (u + w − r)².
+
+    Its three parts weigh the states, the product of states and command, and the command.
+    """
     error = np.zeros(total)
-    error[: len(c)], error[wanted] = c, -1.0
-    beside = np.zeros(total)
-    beside[offset], beside[wanted] = 1.0, -1.0
-    cost = np.outer(error, error) + effort * np.outer(beside, beside)
-    return cost, effort * beside, effort
+    error[: len(c)], error[desired] = c, -1.0
+    deviation = np.zeros(total)
+    deviation[offset], deviation[desired] = 1.0, -1.0
+    cost = np.outer(error, error) + effort * np.outer(deviation, deviation)
+    return cost, effort * deviation, effort
 
 
 def _regulator(a: Array, b: Array, cost: Array, cross: Array, effort: float) -> Array:
-    """K of u = −K x. Neither offset nor desired motion can be controlled, so that they are let fade
-    a little for the Riccati equation to have its solution."""
+    """Return the gain K of u = −K x.
+
+    Offset and desired motion are uncontrollable. They fade slightly here, so that the Riccati
+    equation has a solution.
+    """
     fading = a * (1.0 - 1e-7)
-    solved = solve_discrete_are(
+    riccati = solve_discrete_are(
         fading, b[:, None], cost, np.array([[effort]]), s=cross[:, None], balanced=False
     )
-    return (b @ solved @ fading + cross) / (effort + b @ solved @ b)
+    return (b @ riccati @ fading + cross) / (effort + b @ riccati @ b)

@@ -3,8 +3,8 @@
     u = (τ s + 1)/(τ s/N + 1) r,   bilinear
 
 Zhao, French, Shield, Posbergh: Considerations for the development of real-time dynamic testing
-using servo-hydraulic actuation, Earthquake Eng. Struct. Dyn. 32 (2003) 1773. Needs the lag alone.
-High frequencies, and so noise, are amplified up to N times.
+using servo-hydraulic actuation, Earthquake Eng. Struct. Dyn. 32 (2003) 1773. The law needs the lag
+alone. It amplifies high frequencies, and noise with them, up to N times.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from controllers.linear_law import LinearLaw
 
 
 def lag_compensation(lag: float, period: float, limit: float = 20.0) -> LinearLaw:
-    """The law for a lag and a period in s. limit: N, the most that a high frequency is amplified
-    by."""
+    """Return the law for a lag and a period, s; limit: largest amplification N."""
+    # Bilinear: s → 2/T (z − 1)/(z + 1) in (τ s + 1)/(τ s/N + 1).
     rate = 2.0 / period
     lead, filter_ = lag * rate, lag / limit * rate
     ahead, behind, pole = (

@@ -1,10 +1,11 @@
-"""A linear sampled law of two inputs, what is desired and what is measured: the form that every
-delay compensator with constant coefficients takes.
+"""A linear sampled law of the desired and the measured position.
+
+Every delay compensator with constant coefficients takes this form:
 
     u[k]   = C x[k] + D (r[k], y[k])
     x[k+1] = A x[k] + B (r[k], y[k])
 
-So one tick serves all of them, and their poles, noise and margins follow from four matrices.
+One function steps all of them, and their poles, noise and margins follow from four matrices.
 """
 
 from __future__ import annotations
@@ -21,7 +22,17 @@ Array = NDArray[np.float64]
 
 
 class LinearLaw(NamedTuple):
-    """a: shape (n, n); b: (n, 2), columns desired and measured; c: (n,); d: (2,). Sampled."""
+    """Sampled law from desired and measured position to the command.
+
+    Attributes
+    ----------
+    a : ndarray
+        Transition matrix, shape (n, n).
+    b : ndarray
+        Input matrix, shape (n, 2); the columns are desired and measured.
+    c, d : ndarray
+        Output vector, shape (n,), and feedthrough, shape (2,).
+    """
 
     a: Array
     b: Array
@@ -30,22 +41,23 @@ class LinearLaw(NamedTuple):
 
 
 def pass_through() -> LinearLaw:
-    """No compensation: the command is what is desired."""
+    """Return the law without compensation: the command is the desired position."""
     return LinearLaw(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros(1), np.array([1.0, 0.0]))
 
 
 def filtered(weights: Array) -> LinearLaw:
-    """The law u[k] = Σ weights[i] r[k−i]; weights: shape (n,)."""
+    """Return the law u[k] = Σ weights[i] r[k−i]; weights: shape (n,)."""
     size = max(len(weights) - 1, 1)
     entry = np.zeros((size, 2))
     entry[0, 0] = 1.0
-    late = np.zeros(size)
-    late[: len(weights) - 1] = weights[1:]
-    return LinearLaw(np.eye(size, k=-1), entry, late, np.array([weights[0], 0.0]))
+    # The states are the last desired positions, a shift register.
+    delayed_weights = np.zeros(size)
+    delayed_weights[: len(weights) - 1] = weights[1:]
+    return LinearLaw(np.eye(size, k=-1), entry, delayed_weights, np.array([weights[0], 0.0]))
 
 
 def add_feedback(law: LinearLaw, proportional: float, integral: float, period: float) -> LinearLaw:
-    """The law and a PI of what is desired minus what is measured, added to its command.
+    """Return a law with a PI feedback of desired minus measured position added to its command.
 
     proportional: 1; integral: 1/s, summed after the tick (forward Euler); period: s.
     """
@@ -57,22 +69,22 @@ def add_feedback(law: LinearLaw, proportional: float, integral: float, period: f
 
 @compiled
 def step_linear(law: LinearLaw, state: Array, desired: float, measured: float) -> float:
-    """One tick: returns the command. state: shape (n,), advanced in place."""
+    """Return the command of one tick; state: shape (n,), advanced in place."""
     size = len(state)
     command = law.d[0] * desired + law.d[1] * measured
-    after = np.empty(size)
+    next_state = np.empty(size)
     for row in range(size):
         command += law.c[row] * state[row]
         total = law.b[row, 0] * desired + law.b[row, 1] * measured
         for column in range(size):
             total += law.a[row, column] * state[column]
-        after[row] = total
-    state[:] = after
+        next_state[row] = total
+    state[:] = next_state
     return command
 
 
 def response(law: LinearLaw, frequency: float, period: float) -> tuple[complex, complex]:
-    """From desired and from measured to the command, at a frequency in Hz; period: s."""
+    """Return the response of the command to desired and to measured position at a frequency, Hz."""
     z = np.exp(2j * np.pi * frequency * period)
     inner = np.linalg.solve(z * np.eye(len(law.a)) - law.a, law.b)
     desired, measured = law.c @ inner + law.d
@@ -80,7 +92,7 @@ def response(law: LinearLaw, frequency: float, period: float) -> tuple[complex, 
 
 
 def noise_gain(law: LinearLaw) -> tuple[float, float]:
-    """rms of the command per rms of white noise on what is desired, and on what is measured.
+    """Return the rms of the command per rms of white noise on desired and on measured position.
 
     Raises ValueError for a law that is not stable by itself, such as one that integrates.
     """
@@ -89,6 +101,7 @@ def noise_gain(law: LinearLaw) -> tuple[float, float]:
     gains = []
     for column in range(2):
         entry = law.b[:, [column]]
-        spread = solve_discrete_lyapunov(law.a, entry @ entry.T)
-        gains.append(float(np.sqrt(law.c @ spread @ law.c + law.d[column] ** 2)))
+        # Stationary covariance: P = A P Aᵀ + B Bᵀ; variance of u = C P Cᵀ + D².
+        covariance = solve_discrete_lyapunov(law.a, entry @ entry.T)
+        gains.append(float(np.sqrt(law.c @ covariance @ law.c + law.d[column] ** 2)))
     return gains[0], gains[1]

@@ -1,6 +1,6 @@
-"""Model in the loop: one tick of the whole rig controller.
+"""Model in the loop: one tick of the whole controller of the rig.
 
-A plain function of controller, state, measurements and demand.
+`update` is a plain function of controller, state, measurements and demand.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from controllers.friction import (
     Compensation,
     Errors,
     Velocities,
-    observed,
-    pushed,
-    stepped,
+    advance_motor_model,
+    observe_friction,
+    step_compensator,
 )
 from controllers.gas_spring import gas_force
 from controllers.plate import Array, Plate, at_rest, compensate, plate
@@ -33,7 +33,19 @@ from controllers.suspension import suspension_force
 
 
 class Controller(NamedTuple):
-    """Settings and what follows from them once a test. period in s."""
+    """Settings, and the models computed from them once per test.
+
+    Attributes
+    ----------
+    settings : Settings
+        Settings of the controller.
+    modes : Modes
+        Modes of the beam structure.
+    plate : Plate
+        Delay compensator of the structure plate.
+    period : float
+        Period of the ticks, s.
+    """
 
     settings: Settings
     modes: Modes
@@ -42,14 +54,14 @@ class Controller(NamedTuple):
 
 
 class State(NamedTuple):
-    """What the controller remembers from tick to tick. Positions m, velocities m/s, forces N.
+    """Memory of the controller between ticks, in m, m/s and N.
 
-    Numbers stand first, then tuples of numbers, whose lengths the defaults give; last what the
-    plate's compensator remembers, as many numbers as its law has.
+    Numbers stand first, then tuples of numbers, whose lengths the defaults give. The memory of the
+    plate's compensator stands last; its length depends on the law.
     """
 
     sample: float = math.nan
-    """The last raw travel; not a number before the first tick."""
+    """Last raw travel, m; NaN before the first tick."""
     travel: float = 0.0
     velocity: float = 0.0
     force: float = 0.0
@@ -57,7 +69,7 @@ class State(NamedTuple):
     structure_position: float = 0.0
     structure_velocity: float = 0.0
     modal: Six = AT_REST
-    """Displacements of the structure's modes, and their rates."""
+    """Displacements of the structure's modes; `modal_rates` are their rates."""
     modal_rates: Six = AT_REST
     compensation: Compensation = REST
     velocities: Velocities = NO_VELOCITIES
@@ -66,7 +78,7 @@ class State(NamedTuple):
 
 
 def _lay_out(state: State) -> dict[str, slice]:
-    """Field → where its numbers stand in a packed state."""
+    """Return the place of every field in a packed state."""
     places, first = {}, 0
     for name, value in zip(state._fields[:-1], state[:-1], strict=True):
         last = first + (len(value) if isinstance(value, tuple) else 1)
@@ -76,21 +88,23 @@ def _lay_out(state: State) -> dict[str, slice]:
 
 PLACES = _lay_out(State())
 SIZE = PLACES[State._fields[-2]].stop
-"""Numbers in a packed state, but for the plate's."""
-# Compiled code knows slices that are constants of the module, and no tables of them.
+"""Length of a packed state, without the memory of the plate."""
+# Compiled code supports slices that are constants of the module, but no dictionary of them.
 _MODAL, _RATES, _COMPENSATION = PLACES["modal"], PLACES["modal_rates"], PLACES["compensation"]
 _VELOCITIES, _ERRORS = PLACES["velocities"], PLACES["errors"]
 _NUMBERS = slice(0, _MODAL.start)
 
 
 def controller(settings: Settings, period: float) -> Controller:
-    """What `update` needs, from settings and the period of the ticks in s. Raises ValueError if
-    there is no such compensator of the plate."""
+    """Return the controller for settings and a period of the ticks, s.
+
+    Raises ValueError if the plate has no compensator with these settings.
+    """
     return Controller(settings, modes(settings, period), plate(settings, period), period)
 
 
 def initial_state(controller: Controller) -> State:
-    """The state before the first tick: the structure model at rest at `start`."""
+    """Return the state before the first tick: the structure model at rest at `start`."""
     settings = controller.settings
     return State(
         structure_position=settings.start,
@@ -101,7 +115,7 @@ def initial_state(controller: Controller) -> State:
 
 @compilable
 def packed(state: State) -> tuple[float, ...]:
-    """The state as plain numbers, but for the plate's."""
+    """Return a state as plain numbers, without the memory of the plate."""
     numbers: Any = state[_NUMBERS]
     memory = state.compensation[:] + state.velocities + state.errors
     return numbers + state.modal + state.modal_rates + memory
@@ -109,11 +123,35 @@ def packed(state: State) -> tuple[float, ...]:
 
 @compilable
 def unpacked(values: tuple[float, ...], plate: Array) -> State:
-    """The state of its plain numbers, SIZE of them, and what the plate's compensator remembers."""
+    """Return the state of `SIZE` plain numbers and of the memory of the plate's compensator."""
     numbers: Any = values[_NUMBERS]
     compensation = Compensation(*values[_COMPENSATION])
     tuples = (values[_MODAL], values[_RATES], compensation, values[_VELOCITIES], values[_ERRORS])
     return State(*(numbers + tuples + (plate,)))
+
+
+@compilable
+def _filter_measurements(
+    controller: Controller, state: State, measured: Measurements, demand: Demand
+) -> tuple[float, float, float, float]:
+    """Return the raw travel, m, and filtered travel, m, velocity, m/s, and force, N."""
+    settings, period = controller.settings, controller.period
+    sample = measured.suspension_lvdt
+    if settings.travel == Travel.GROUND:
+        sample = measured.structure_lvdt - measured.ground_lvdt
+    elif settings.travel == Travel.MODEL:
+        sample = state.structure_position - demand.ground
+    if math.isnan(state.sample):
+        # First tick: the filters start settled at the first sample.
+        return sample, sample, 0.0, measured.load_cell
+    rate = (sample - state.sample) / period
+    force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
+    if settings.travel == Travel.MODEL:
+        # The travel of the model has no noise and needs no filter.
+        return sample, sample, rate, force
+    travel = low_pass(state.travel, sample, settings.filter_position, period)
+    velocity = low_pass(state.velocity, rate, settings.filter_velocity, period)
+    return sample, travel, velocity, force
 
 
 @compilable
@@ -123,54 +161,47 @@ def update(
     measured: Measurements,
     demand: Demand,
 ) -> tuple[State, Commands]:
-    """One tick: filters, suspension model and skyhook, friction compensation, force loop, structure
-    model, delay compensation of its plate."""
-    settings, period = controller.settings, controller.period
-    sample = measured.suspension_lvdt
-    if settings.travel == Travel.GROUND:
-        sample = measured.structure_lvdt - measured.ground_lvdt
-    elif settings.travel == Travel.MODEL:
-        sample = state.structure_position - demand.ground
-    if math.isnan(state.sample):
-        travel, velocity, force = sample, 0.0, measured.load_cell
-    elif settings.travel == Travel.MODEL:
-        travel, velocity = sample, (sample - state.sample) / period
-        force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
-    else:
-        travel = low_pass(state.travel, sample, settings.filter_position, period)
-        rate = (sample - state.sample) / period
-        velocity = low_pass(state.velocity, rate, settings.filter_velocity, period)
-        force = low_pass(state.force, measured.load_cell, settings.filter_force, period)
+    """Return the state and the commands after one tick.
 
+    The order is: filters, suspension model and skyhook, structure model, delay compensation of its
+    plate, friction compensation, force loop.
+    """
+    settings, period = controller.settings, controller.period
+    sample, travel, velocity, force = _filter_measurements(controller, state, measured, demand)
     modal, modal_rates = state.modal, state.modal_rates
     memory = state.plate
+    # Imposed tests bypass the models, and with them the delay compensation.
     if settings.mode == Mode.IMPOSED:
         demanded = demand.force
         position, structure_velocity = demand.structure, 0.0
-        asked = position
+        plate_command = position
     else:
+        # The structure's velocity is that of the tick before: this tick's needs the force first.
         skyhook = skyhook_force(settings, state.structure_velocity, velocity)
         demanded = suspension_force(settings, travel, velocity) - skyhook
-        carried = force
+        body_force = force
         if settings.gas_force > 0.0:
-            # The load cell is on the motor's rod; what the real spring beside it carries follows
-            # from its travel.
+            # The load cell is on the motor's rod. The force of the real gas spring beside it
+            # follows from the travel.
             length, exponent = settings.gas_length, settings.gas_exponent
-            carried += gas_force(settings.gas_force, length, exponent, -travel)
+            body_force += gas_force(settings.gas_force, length, exponent, -travel)
         if settings.structure == Structure.BEAM:
-            modal, modal_rates = beam(controller.modes, modal, modal_rates, carried)
+            modal, modal_rates = beam(controller.modes, modal, modal_rates, body_force)
             position = centre(controller.modes, modal)
             structure_velocity = centre(controller.modes, modal_rates)
         else:
             position, structure_velocity = point_mass(
-                settings, state.structure_position, state.structure_velocity, carried, period
+                settings, state.structure_position, state.structure_velocity, body_force, period
             )
-        memory, asked = compensate(controller.plate, memory, position, measured.structure_lvdt)
+        memory, plate_command = compensate(
+            controller.plate, memory, position, measured.structure_lvdt
+        )
     compensation, velocities, errors = state.compensation, state.velocities, state.errors
     if settings.compensator == Compensator.OBSERVER:
-        compensation = observed(settings, compensation, measured.load_cell, period)
+        compensation = observe_friction(settings, compensation, measured.load_cell, period)
+    # Both compensators run before the force loop, whose output they add to.
     elif settings.compensator != Compensator.NONE:
-        compensation, velocities, errors = stepped(
+        compensation, velocities, errors = step_compensator(
             settings,
             compensation,
             velocities,
@@ -181,8 +212,8 @@ def update(
         )
     added = compensation.added
     integral, voltage = force_loop(settings, state.integral, demanded, force, added, period)
-    compensation = pushed(compensation, MOTOR_CONSTANT * voltage, period)
-    after = State(
+    compensation = advance_motor_model(compensation, MOTOR_CONSTANT * voltage, period)
+    next_state = State(
         sample=sample,
         travel=travel,
         velocity=velocity,
@@ -197,4 +228,4 @@ def update(
         errors=errors,
         plate=memory,
     )
-    return after, Commands(demand.ground, asked, demanded, voltage)
+    return next_state, Commands(demand.ground, plate_command, demanded, voltage)

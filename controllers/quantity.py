@@ -1,4 +1,4 @@
-"""A physical value's unit, bounds and source, written once beside the field that holds it."""
+"""Unit, bounds and source of a physical value, written once in the type of its field."""
 
 from __future__ import annotations
 
@@ -9,10 +9,16 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a number means: `Annotated[float, Quantity("kg", 1, 1e4, "§6.1")] = 34.0`.
+    """Meaning of a number: `Annotated[float, Quantity("kg", 1, 1e4, "§6.1")] = 34.0`.
 
-    unit: SI unit as text. low, high: inclusive bounds in that unit. source: where the nominal value
-    comes from.
+    Attributes
+    ----------
+    unit : str
+        SI unit.
+    low, high : float
+        Inclusive bounds in that unit.
+    source : str
+        Source of the nominal value.
     """
 
     unit: str
@@ -22,21 +28,21 @@ class Quantity:
 
 
 class Choice(IntEnum):
-    """Base of the named alternatives of a setting; an integer to compiled code, a label to
-    people."""
+    """Base of a setting's alternatives: an integer in compiled code, a label in files."""
 
     @property
     def label(self) -> str:
-        """The name as it stands in configurations and recordings, e.g. `semi-active`."""
+        """Name in configurations and recordings, such as `semi-active`."""
         return self.name.lower().replace("_", "-")
 
     @classmethod
     def labels(cls) -> tuple[str, ...]:
+        """Return the labels of all members."""
         return tuple(member.label for member in cls)
 
     @classmethod
     def parse(cls, text: str) -> Any:
-        """The member of that label. Raises ValueError where there is none."""
+        """Return the member with a label. Raises ValueError, listing the labels, otherwise."""
         for member in cls:
             if member.label == text:
                 return member
@@ -44,11 +50,13 @@ class Choice(IntEnum):
 
 
 def fields(group: type) -> dict[str, Quantity | type[Choice]]:
-    """Name → Quantity or Choice of every leaf field of a NamedTuple class, in order."""
-    found: dict[str, Quantity | type[Choice]] = {}
+    """Return the Quantity or Choice of every leaf field of a NamedTuple class, by name."""
+    meanings: dict[str, Quantity | type[Choice]] = {}
     for name, hint in get_type_hints(group, include_extras=True).items():
         if get_origin(hint) is Annotated:
-            found[name] = next(extra for extra in get_args(hint)[1:] if isinstance(extra, Quantity))
+            meanings[name] = next(
+                extra for extra in get_args(hint)[1:] if isinstance(extra, Quantity)
+            )
         elif isinstance(hint, type) and issubclass(hint, Choice):
-            found[name] = hint
-    return found
+            meanings[name] = hint
+    return meanings

@@ -1,5 +1,7 @@
-"""What the controller is told to do. The fields and labels are those of `config.controller` in a
-recording."""
+"""Settings of the controller.
+
+Fields and labels are those of `config.controller` in a recording.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +16,22 @@ _BEAM = "thesis Table 7.4"
 
 
 class Mode(Choice):
-    """`mil`: suspension and structure models close the loop; `imposed`: force and motions are
-    demanded from outside."""
+    """Mode of a test.
+
+    In `mil` the models of suspension and structure close the loop. In `imposed` force and motions
+    follow given signals.
+    """
 
     MIL = 0
     IMPOSED = 1
 
 
 class Travel(Choice):
-    """What the suspension model's travel is of: plate against wheel, plate against ground (single
-    mass tests, thesis §3.6), or the structure model against the demanded ground, so that no sensor
-    is in it (thesis Fig. 4.1)."""
+    """Travel of the suspension model.
+
+    `wheel` is plate minus wheel. `ground` is plate minus ground, for single-mass tests (thesis
+    §3.6). `model` is structure model minus demanded ground, without any sensor (thesis Fig. 4.1).
+    """
 
     WHEEL = 0
     GROUND = 1
@@ -32,15 +39,18 @@ class Travel(Choice):
 
 
 class Structure(Choice):
-    """The structure model: a point mass, or the cross of elastic beams (thesis §7.2)."""
+    """Structure model: a point mass, or the cross of elastic beams (thesis §7.2)."""
 
     POINT = 0
     BEAM = 1
 
 
 class Compensator(Choice):
-    """The friction compensator: none; the thesis' own with one or two steps (§4.5, §4.6), and the
-    partial ones that it is compared with (Table 4.1); or an observer of the friction force."""
+    """Friction compensator of the motor.
+
+    The thesis has one or two steps (§4.5, §4.6), and two partial forms for comparison (Table 4.1).
+    `observer` estimates the friction force.
+    """
 
     NONE = 0
     ONE_STEP = 1
@@ -51,9 +61,11 @@ class Compensator(Choice):
 
 
 class PlateCompensator(Choice):
-    """The delay compensator between the structure model and its cylinder, made of what it is told
-    of the cylinder, the settings plate_b2 to plate_delay (docs/compensation.md). Imposed tests
-    have none."""
+    """Delay compensator between the structure model and its cylinder (docs/compensation.md).
+
+    It is designed from the cylinder model in the settings plate_b2 to plate_delay. Imposed tests
+    run without it.
+    """
 
     NONE = 0
     FORWARD_PREDICTION = 1
@@ -62,7 +74,7 @@ class PlateCompensator(Choice):
 
 
 class Skyhook(Choice):
-    """The skyhook law (thesis §7.1)."""
+    """Skyhook law (thesis §7.1)."""
 
     NONE = 0
     ACTIVE = 1
@@ -70,7 +82,10 @@ class Skyhook(Choice):
 
 
 class Settings(NamedTuple):
-    """Controller settings; nominal is the quarter car of thesis Table 6.2 and 7.1."""
+    """Settings of the controller, with unit, bounds and source in the types.
+
+    The defaults are the quarter car of thesis Tables 6.2 and 7.1.
+    """
 
     mode: Mode = Mode.MIL
     travel: Travel = Travel.WHEEL

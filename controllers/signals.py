@@ -1,5 +1,7 @@
-"""What goes into and out of the controller at each tick. Field names are the channel names of a
-recording."""
+"""Inputs and outputs of the controller at every tick.
+
+The names of the fields are the channel names of a recording.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,7 @@ from typing import NamedTuple
 
 
 class Measurements(NamedTuple):
-    """`/sensor`: raw samples. Positions in m; force in N, positive in compression."""
+    """Raw samples, topic `/sensor`: positions, m, and force, N, positive in compression."""
 
     ground_lvdt: float
     structure_lvdt: float
@@ -16,8 +18,10 @@ class Measurements(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What the test asks for: ground motion (m) always; structure motion (m) and force (N) in
-    imposed tests only."""
+    """Demands of the test: ground motion, m, structure motion, m, and force, N.
+
+    Structure motion and force count in imposed tests only.
+    """
 
     ground: float
     structure: float
@@ -25,8 +29,7 @@ class Demand(NamedTuple):
 
 
 class Commands(NamedTuple):
-    """`/command`: cylinder positions (m), suspension force demanded (N), motor amplifier voltage
-    (V)."""
+    """Commands, topic `/command`: cylinder positions, m, demanded force, N, motor voltage, V."""
 
     ground: float
     structure: float

@@ -1,5 +1,4 @@
-"""Skyhook damping (thesis §7.1): none, an ideal active force, or a semi-active damper that can only
-dissipate."""
+"""Skyhook damping (thesis §7.1): none, an ideal active force, or a dissipative damper."""
 
 from __future__ import annotations
 
@@ -11,8 +10,11 @@ from controllers.settings import Settings, Skyhook
 def semi_active_damping(
     settings: Settings, sprung_velocity: float, travel_velocity: float
 ) -> float:
-    """Damping coefficient in Ns/m: b_sky·v_s/v within [b_min, b_max] while v_s·v > 0, else
-    b_min."""
+    """Return the coefficient of the semi-active damper, Ns/m.
+
+    It is b_sky·v_s/v within [b_min, b_max] while v_s·v > 0, else b_min: a damper cannot push.
+    Velocities of the body, v_s, and of the travel, v, are in m/s.
+    """
     if sprung_velocity * travel_velocity <= 0.0:
         return settings.damping_min
     wanted = settings.skyhook_damping * sprung_velocity / travel_velocity
@@ -21,7 +23,7 @@ def semi_active_damping(
 
 @compilable
 def skyhook_force(settings: Settings, sprung_velocity: float, travel_velocity: float) -> float:
-    """Force in N to be subtracted from the suspension force. Velocities in m/s."""
+    """Return the force to subtract from the suspension force, N; velocities: m/s."""
     if settings.skyhook == Skyhook.ACTIVE:
         return settings.skyhook_damping * sprung_velocity
     if settings.skyhook == Skyhook.SEMI_ACTIVE:

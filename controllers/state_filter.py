@@ -1,4 +1,4 @@
-"""A filter whose states are a signal and its derivatives: (ω/(s + ω))^n of the signal, sampled."""
+"""Sampled filter (ω/(s + ω))^n whose states are the filtered signal and its derivatives."""
 
 from __future__ import annotations
 
@@ -15,8 +15,15 @@ Array = NDArray[np.float64]
 
 
 class StateFilter(NamedTuple):
-    """a: (n, n), b: (n,), sampled; the states are the derivatives of order 0 to n−1, each divided
-    by corner^order. corner: rad/s."""
+    """Sampled filter; its states are the derivatives 0 to n − 1, divided by corner^order.
+
+    Attributes
+    ----------
+    a, b : ndarray
+        Transition matrix, shape (n, n), and input vector, shape (n,).
+    corner : float
+        Corner frequency, rad/s.
+    """
 
     a: Array
     b: Array
@@ -24,28 +31,29 @@ class StateFilter(NamedTuple):
 
 
 def state_filter(order: int, corner: float, period: float) -> StateFilter:
-    """Of n = order states; corner: Hz, period: s."""
+    """Return a filter with n = order states; corner: Hz, period: s."""
+    # (1 + s/ω)^n y = u in controllable form; the binomials are its coefficients.
     omega = 2.0 * math.pi * corner
-    both = np.zeros((order + 1,) * 2)
-    both[: order - 1, 1:order] = np.eye(order - 1)
-    both[order - 1, :order] = [-float(math.comb(order, power)) for power in range(order)]
-    both[order - 1, order] = 1.0
-    both = np.asarray(expm(both * omega * period), dtype=np.float64)
+    augmented = np.zeros((order + 1,) * 2)
+    augmented[: order - 1, 1:order] = np.eye(order - 1)
+    augmented[order - 1, :order] = [-float(math.comb(order, power)) for power in range(order)]
+    augmented[order - 1, order] = 1.0
+    augmented = np.asarray(expm(augmented * omega * period), dtype=np.float64)
     return StateFilter(
-        np.ascontiguousarray(both[:order, :order]),
-        np.ascontiguousarray(both[:order, order]),
+        np.ascontiguousarray(augmented[:order, :order]),
+        np.ascontiguousarray(augmented[:order, order]),
         omega,
     )
 
 
 @compilable
-def step_filter(one: StateFilter, state: Array, held: float) -> None:
-    """Advances a state (n,) in place by one period of a held input."""
+def step_filter(motion_filter: StateFilter, state: Array, held: float) -> None:
+    """Advance a state, shape (n,), in place by one period of a held input."""
     size = len(state)
-    after = np.empty(size)
+    next_state = np.empty(size)
     for row in range(size):
-        total = one.b[row] * held
+        total = motion_filter.b[row] * held
         for column in range(size):
-            total += one.a[row, column] * state[column]
-        after[row] = total
-    state[:] = after
+            total += motion_filter.a[row, column] * state[column]
+        next_state[row] = total
+    state[:] = next_state

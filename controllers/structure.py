@@ -10,7 +10,9 @@ from controllers.settings import Settings
 def point_mass(
     settings: Settings, position: float, velocity: float, force: float, period: float
 ) -> tuple[float, float]:
-    """One semi-implicit Euler step; position m, velocity m/s, force N. Returns (position,
-    velocity); thesis §3.3."""
+    """Return position, m, and velocity, m/s, of the body after a tick: m v̇ = F − m g (thesis §3.3).
+
+    force: of the suspension, N; period: s. Semi-implicit Euler: the velocity first.
+    """
     velocity = velocity + (force / settings.sprung_mass - settings.gravity) * period
     return position + velocity * period, velocity

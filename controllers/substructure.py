@@ -1,5 +1,7 @@
-"""The rig's controller with a structure whose model is elsewhere: an object in Python, a compiled
-function, or another program behind a socket."""
+"""The rig's controller with an external structure model.
+
+The model is a Python object, a compiled function, or another program behind a socket.
+"""
 
 from __future__ import annotations
 
@@ -14,27 +16,28 @@ from controllers.signals import Commands, Demand, Measurements
 
 
 class Model(Protocol):
-    """A structure: where its plate is at the next tick."""
+    """Structure model that returns the position of its plate at the next tick."""
 
     def advance(self, force: float, period: float) -> float:
-        """Its position, m. force: that the suspension carries it with, N; period: s."""
+        """Return the position of the plate, m; force: of the suspension on it, N; period: s."""
         ...
 
 
 class Substructured:
-    """One test's controller; a new one is needed for every test. The suspension is the rig's own,
-    in `settings`; of the structure only its start.
+    """Controller of one test; every test needs a new one.
+
+    The suspension is that of `settings`. Of the structure in `settings` only the start is used.
 
     Parameters
     ----------
-    settings
-        Of the test.
-    period
-        s, of a tick.
-    model
-        The structure, or its `advance` alone.
-    law
-        A delay compensator of the plate, in place of the one that the settings ask for.
+    settings : Settings
+        Settings of the test.
+    period : float
+        Period of a tick, s.
+    model : Model or callable
+        Structure model, or its `advance` alone.
+    law : LinearLaw, optional
+        Delay compensator of the plate. Defaults to the one of the settings.
     """
 
     def __init__(
@@ -44,7 +47,7 @@ class Substructured:
         model: Model | Callable[[float, float], float],
         law: LinearLaw | None = None,
     ) -> None:
-        # The settings' own structure runs along unused, so its plate needs no compensation.
+        # The structure of the settings is simulated but unused: its plate needs no compensation.
         plain = settings._replace(plate_compensator=PlateCompensator.NONE)
         self._controller = controller(plain, period)
         self._plate = plate(settings, period) if law is None else compensation(law, period)
@@ -53,10 +56,10 @@ class Substructured:
         self._period, self._memory = period, at_rest(self._plate)
 
     def tick(self, measured: Measurements, demand: Demand) -> Commands:
-        """The commands of one tick, the plate's where the model has it."""
+        """Return the commands of one tick, with the plate at the position of the model."""
         self._state, commands = update(self._controller, self._state, measured, demand)
         position = float(self._advance(self._state.force, self._period))
-        self._memory, asked = compensate(
+        self._memory, plate_command = compensate(
             self._plate, self._memory, position, measured.structure_lvdt
         )
-        return commands._replace(structure=float(asked))
+        return commands._replace(structure=float(plate_command))

@@ -8,8 +8,10 @@ from controllers.settings import Settings
 
 @compilable
 def suspension_force(settings: Settings, travel: float, velocity: float) -> float:
-    """preload − k_s·travel − b_s·velocity, of the filtered travel (m) and its rate (m/s); thesis
-    §3.3."""
+    """Return the suspension force F = F_0 − k_s x − b_s ẋ, N (thesis §3.3).
+
+    travel, velocity: filtered travel x, m, and its rate, m/s; F_0 is the preload.
+    """
     return (
         settings.preload
         - settings.suspension_stiffness * travel

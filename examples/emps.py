@@ -1,10 +1,9 @@
-"""EMPS, a real machine: what the diagnosis finds beside what a plain least-squares fit finds, on
-the same split.
+"""EMPS, a real machine: the diagnosis compared with a plain least-squares fit on the same data.
 
     python examples/emps.py emps.mcap pulses.mcap
 
-Both are fitted to the first recording and judged on the second by one measure: the rms of the
-measured drive force less what the machine's closed loop predicts from the demanded position.
+Both are fitted to the first recording and validated on the second. The measure is the rms of the
+measured drive force minus the force that the closed loop predicts from the demanded position.
 docs/tutorial.md says where the data are and how to import them.
 """
 
@@ -18,26 +17,32 @@ from scipy.signal import butter, sosfiltfilt
 import rigtwin
 
 BAND = 40.0
-"""Hz; of the position, before it is differentiated."""
+"""Cut-off frequency of the position before its differentiation, Hz."""
 SLOWEST = 0.002
-"""m/s; below it the sign of the speed is not sure."""
+"""Lowest speed used, m/s. Below it the sign of the speed is uncertain."""
 
 
 def least_squares(recording: rigtwin.Recording) -> dict[str, float]:
-    """Mass, viscous and Coulomb friction and a constant force, by linear regression of the drive
-    force on the measured motion."""
+    """Return mass, viscous and Coulomb friction and a constant force by linear regression.
+
+    F = m a + F_v v + F_c sign(v) + F_0, fitted to the measured motion and drive force.
+    """
     band = butter(4, 2.0 * BAND * recording.period, output="sos")
     position = sosfiltfilt(band, recording["/sensor.position"])
     speed = np.gradient(position, recording.period)
     acceleration = np.gradient(speed, recording.period)
+    # The force passes the same filter, so both sides have the same bandwidth.
     force = sosfiltfilt(band, recording["/command.force"])
     columns = np.stack([acceleration, speed, np.sign(speed), np.ones_like(speed)], axis=1)
     moving = np.abs(speed) > SLOWEST
-    found = np.linalg.lstsq(columns[moving], force[moving], rcond=None)[0]
-    return dict(zip(("mass", "viscous", "coulomb", "offset"), map(float, found), strict=True))
+    coefficients = np.linalg.lstsq(columns[moving], force[moving], rcond=None)[0]
+    return dict(
+        zip(("mass", "viscous", "coulomb", "offset"), map(float, coefficients), strict=True)
+    )
 
 
 def main() -> None:
+    """Print the residual of the force after each correction."""
     fitted, held_out = (rigtwin.load(name) for name in sys.argv[1:3])
     plain = least_squares(fitted)
     print("least squares: " + ", ".join(f"{name} {value:.4g}" for name, value in plain.items()))

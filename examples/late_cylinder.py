@@ -1,6 +1,7 @@
-"""From a test that trips to one that runs: a structure cylinder is late by what nobody knew, and
-the compensator of its delay is told too little. The diagnosis of the test that tripped says so, and
-the corrected twin tells the compensator.
+"""From a test that trips to one that runs.
+
+The structure cylinder has an unknown delay, so its compensator compensates too little and the test
+trips. The diagnosis of that test finds the delay, and the corrected twin sets the compensator.
 
     python examples/late_cylinder.py [--video FOLDER]
 
@@ -19,35 +20,36 @@ from experiments.vehicles import VEHICLES
 
 TEST, VEHICLE = "motorcycle-road10-compensated", VEHICLES["motorcycle"]
 ON_STIFFER_SPRINGS = {"controller": {"suspension_stiffness": 20e3, "suspension_damping": 100.0}}
-LATE = {"delay@structure_cylinder": 8e-3}
-"""s; neither the compensator nor the diagnosis is told."""
+HIDDEN_DELAY = {"delay@structure_cylinder": 8e-3}
+"""True delay of the cylinder, s. Neither compensator nor diagnosis gets it."""
 
 
 def run(effects: Mapping[str, float], corrected: Sequence[str | Path] = ()) -> rigtwin.Recording:
-    """The motorcycle on a road. effects: of the rig; corrected: files of settings."""
+    """Run the motorcycle on a road; effects: of the rig, corrected: files of settings."""
     settings = [*corrected, ON_STIFFER_SPRINGS]
     return rigtwin.run("suspension-rig", TEST, seed=1, settings=settings, effects=effects)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Prints what becomes of each step."""
+    """Print the outcome of every step."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--video", type=Path, metavar="FOLDER", help="films of both tests")
     parsed = parser.parse_args(arguments)
 
     twin = run({})
     print(f"on the nominal twin: {twin.end}, {twin.time[-1]:.1f} s")
-    first = run(LATE)
+    first = run(HIDDEN_DELAY)
     print(f"on the rig: {first.end}, {first.time[-1]:.1f} s")
 
     wheel = {
         "tyre": {"stiffness": VEHICLE.tyre_stiffness, "damping": 0.0},
         "carriage": {"mass": VEHICLE.unsprung_mass},
     }
+    # Wheel and tyre of the emulated vehicle are real on this rig, so the diagnosis gets them.
     answer = rigtwin.diagnose(first, settings=wheel)
     print(answer.sentence)
     with tempfile.TemporaryDirectory() as folder:
-        second = run(LATE, [answer.save_twin(Path(folder) / "found.toml")])
+        second = run(HIDDEN_DELAY, [answer.save_twin(Path(folder) / "found.toml")])
     print(f"with the compensator of the corrected twin: {second.end}, {second.time[-1]:.1f} s")
     if parsed.video:
         parsed.video.mkdir(parents=True, exist_ok=True)

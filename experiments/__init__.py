@@ -1,4 +1,4 @@
-"""The experiments of the rig, by name. One module a study."""
+"""The named experiments of the suspension rig, one module for each study."""
 
 from experiments import imposed, quarter_car, single_mass, vehicles
 from rigtwin.errors import RigtwinError
@@ -12,7 +12,10 @@ EXPERIMENTS: dict[str, Experiment] = {
 
 
 def find(name: str) -> Experiment:
-    """The experiment of that name. Raises RigtwinError listing what there is."""
+    """Return the experiment of a name.
+
+    Raises RigtwinError, listing the names that exist, for an unknown name.
+    """
     try:
         return EXPERIMENTS[name]
     except KeyError:

@@ -1,4 +1,4 @@
-"""An experiment by its name as an environment to learn in."""
+"""A named experiment as a reinforcement-learning environment."""
 
 from __future__ import annotations
 
@@ -13,24 +13,26 @@ def environment(
     reward: Reward = Reward(),  # noqa: B008
     interval: int = INTERVAL,
 ) -> Environment:
-    """An experiment as a dm_env environment.
+    """Return a dm_env environment that runs a named experiment.
 
     Parameters
     ----------
-    experiment
-        One of `rigtwin list`.
-    seed, actions, reward, interval
-        As `rigtwin.studies.environment.Environment` has them.
+    experiment : str
+        Name of the experiment, as `rigtwin list` prints it.
+    seed : int
+        Seed of the first episode's excitation and sensor noise. Defaults to 0.
+    actions, reward, interval
+        Arguments of `rigtwin.studies.environment.Environment`.
 
     Returns
     -------
     Environment
-        Before its first episode.
+        Environment before its first episode.
 
     Raises
     ------
     RigtwinError
-        For an experiment that there is not, or figures that make no sense.
+        If the experiment does not exist or an argument is out of range.
     """
-    found = find(experiment)
-    return Environment(found.configuration, found.demands, seed, actions, reward, interval)
+    chosen = find(experiment)
+    return Environment(chosen.configuration, chosen.demands, seed, actions, reward, interval)

@@ -1,5 +1,7 @@
-"""Imposed tests: force and both motions follow multisines, so the rig cannot run away and
-everything is excited."""
+"""Imposed tests: the force and both plate motions follow multisines.
+
+No model closes the loop, so the rig cannot diverge, and every component is excited.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +15,17 @@ from rigtwin.signals.excitation import multisine
 from rigtwin.simulation.experiment import Experiment
 
 FORCE_MEAN = 230.0
-"""N; keeps the tyre pressed while the force swings."""
+"""Mean force, N. It keeps the tyre pressed to the ground while the force swings."""
 
 
 def multisines(configuration: Configuration, seed: int) -> Array:
-    """Ground and structure ∝ 1/f over 0.2–10 Hz, 5 and 9 mm rms; force ∝ 1/√f over 0.3–30 Hz, 35 N
-    rms about its mean."""
+    """Return the demands of the test `imposed`, shape (ticks, 3): ground m, structure m, force N.
+
+    Ground and structure have amplitudes ∝ 1/f over 0.2 to 10 Hz, with 5 and 9 mm rms. The force
+    has amplitudes ∝ 1/√f over 0.3 to 30 Hz, with 35 N rms about its mean.
+    """
+    # Displacements ∝ 1/f have the same speed at every frequency, so the high frequencies alone do
+    # not use up the cylinders' speed limit.
     time, random = time_of(configuration), random_of(seed)
     ground = multisine(time, 0.2, 10.0, 0.1, 1.0, 0.005, random)
     structure = configuration.controller.start + multisine(time, 0.2, 10.0, 0.1, 1.0, 0.009, random)
@@ -27,11 +34,16 @@ def multisines(configuration: Configuration, seed: int) -> Array:
 
 
 def fast_multisines(configuration: Configuration, seed: int) -> Array:
-    """Slow motions as in the imposed test at half its size, and force over 0.5–120 Hz, flat above
-    20 Hz: 50 N rms."""
+    """Return the demands of the test `imposed-fast`, shape (ticks, 3): ground m, structure m, N.
+
+    The motions are about half as large as in `imposed`. The force extends over 0.5 to 120 Hz,
+    flat above 20 Hz, with 50 N rms.
+    """
     time, random = time_of(configuration), random_of(seed)
     ground = multisine(time, 0.2, 10.0, 0.1, 0.5, 0.0025, random)
     structure = configuration.controller.start + multisine(time, 0.2, 20.0, 0.1, 0.5, 0.004, random)
+    # A delay and a lag of equal low-frequency phase differ only well above the loop's bandwidth,
+    # so the force is flat up to 120 Hz. The two bands add in power: √(20² + 45²) ≈ 50 N rms.
     force = (
         FORCE_MEAN
         + multisine(time, 0.5, 20.0, 0.1, 0.5, 20.0, random)

@@ -1,5 +1,7 @@
-"""Chapter 6 and 7: the quarter car of Tables 6.2 and 7.1, dropped and driven over roads; passive,
-semi-active, active."""
+"""Quarter-car experiments of thesis chapters 6 and 7 (Tables 6.2 and 7.1).
+
+The quarter car is dropped and driven over roads, with a passive, semi-active or active suspension.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +16,8 @@ PASSIVE = Settings()
 SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
 ACTIVE = Settings(skyhook=Skyhook.ACTIVE, skyhook_damping=200.0)
 
+# Roads of §6.3.2, §6.3.3 and §7.1: the speed, m/s, and the band at that speed, Hz. A road of
+# spectral lines `spacing` apart repeats after 1/spacing, in s.
 ROAD_1_6 = Road(speed=25 / 3.6, lowest=0.02, highest=1.6, spacing=0.02)
 ROAD_10 = Road(speed=15 / 3.6, lowest=0.01, highest=10.0, spacing=0.01)
 ROAD_CHAPTER_7 = Road(speed=25 / 3.6, lowest=0.2, highest=1.6, spacing=0.2)
@@ -21,8 +25,10 @@ ROAD_CHAPTER_7 = Road(speed=25 / 3.6, lowest=0.2, highest=1.6, spacing=0.2)
 _LONG = Timing(duration=45.0)
 
 GAS = GasSpring(force=120.0, length=0.5, exponent=1.2)
-"""Beside the motor, which plays the damper and a soft spring; stiffer ones are unstable with the
-rig's delays."""
+"""Gas spring beside the motor, which emulates the damper and a soft spring.
+
+A stiffer gas spring is unstable with the rig's delays.
+"""
 ON_GAS = Settings(
     start=-220.0 / 50_000.0,
     preload=100.0,

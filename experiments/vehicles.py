@@ -1,6 +1,9 @@
-"""The vehicles of thesis Table 6.1, dropped and on a road, plain and with the plate's delay
-compensated. Plain, all are unstable with the rig's delays (thesis §6.2); the heavy ones exceed the
-motor's force at once and trip either way."""
+"""The vehicles of thesis Table 6.1, dropped and on a road.
+
+Each test exists plain and with the delay of the plate compensated. Without compensation all
+vehicles are unstable with the rig's delays (thesis §6.2). The heavy ones exceed the motor's force
+at once, and trip with or without compensation.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +23,23 @@ from rigtwin.studies.stability.tested import rig_as, set_for_compensation
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 TABLE_6_2 = "quarter-car"
-"""The name of the vehicle of thesis Table 6.2."""
+"""Name of the vehicle of thesis Table 6.2."""
 
 
 class Vehicle(NamedTuple):
-    """A quarter car: tyre stiffness N/m, unsprung mass kg, suspension stiffness N/m and damping
-    Ns/m, sprung mass kg."""
+    """Quarter car of thesis Table 6.1.
+
+    Attributes
+    ----------
+    tyre_stiffness : float
+        Stiffness of the tyre, N/m. The table gives no tyre damping.
+    unsprung_mass : float
+        Mass of wheel and axle, kg.
+    suspension_stiffness, suspension_damping : float
+        Stiffness, N/m, and damping, Ns/m, of the suspension.
+    sprung_mass : float
+        Mass of the body, kg.
+    """
 
     tyre_stiffness: float
     unsprung_mass: float
@@ -40,21 +54,23 @@ VEHICLES = {
     "car": Vehicle(250_000.0, 400.0, 20_000.0, 1300.0, 400.0),
     "motorcycle": Vehicle(180_000.0, 25.0, 7600.0, 750.0, 72.5),
 }
-"""Thesis Table 6.1."""
+"""Vehicles of thesis Table 6.1 by name."""
 
 
 def configuration(vehicle: Vehicle) -> Configuration:
-    """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so
-    that the body drops."""
+    """Return the configuration of the rig that emulates a vehicle.
+
+    At the start the spring carries 90 % of the static load, so the body drops.
+    """
     return rig_as(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
 
 
 COMPENSATED = "-compensated"
-"""Ends the name of a test whose plate's delay is compensated."""
+"""Suffix of the name of a test in which the delay of the plate is compensated."""
 
 
 def _tests() -> Iterator[Experiment]:
-    """Every vehicle dropped and on a road, then those of Table 6.2."""
+    """Yield the uncompensated tests: every vehicle of Table 6.1, then that of Table 6.2."""
     for name, vehicle in VEHICLES.items():
         dropped = configuration(vehicle)
         yield Experiment(
@@ -77,6 +93,7 @@ def _tests() -> Iterator[Experiment]:
 
 
 def _compensated(plain: Experiment) -> Experiment:
+    """Return a test with the delay of the plate compensated."""
     summary = plain.summary.removesuffix(": unstable on this rig")
     return replace(
         plain,
@@ -86,6 +103,7 @@ def _compensated(plain: Experiment) -> Experiment:
     )
 
 
+# The tests of Table 6.2 stand in `quarter_car` already; only their compensated forms are added.
 EXPERIMENTS = tuple(
     test
     for plain in _tests()
@@ -95,20 +113,25 @@ EXPERIMENTS = tuple(
 
 
 def find_vehicle(name: str) -> QuarterCar:
-    """A vehicle as a linear quarter car.
+    """Return a vehicle as a linear quarter car.
 
     Parameters
     ----------
-    name
-        Of thesis Table 6.1, or `quarter-car` for that of Table 6.2.
+    name : str
+        Name of a vehicle of thesis Table 6.1, or `quarter-car` for the one of Table 6.2.
+
+    Returns
+    -------
+    QuarterCar
+        Linear quarter car. The vehicles of Table 6.1 have no tyre damping.
 
     Raises
     ------
     RigtwinError
-        With what there is.
+        If no vehicle has this name. The message lists the names.
     """
     tyre, settings = Tyre(), Settings()
-    found = {
+    cars = {
         TABLE_6_2: QuarterCar(
             tyre.stiffness,
             tyre.damping,
@@ -118,8 +141,8 @@ def find_vehicle(name: str) -> QuarterCar:
             settings.sprung_mass,
         )
     }
-    for each, vehicle in VEHICLES.items():
-        found[each] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
-    if name not in found:
-        raise RigtwinError(f"unknown vehicle {name!r}; there are {', '.join(found)}")
-    return found[name]
+    for vehicle_name, vehicle in VEHICLES.items():
+        cars[vehicle_name] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
+    if name not in cars:
+        raise RigtwinError(f"unknown vehicle {name!r}; there are {', '.join(cars)}")
+    return cars[name]

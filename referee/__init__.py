@@ -1,2 +1,5 @@
-"""The withheld-effect check: a referee's rig of its own, a diagnosis that sees files alone, and the
-score of both."""
+"""The withheld-effect check.
+
+A referee with an independent rig withholds defects, a diagnosis sees the recordings alone, and
+its answers are scored.
+"""

@@ -1,5 +1,4 @@
-"""How the diagnosis does on arms whose defects are withheld from it, scored by what a person would
-accept."""
+"""The check on arms with withheld defects, scored by a table of acceptable answers."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from referee.withheld import Question, Withheld, check_machines, score_lines, se
 from rigtwin.studies.sweep import Workers
 
 FLAGGED = ("unknown", "partly explained")
-"""Verdicts that say that something has no name."""
+"""Verdicts that report an effect without a name."""
 
 ArmResult = Withheld[ArmCase]
 
@@ -29,33 +28,34 @@ def check_arms(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> ArmResult:
-    """The whole check, its answers kept in a folder; see `check_machines`."""
+    """Run the whole check with its answers stored in a folder; see `check_machines`."""
 
     def ask(case: ArmCase) -> Question:
         tests = [record_arm(case, again) for again in (0, 1)]
-        return MACHINES[case.machine], [WildData(each.columns, each.period, {}) for each in tests]
+        return MACHINES[case.machine], [WildData(test.columns, test.period, {}) for test in tests]
 
     cases = [draw_arm(number, seed) for number in range(count)]
     return check_machines(folder / f"arm-{seed}.sqlite", cases, seed, ask, workers, progress)
 
 
 def _accept_all(case: ArmCase) -> frozenset[str]:
+    """Return the acceptable names of all defects of a case."""
     return frozenset(name for defect in case.defects for name in case.accept(defect))
 
 
 def is_right(case: ArmCase, answer: dict[str, Any]) -> bool:
-    """Whether every defect is named, and nothing else."""
-    said = set(names(answer))
-    return all(case.accept(each) & said for each in case.defects) and not said - _accept_all(case)
+    """Return whether every defect is named, and nothing else."""
+    named = set(names(answer))
+    return all(case.accept(each) & named for each in case.defects) and not named - _accept_all(case)
 
 
 def is_wrong(case: ArmCase, answer: dict[str, Any]) -> bool:
-    """Whether something is named that a person would not accept."""
+    """Return whether a name is not acceptable."""
     return bool(set(names(answer)) - _accept_all(case))
 
 
 def _weigh_payloads(result: ArmResult) -> Iterator[float]:
-    """Relative errors of the masses of all payloads that were named."""
+    """Yield the relative mass errors of all named payloads."""
     for case, answer in zip(result.cases, result.answers, strict=True):
         if case.sort == "single" and case.defects[0][0] == "payload":
             (mass,) = record_arm(case).magnitudes
@@ -65,30 +65,39 @@ def _weigh_payloads(result: ArmResult) -> Iterator[float]:
 
 
 def arm_rows(result: ArmResult) -> list[Row]:
-    """Every measure."""
+    """Return every measure of the score."""
     pairs = list(zip(result.cases, result.answers, strict=True))
 
-    def of(sort: str) -> list[tuple[ArmCase, dict[str, Any]]]:
+    def of_sort(sort: str) -> list[tuple[ArmCase, dict[str, Any]]]:
         return [(case, answer) for case, answer in pairs if case.sort == sort]
 
     errors = list(_weigh_payloads(result))
-    said = f"{100 * np.median(errors):.1f} % / {100 * max(errors):.1f} %" if errors else "no case"
+    mass_errors = (
+        f"{100 * np.median(errors):.1f} % / {100 * max(errors):.1f} %" if errors else "no case"
+    )
     return [
-        share_of("single effects: joint and kind", [is_right(*p) for p in of("single")], ">= 92 %"),
-        share_of("pairs on different joints: both", [is_right(*p) for p in of("pair")], ">= 80 %"),
-        share_of("false alarms", [a["verdict"] != "no gap" for _, a in of("none")], "<= 2 in 30"),
+        share_of(
+            "single effects: joint and kind", [is_right(*p) for p in of_sort("single")], ">= 92 %"
+        ),
+        share_of(
+            "pairs on different joints: both", [is_right(*p) for p in of_sort("pair")], ">= 80 %"
+        ),
+        share_of(
+            "false alarms", [a["verdict"] != "no gap" for _, a in of_sort("none")], "<= 2 in 30"
+        ),
         share_of(
             "of no known form: flagged",
-            [a["verdict"] in FLAGGED for _, a in of("outside")],
+            [a["verdict"] in FLAGGED for _, a in of_sort("outside")],
             "none set",
         ),
         share_of("a wrong name", [is_wrong(*p) for p in pairs], "<= 5 %"),
-        Row("mass of a payload, error, median / largest", said, "<= 3 %"),
+        Row("mass of a payload, error, median / largest", mass_errors, "<= 3 %"),
         seconds_row(result.answers),
     ]
 
 
 def _list_misses(result: ArmResult) -> Iterator[str]:
+    """Yield one line for every wrong answer."""
     for case, answer in zip(result.cases, result.answers, strict=True):
         if case.sort == "outside":
             right = answer["verdict"] in FLAGGED and not is_wrong(case, answer)
@@ -97,17 +106,17 @@ def _list_misses(result: ArmResult) -> Iterator[str]:
         else:
             right = is_right(case, answer)
         if not right:
-            there = " + ".join(f"{word} {joint + 1}" for word, joint in case.defects) or "nothing"
+            defects = " + ".join(f"{word} {joint + 1}" for word, joint in case.defects) or "nothing"
             sizes = ", ".join(f"{each:.3g}" for each in record_arm(case).magnitudes)
             named = " + ".join(names(answer)) or "nothing named"
             yield (
-                f"{case.number:03d} {case.machine}, {case.sort}: {there} ({sizes or '-'}) -> "
+                f"{case.number:03d} {case.machine}, {case.sort}: {defects} ({sizes or '-'}) -> "
                 f"{named} [{answer['verdict']}]"
             )
 
 
 def arm_document(result: ArmResult) -> dict[str, Any]:
-    """The score for other programs, with what was there and what was said of each machine."""
+    """Return the score as a JSON document, with the defects and the answer of every machine."""
     return {
         "seed": result.seed,
         "cases": len(result.cases),
@@ -127,6 +136,6 @@ def arm_document(result: ArmResult) -> dict[str, Any]:
 
 
 def arm_table(result: ArmResult) -> str:
-    """The score as text."""
+    """Return the score as text."""
     lines = score_lines(result.seed, len(result.cases), arm_rows(result))
     return "\n".join([*lines, "", "not answered right:", *_list_misses(result)])

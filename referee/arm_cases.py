@@ -1,8 +1,7 @@
-"""Draws arms whose defects are withheld, records tests of them, and says what a person would accept
-as an answer about each.
+"""Random arms with withheld defects, their recordings, and the acceptable answers.
 
-The table of acceptable answers stood before the first diagnosis was made with it. A name that is
-not in a case's row is wrong, whatever it explains.
+The table of acceptable answers was fixed before the first diagnosis. A name outside a case's row
+is wrong, whatever it explains.
 """
 
 from __future__ import annotations
@@ -14,24 +13,26 @@ from pathlib import Path
 
 import numpy as np
 
-from referee.arm_truth import Arm, Array, Drag, Link, Travel, add_ball, drive
+from referee.arm_truth import Arm, Array, Link, Resistance, Travel, add_ball, motor_forces
 
-OWN = Path(__file__).parent / "machines"
+DESCRIPTIONS = Path(__file__).parent / "machines"
 MACHINES: Mapping[str, str] = {
-    name: str(OWN / f"{name}.toml") for name in ("arm_2", "arm_3", "cart")
+    name: str(DESCRIPTIONS / f"{name}.toml") for name in ("arm_2", "arm_3", "cart")
 }
-"""Sort of machine → its description."""
+"""Path of the description of every machine."""
 
 
-def _drag(slip: float, viscous: float, rotor: float, slow: float = 0.05) -> Drag:
-    return Drag(slip=slip, breakaway=1.2 * slip, slow=slow, viscous=viscous, rotor=rotor)
+def _resistance(slip: float, viscous: float, rotor: float, fade_speed: float = 0.05) -> Resistance:
+    return Resistance(
+        slip=slip, breakaway=1.2 * slip, fade_speed=fade_speed, viscous=viscous, rotor=rotor
+    )
 
 
 NOMINAL: Mapping[str, Arm] = {
     "arm_2": Arm(
         None,
         (Link(0.4, 4.0, 0.18, 0.0, 0.06), Link(0.3, 2.5, 0.13, 0.0, 0.022)),
-        (_drag(1.8, 1.2, 0.12), _drag(0.9, 0.5, 0.05)),
+        (_resistance(1.8, 1.2, 0.12), _resistance(0.9, 0.5, 0.05)),
     ),
     "arm_3": Arm(
         None,
@@ -40,16 +41,17 @@ NOMINAL: Mapping[str, Arm] = {
             Link(0.3, 3.0, 0.13, 0.0, 0.03),
             Link(0.2, 1.2, 0.07, 0.0, 0.006),
         ),
-        (_drag(2.0, 1.5, 0.15), _drag(1.2, 0.8, 0.08), _drag(0.5, 0.3, 0.02)),
-        _drag(0.4, 0.2, 0.015),
+        (_resistance(2.0, 1.5, 0.15), _resistance(1.2, 0.8, 0.08), _resistance(0.5, 0.3, 0.02)),
+        _resistance(0.4, 0.2, 0.015),
     ),
     "cart": Arm(
         6.0,
         (Link(0.5, 2.0, 0.4, 0.0, 0.02),),
-        (_drag(6.0, 8.0, 1.5, 0.02), _drag(0.15, 0.05, 0.01)),
+        (_resistance(6.0, 8.0, 1.5, 0.02), _resistance(0.15, 0.05, 0.01)),
     ),
 }
-"""What the descriptions say of the machines, by hand."""
+"""Parameters of the descriptions, typed in by hand."""
+# Names of joints, sensors and last bodies in the descriptions.
 GUIDES = {
     "arm_2": ("shoulder", "elbow"),
     "arm_3": ("shoulder", "elbow", "wrist"),
@@ -66,9 +68,9 @@ FORCES = {
     "cart": ("force_1", "torque_2"),
 }
 LAST = {"arm_2": "link_2", "arm_3": "link_3", "cart": "pendulum"}
-"""Of each machine's joints, and of its last body: what the description calls them."""
+"""Name of the last body of every machine."""
 ACCEPTED: Mapping[str, tuple[str, ...]] = {
-    # what is in it: names, where G is the joint, R its rotor, A and F its sensors, B the last body
+    # defect: accepted names; G is the joint, R its rotor, A and F its sensors, B the last body
     "coulomb": ("coulomb@G",),
     "viscous": ("viscous@G",),
     "constant": ("offset@G", "asymmetry@G"),
@@ -77,16 +79,19 @@ ACCEPTED: Mapping[str, tuple[str, ...]] = {
     "gain": ("gain@F",),
     "zero": ("offset@A",),
     "payload": ("payload@B",),
-    # of forms that the library does not have
+    # defects whose form the library does not have
     "warming": ("coulomb@G",),
     "hose": (),
     "sagging": ("gain@F",),
 }
-SAME: Mapping[str, Mapping[str, frozenset[str]]] = {
+EQUIVALENT: Mapping[str, Mapping[str, frozenset[str]]] = {
     "cart": {"armature@rotor_2": frozenset({"inertia@pendulum"})}
 }
-"""Machine → name → others that are the very same there: what hangs from a cart, which does not
-turn, has one moment of inertia about its pivot, whether rotor or pendulum."""
+"""Machine → name → names of the same physical effect.
+
+A cart does not rotate, so the pendulum has one moment of inertia about its pivot. Rotor and
+pendulum cannot be told apart.
+"""
 SINGLES = ("coulomb", "viscous", "constant", "spring", "rotor", "gain", "zero", "payload")
 PAIRED = ("coulomb", "viscous", "constant", "spring", "rotor", "gain")
 OUTSIDE = ("warming", "hose", "sagging")
@@ -102,26 +107,39 @@ ROUND = (
     "none",
     "single",
 )
-"""Sorts of case in the order in which they are drawn."""
-TRUE = 0.02
-"""Share by which the friction of a real machine is off what its description says, at most; the
-description tolerates 5 %."""
+"""Order in which the sorts of case are drawn."""
+FRICTION_SPREAD = 0.02
+"""Largest relative deviation of a machine's friction from its description.
+
+The description tolerates 5 %.
+"""
 PERIOD, SECONDS, WAVES = 2e-3, 12.0, 6
-"""s, of a tick and of a test, and sines in the motion of each joint."""
+"""Sample period and length of a test, s, and number of sines in the motion of a joint."""
 ANGULAR, LINEAR = 2e-5, 1e-5
-"""rad and m that the encoders tell apart."""
+"""Resolution of the encoders, rad and m."""
 NOISE = (0.01, 0.03)
-"""rms of the forces' white noise, from motor currents, as a share of their swing."""
+"""Range of the white noise of the forces, rms, as a share of their standard deviation."""
 BALL = 0.02
-"""m, radius of what is fixed to a link."""
+"""Radius of a payload, m."""
 WARMED = 4.0
-"""s in which friction changes."""
+"""Time constant of warming friction, s."""
 
 
 @dataclass(frozen=True)
 class ArmCase:
-    """machine: which; sort: none, single, pair or outside; defects: (word of `ACCEPTED`, number of
-    its joint) each; number, seed: it was drawn with."""
+    """A random arm with its defects.
+
+    Attributes
+    ----------
+    machine : str
+        Machine, one of `MACHINES`.
+    sort : str
+        `none`, `single`, `pair` or `outside`.
+    defects : tuple
+        Word of `ACCEPTED` and number of the joint of every defect.
+    number, seed : int
+        Number and seed from which it is drawn.
+    """
 
     machine: str
     sort: str
@@ -130,7 +148,7 @@ class ArmCase:
     seed: int
 
     def accept(self, defect: tuple[str, int]) -> frozenset[str]:
-        """Names that a person would accept for one defect, kind@component."""
+        """Return the acceptable names of one defect, kind@component."""
         word, joint = defect
         places = {
             "G": GUIDES[self.machine][joint],
@@ -140,14 +158,23 @@ class ArmCase:
             "B": LAST[self.machine],
         }
         pairs = (name.split("@") for name in ACCEPTED[word])
-        found = frozenset(f"{kind}@{places[place]}" for kind, place in pairs)
-        return found | SAME.get(self.machine, {}).get(next(iter(found), ""), frozenset())
+        names = frozenset(f"{kind}@{places[place]}" for kind, place in pairs)
+        return names | EQUIVALENT.get(self.machine, {}).get(next(iter(names), ""), frozenset())
 
 
 @dataclass(frozen=True)
 class ArmTest:
-    """One test. columns: topic → field → values, shape (ticks,); period: s; magnitudes: of each
-    defect, in its unit."""
+    """One test of an arm.
+
+    Attributes
+    ----------
+    columns : dict
+        Topic → field → values, shape (ticks,).
+    period : float
+        Sample period, s.
+    magnitudes : tuple of float
+        Magnitude of every defect, in its unit.
+    """
 
     columns: dict[str, dict[str, Array]]
     period: float
@@ -155,7 +182,7 @@ class ArmTest:
 
 
 def draw_arm(number: int, seed: int) -> ArmCase:
-    """The case of that number: every sort in turn, every machine and kind by chance."""
+    """Return a case by its number: every sort in turn, with random machine and joints."""
     sort = ROUND[number % len(ROUND)]
     random = np.random.default_rng([seed, number, 7])
     machine = str(random.choice(list(MACHINES)))
@@ -164,7 +191,7 @@ def draw_arm(number: int, seed: int) -> ArmCase:
     defects: tuple[tuple[str, int], ...] = ()
     if sort == "single":
         word = SINGLES[(before + seed) % len(SINGLES)]
-        # A position along the rail changes no force, so its zero cannot be seen.
+        # A position along the rail changes no force, so its offset is unobservable.
         blind = word == "zero" and machine == "cart"
         defects = ((word, 1 if blind else int(random.integers(joints))),)
     elif sort == "pair":
@@ -178,123 +205,155 @@ def draw_arm(number: int, seed: int) -> ArmCase:
 
 
 @dataclass(frozen=True)
-class Broken:
-    """A machine with its defects. gains, zeros: of the sensors of force and motion, shape
-    (joints,); strange: (word, joint, N or Nm) of forces that the library has no form for;
-    magnitudes: of each defect, in its unit; swings: of the usual forces, shape (joints,)."""
+class DefectiveArm:
+    """An arm with its defects.
+
+    Attributes
+    ----------
+    arm : Arm
+        Arm with the defects that change its parameters.
+    gains : ndarray
+        Gains of the force sensors, shape (joints,).
+    zeros : ndarray
+        Offsets of the position sensors, m or rad, shape (joints,).
+    unmodelled : tuple
+        Word, joint and size, N or Nm, of every force whose form the library does not have.
+    magnitudes : tuple of float
+        Magnitude of every defect, in its unit.
+    swings : ndarray
+        Standard deviation of the forces without defects, N or Nm, shape (joints,).
+    """
 
     arm: Arm
     gains: Array
     zeros: Array
-    strange: tuple[tuple[str, int, float], ...]
+    unmodelled: tuple[tuple[str, int, float], ...]
     magnitudes: tuple[float, ...]
     swings: Array
 
 
-def build_arm(case: ArmCase) -> Broken:
-    """The machine of a case, in all its tests the same: defects are sized by a motion of their
-    own."""
-    own = np.random.default_rng([case.seed, case.number, 11])
-    arm = _vary(NOMINAL[case.machine], own)
-    travel = wave(case.machine, np.random.default_rng([case.seed, case.number, 17]))
-    swings = np.std(drive(arm, travel), axis=1)
+def build_arm(case: ArmCase) -> DefectiveArm:
+    """Return the machine of a case, which is the same in all its tests.
+
+    A reference motion, independent of the tests, sets the magnitudes of the defects.
+    """
+    random = np.random.default_rng([case.seed, case.number, 11])
+    arm = _vary(NOMINAL[case.machine], random)
+    travel = draw_travel(case.machine, np.random.default_rng([case.seed, case.number, 17]))
+    # Forces without defects set the scale of every defect.
+    swings = np.std(motor_forces(arm, travel), axis=1)
     gains, zeros = np.ones(len(swings)), np.zeros(len(swings))
-    strange: list[tuple[str, int, float]] = []
+    unmodelled: list[tuple[str, int, float]] = []
     magnitudes: list[float] = []
     for word, joint in case.defects:
-        share = _spread(own, 0.06, 0.25) * (1.0 if own.random() < 0.5 else -1.0)
+        share = _spread(random, 0.06, 0.25) * (1.0 if random.random() < 0.5 else -1.0)
         force = share * float(swings[joint])
         if word == "gain":
             gains[joint] += share
             magnitudes.append(float(gains[joint]))
         elif word == "zero":
-            zeros[joint] = math.copysign(_spread(own, 0.015, 0.08), share)
+            zeros[joint] = math.copysign(_spread(random, 0.015, 0.08), share)
             magnitudes.append(float(zeros[joint]))
         elif word == "payload":
             last = arm.links[-1]
-            mass = _spread(own, 0.05, 0.4) * last.mass
-            along, across = own.uniform(0.3, 1.0), own.uniform(-0.1, 0.1)
+            mass = _spread(random, 0.05, 0.4) * last.mass
+            along, across = random.uniform(0.3, 1.0), random.uniform(-0.1, 0.1)
             ball = add_ball(last, mass, along * last.length, across * last.length, BALL)
             arm = arm._replace(links=(*arm.links[:-1], ball))
             magnitudes.append(mass)
         elif word in OUTSIDE:
-            strange.append((word, joint, abs(force)))
+            unmodelled.append((word, joint, abs(force)))
             magnitudes.append(abs(force))
         else:
-            # So large that it changes the joint's force by that share of what it usually is.
-            drag, size = _change(arm.drags[joint], word, force, [each[joint] for each in travel])
-            drags = tuple(drag if n == joint else each for n, each in enumerate(arm.drags))
-            arm = arm._replace(drags=drags)
+            # The defect changes the joint's force by `share` of its usual standard deviation.
+            drag, size = _change(
+                arm.resistances[joint], word, force, [each[joint] for each in travel]
+            )
+            resistances = tuple(
+                drag if n == joint else each for n, each in enumerate(arm.resistances)
+            )
+            arm = arm._replace(resistances=resistances)
             magnitudes.append(size)
-    return Broken(arm, gains, zeros, tuple(strange), tuple(magnitudes), swings)
+    return DefectiveArm(arm, gains, zeros, tuple(unmodelled), tuple(magnitudes), swings)
 
 
 def record_arm(case: ArmCase, again: int = 0) -> ArmTest:
-    """A test of a case. again: another one of the same machine."""
-    broken = build_arm(case)
-    test = np.random.default_rng([case.seed, case.number, 13, again])
-    travel = wave(case.machine, test)
-    force = drive(broken.arm, travel)
-    for word, joint, size in broken.strange:
-        force[joint] += _act_strangely(word, joint, travel, force[joint], size)
-    noise = _spread(test, *NOISE) * broken.swings
-    force = broken.gains[:, None] * force + noise[:, None] * test.standard_normal(force.shape)
-    read = travel.position + broken.zeros[:, None]
-    bits = np.full(len(read), ANGULAR)
+    """Record a test of a case; again: number of the repetition on the same machine."""
+    defective = build_arm(case)
+    random = np.random.default_rng([case.seed, case.number, 13, again])
+    travel = draw_travel(case.machine, random)
+    force = motor_forces(defective.arm, travel)
+    for word, joint, size in defective.unmodelled:
+        force[joint] += _unmodelled_force(word, joint, travel, force[joint], size)
+    # Noise in proportion to the force, as from a current sensor of suitable range.
+    noise = _spread(random, *NOISE) * defective.swings
+    force = defective.gains[:, None] * force + noise[:, None] * random.standard_normal(force.shape)
+    readings = travel.position + defective.zeros[:, None]
+    resolution = np.full(len(readings), ANGULAR)
     if case.machine == "cart":
-        bits[0] = LINEAR
-    read = np.round(read / bits[:, None]) * bits[:, None]
-    sensors = dict(zip(ANGLES[case.machine], read, strict=True))
+        resolution[0] = LINEAR
+    readings = np.round(readings / resolution[:, None]) * resolution[:, None]
+    sensors = dict(zip(ANGLES[case.machine], readings, strict=True))
     sensors.update(zip(FORCES[case.machine], force, strict=True))
-    return ArmTest({"/sensor": sensors}, PERIOD, broken.magnitudes)
+    return ArmTest({"/sensor": sensors}, PERIOD, defective.magnitudes)
 
 
-def wave(machine: str, random: np.random.Generator) -> Travel:
-    """A motion of all joints, each a sum of sines of its own."""
+def draw_travel(machine: str, random: np.random.Generator) -> Travel:
+    """Draw a motion of all joints, every one a sum of sines."""
     time = np.arange(round(SECONDS / PERIOD)) * PERIOD
-    found = []
+    joints = []
     for guide in GUIDES[machine]:
         reach = 0.12 if guide == "rail" else random.uniform(0.6, 1.0)
         frequency = np.sort(np.exp(random.uniform(math.log(0.12), math.log(1.3), WAVES)))
+        # Slow waves are larger, so all contribute to speed and acceleration.
         size = frequency**-0.8 * random.uniform(0.5, 1.0, WAVES)
         phase = random.uniform(-math.pi, math.pi, WAVES)
         rate = 2.0 * math.pi * frequency[:, None]
-        turned = rate * time + phase[:, None]
+        phase_angle = rate * time + phase[:, None]
         size = reach * (size / np.sum(size))[:, None]
         middle = 0.0 if guide == "rail" else random.uniform(-0.5, 0.5)
-        found.append(
+        joints.append(
             [
-                middle + np.sum(size * np.sin(turned), axis=0),
-                np.sum(size * rate * np.cos(turned), axis=0),
-                -np.sum(size * rate**2 * np.sin(turned), axis=0),
+                middle + np.sum(size * np.sin(phase_angle), axis=0),
+                np.sum(size * rate * np.cos(phase_angle), axis=0),
+                -np.sum(size * rate**2 * np.sin(phase_angle), axis=0),
             ]
         )
-    return Travel(*np.stack(found, axis=1))
+    return Travel(*np.stack(joints, axis=1))
 
 
 def _spread(random: np.random.Generator, low: float, high: float) -> float:
+    """Draw a number between two bounds, uniform in its logarithm."""
     return float(math.exp(random.uniform(math.log(low), math.log(high))))
 
 
 def _vary(arm: Arm, random: np.random.Generator) -> Arm:
-    """A machine as it was made, whose friction is not quite what its description says."""
+    """Return an arm whose friction deviates from its description within `FRICTION_SPREAD`."""
 
-    def vary(drag: Drag) -> Drag:
-        dry, viscous = 1.0 + TRUE * random.uniform(-1.0, 1.0, 2)
+    def vary(drag: Resistance) -> Resistance:
+        dry, viscous = 1.0 + FRICTION_SPREAD * random.uniform(-1.0, 1.0, 2)
         return drag._replace(
             slip=dry * drag.slip, breakaway=dry * drag.breakaway, viscous=viscous * drag.viscous
         )
 
-    return arm._replace(drags=tuple(vary(drag) for drag in arm.drags), belt=vary(arm.belt))
+    return arm._replace(
+        resistances=tuple(vary(drag) for drag in arm.resistances), belt=vary(arm.belt)
+    )
 
 
-def _change(drag: Drag, word: str, force: float, motion: list[Array]) -> tuple[Drag, float]:
-    """What resists at a joint with a defect that is worth that force, rms, and its magnitude.
-    motion: position, speed and acceleration of the joint, shape (ticks,) each."""
+def _change(
+    drag: Resistance, word: str, force: float, motion: list[Array]
+) -> tuple[Resistance, float]:
+    """Return the resistance of a joint with a defect, and the magnitude of the defect.
+
+    force: rms force that the defect adds, N or Nm, with sign; motion: position, speed and
+    acceleration of the joint, each of shape (ticks,).
+    """
     position, speed, acceleration = (float(np.sqrt(np.mean(each**2))) for each in motion)
     if word == "coulomb":
-        more = max(force, -0.7 * drag.slip)
-        changed = drag._replace(slip=drag.slip + more, breakaway=drag.breakaway + more)
+        # Negative changes stop at 30 % of the nominal friction: it never vanishes.
+        added = max(force, -0.7 * drag.slip)
+        changed = drag._replace(slip=drag.slip + added, breakaway=drag.breakaway + added)
         return changed, changed.slip
     if word == "viscous":
         changed = drag._replace(viscous=drag.viscous + max(force / speed, -0.7 * drag.viscous))
@@ -308,16 +367,19 @@ def _change(drag: Drag, word: str, force: float, motion: list[Array]) -> tuple[D
     return changed, changed.rotor
 
 
-def _act_strangely(word: str, joint: int, travel: Travel, usual: Array, size: float) -> Array:
-    """What the library has no form for, at a joint, N or Nm, shape (ticks,): of that size, beside
-    what its force is otherwise."""
+def _unmodelled_force(word: str, joint: int, travel: Travel, usual: Array, size: float) -> Array:
+    """Return a force whose form the library does not have, N or Nm, shape (ticks,).
+
+    usual: force of the joint without it; size: magnitude of the additional force.
+    """
     if word == "warming":
         time = np.arange(len(usual)) * PERIOD
         return 2.0 * size * np.sign(travel.speed[joint]) * np.exp(-time / WARMED)
     if word == "hose":
-        # It hangs from the neighbour, and pulls by where that is.
-        beside = travel.position[joint - 1 if joint else 1]
-        pull = np.tanh(3.0 * (beside - np.mean(beside)) / np.std(beside))
+        # A hose between two links pulls by the position of the neighbour.
+        neighbour = travel.position[joint - 1 if joint else 1]
+        pull = np.tanh(3.0 * (neighbour - np.mean(neighbour)) / np.std(neighbour))
         return size * pull * np.cos(travel.position[joint])
+    # A force that saturates softly at 2.5 standard deviations, as a sagging supply does.
     limit = 2.5 * float(np.std(usual))
     return limit * np.tanh(usual / limit) - usual

@@ -1,9 +1,8 @@
-"""Planar arms and a cart with a pendulum: the forces that a prescribed motion takes, by equations
-of motion written by hand.
+"""Inverse dynamics of planar arms and of a cart with a pendulum, written by hand.
 
 Links hang from each other in a vertical plane. Newton's and Euler's equations are summed from the
-last link to the first; joints may have friction, springs and rotors, and a belt may couple the last
-two.
+last link to the first. Joints may have friction, springs and rotors, and a belt may couple the last
+two joints.
 """
 
 from __future__ import annotations
@@ -16,12 +15,23 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 GRAVITY = 9.81
-"""m/s²."""
+"""Gravity, m/s²."""
 
 
 class Link(NamedTuple):
-    """length: m to the next joint; mass: kg; along, across: m, of the centre of mass from the
-    joint, along the link and in the direction in which its angle grows; inertia: kg m² about it."""
+    """Link of an arm.
+
+    Attributes
+    ----------
+    length : float
+        Distance to the next joint, m.
+    mass : float
+        Mass, kg.
+    along, across : float
+        Centre of mass from the joint, m: along the link, and in the direction of a growing angle.
+    inertia : float
+        Moment of inertia about the centre of mass, kg m².
+    """
 
     length: float
     mass: float
@@ -30,14 +40,28 @@ class Link(NamedTuple):
     inertia: float
 
 
-class Drag(NamedTuple):
-    """What resists along one coordinate, N or Nm: slip, breakaway: dry friction at speed and at
-    standstill; slow: speed within which it falls; viscous: by the speed; constant; spring: by the
-    position; rotor: kg or kg m² of the motor, through its gear."""
+class Resistance(NamedTuple):
+    """Resistance along one coordinate, in N, m and kg, or Nm, rad and kg m².
+
+    Attributes
+    ----------
+    slip, breakaway : float
+        Dry friction in motion and at standstill, N.
+    fade_speed : float
+        Speed within which the friction falls from `breakaway` to `slip`, m/s.
+    viscous : float
+        Viscous friction, Ns/m.
+    constant : float
+        Constant force, N.
+    spring : float
+        Stiffness, N/m.
+    rotor : float
+        Inertia of the motor, reflected through its gear, kg.
+    """
 
     slip: float = 0.0
     breakaway: float = 0.0
-    slow: float = 0.1
+    fade_speed: float = 0.1
     viscous: float = 0.0
     constant: float = 0.0
     spring: float = 0.0
@@ -45,18 +69,28 @@ class Drag(NamedTuple):
 
 
 class Arm(NamedTuple):
-    """cart: kg on a rail that the first link hangs from, None for an arm on the floor; links: from
-    the first to the last; drags: of the joints, the cart's first; belt: of the sum of the last two
-    angles."""
+    """Arm on the floor or on a cart.
+
+    Attributes
+    ----------
+    cart : float or None
+        Mass of the cart that the first link hangs from, kg. None for an arm on the floor.
+    links : tuple of Link
+        Links from the first to the last.
+    resistances : tuple of Resistance
+        Resistance of every joint, that of the cart first.
+    belt : Resistance
+        Resistance along the sum of the last two angles.
+    """
 
     cart: float | None
     links: tuple[Link, ...]
-    drags: tuple[Drag, ...]
-    belt: Drag = Drag()
+    resistances: tuple[Resistance, ...]
+    belt: Resistance = Resistance()
 
 
 class Travel(NamedTuple):
-    """A motion: position, speed and acceleration, shape (joints, ticks) each."""
+    """Motion of the joints: position, speed and acceleration, each of shape (joints, ticks)."""
 
     position: Array
     speed: Array
@@ -64,93 +98,115 @@ class Travel(NamedTuple):
 
 
 def add_ball(link: Link, mass: float, along: float, across: float, radius: float) -> Link:
-    """A link with a solid ball fixed to it, whose centre is there."""
+    """Return a link with a solid ball fixed to it.
+
+    mass: kg; along, across: centre of the ball from the joint, m; radius: m.
+    """
     total = link.mass + mass
-    a = (link.mass * link.along + mass * along) / total
-    e = (link.mass * link.across + mass * across) / total
+    new_along = (link.mass * link.along + mass * along) / total
+    new_across = (link.mass * link.across + mass * across) / total
 
-    def about(inertia: float, kilograms: float, x: float, y: float) -> float:
-        return inertia + kilograms * ((x - a) ** 2 + (y - e) ** 2)
+    def parallel_axis(inertia: float, kilograms: float, x: float, y: float) -> float:
+        return inertia + kilograms * ((x - new_along) ** 2 + (y - new_across) ** 2)
 
-    inertia = about(link.inertia, link.mass, link.along, link.across)
-    inertia += about(0.4 * mass * radius**2, mass, along, across)
-    return Link(link.length, total, a, e, inertia)
+    # Both inertias about the new centre of mass; a solid ball has 2/5 m r² about its own.
+    inertia = parallel_axis(link.inertia, link.mass, link.along, link.across)
+    inertia += parallel_axis(0.4 * mass * radius**2, mass, along, across)
+    return Link(link.length, total, new_along, new_across, inertia)
 
 
-def swing(links: Sequence[Link], hung: Array, travel: Travel) -> tuple[Array, Array]:
-    """The forces on links that hang from a point.
+def link_forces(
+    links: Sequence[Link], point_acceleration: Array, travel: Travel
+) -> tuple[Array, Array]:
+    """Return the forces on links that hang from a point.
 
     Parameters
     ----------
-    links
-        From the first to the last.
-    hung
-        m/s², of the point, across and up, shape (2, ticks).
-    travel
-        Of the joints, each relative to the link before.
+    links : sequence of Link
+        Links from the first to the last.
+    point_acceleration : ndarray
+        Acceleration of the point, across and up, m/s², shape (2, ticks).
+    travel : Travel
+        Motion of the joints, each relative to the link before it.
 
     Returns
     -------
-    tuple
-        Torques on the joints, Nm, shape (joints, ticks), and the force on the point, N, shape (2,
+    tuple of ndarray
+        Torques on the joints, Nm, shape (joints, ticks), and force on the point, N, shape (2,
         ticks).
     """
-    angle, rate, gain = (np.cumsum(each, axis=0) for each in travel)
-    out = np.stack([np.sin(angle), -np.cos(angle)])
-    on = np.stack([np.cos(angle), np.sin(angle)])
-    joints = [hung + np.array([[0.0], [GRAVITY]])]
+    # Absolute angles, rates and accelerations are the sums over the joints before.
+    angle, rate, angular_acceleration = (np.cumsum(each, axis=0) for each in travel)
+    radial = np.stack([np.sin(angle), -np.cos(angle)])
+    tangential = np.stack([np.cos(angle), np.sin(angle)])
+    # Gravity as an upward acceleration of the support, so no weight terms are needed.
+    joints = [point_acceleration + np.array([[0.0], [GRAVITY]])]
     for number, link in enumerate(links):
-        turned = gain[number] * on[:, number] - rate[number] ** 2 * out[:, number]
-        joints.append(joints[-1] + link.length * turned)
+        along_motion = (
+            angular_acceleration[number] * tangential[:, number]
+            - rate[number] ** 2 * radial[:, number]
+        )
+        joints.append(joints[-1] + link.length * along_motion)
     torques = np.empty_like(angle)
-    force, torque = np.zeros_like(hung), np.zeros(angle.shape[1])
+    force, torque = np.zeros_like(point_acceleration), np.zeros(angle.shape[1])
+    # Newton and Euler from the tip: forces and moments of the outer links accumulate.
     for number in reversed(range(len(links))):
-        link, u, w = links[number], out[:, number], on[:, number]
+        link, u, w = links[number], radial[:, number], tangential[:, number]
         centre = link.along * u + link.across * w
-        turned = gain[number] * w - rate[number] ** 2 * u
-        aside = -gain[number] * u - rate[number] ** 2 * w
-        own = link.mass * (joints[number] + link.along * turned + link.across * aside)
-        torque = torque + link.inertia * gain[number]
-        torque = torque + _cross(centre, own) + _cross(link.length * u, force)
-        force = force + own
+        along_motion = angular_acceleration[number] * w - rate[number] ** 2 * u
+        across_motion = -angular_acceleration[number] * u - rate[number] ** 2 * w
+        inertial = link.mass * (
+            joints[number] + link.along * along_motion + link.across * across_motion
+        )
+        torque = torque + link.inertia * angular_acceleration[number]
+        torque = torque + _cross(centre, inertial) + _cross(link.length * u, force)
+        force = force + inertial
         torques[number] = torque
     return torques, force
 
 
-def _cross(one: Array, other: Array) -> Array:
-    return one[0] * other[1] - one[1] * other[0]
+def _cross(first: Array, second: Array) -> Array:
+    """Return the out-of-plane component of a cross product."""
+    return first[0] * second[1] - first[1] * second[0]
 
 
-def resist(drag: Drag, position: Array, speed: Array, acceleration: Array) -> Array:
-    """What moves one coordinate against all that resists along it, shape (ticks,)."""
-    dry = drag.slip + (drag.breakaway - drag.slip) * np.exp(-((speed / drag.slow) ** 2))
-    found = dry * np.sign(speed) + drag.viscous * speed + drag.constant
-    return found + drag.spring * position + drag.rotor * acceleration
+def resisting_force(
+    resistance: Resistance, position: Array, speed: Array, acceleration: Array
+) -> Array:
+    """Return the force that moves one coordinate against its resistance, N, shape (ticks,)."""
+    # Stribeck curve: breakaway at standstill, slip at speed.
+    dry = resistance.slip + (resistance.breakaway - resistance.slip) * np.exp(
+        -((speed / resistance.fade_speed) ** 2)
+    )
+    force = dry * np.sign(speed) + resistance.viscous * speed + resistance.constant
+    return force + resistance.spring * position + resistance.rotor * acceleration
 
 
-def drive(arm: Arm, travel: Travel) -> Array:
-    """What the motors of an arm give while it moves as prescribed.
+def motor_forces(arm: Arm, travel: Travel) -> Array:
+    """Return the forces of the motors of an arm that moves as prescribed.
 
     Parameters
     ----------
-    arm
-        With or without a cart, which is then the first joint.
-    travel
-        Of all joints.
+    arm : Arm
+        Arm with or without a cart. The cart is the first joint.
+    travel : Travel
+        Motion of all joints.
 
     Returns
     -------
-    array
-        N or Nm, shape (joints, ticks).
+    ndarray
+        Forces, N, or torques, Nm, shape (joints, ticks).
     """
-    hung, hinges = np.zeros((2, travel.position.shape[1])), travel
+    point_acceleration, hinges = np.zeros((2, travel.position.shape[1])), travel
     if arm.cart is not None:
-        hung[0] = travel.acceleration[0]
+        point_acceleration[0] = travel.acceleration[0]
         hinges = Travel(*(each[1:] for each in travel))
-    found, pull = swing(arm.links, hung, hinges)
+    forces, reaction = link_forces(arm.links, point_acceleration, hinges)
     if arm.cart is not None:
-        found = np.concatenate([[pull[0] + arm.cart * hung[0]], found])
-    for number, drag in enumerate(arm.drags):
-        found[number] = found[number] + resist(drag, *(each[number] for each in travel))
-    found[-2:] += resist(arm.belt, *(each[-2:].sum(axis=0) for each in travel))
-    return found
+        forces = np.concatenate([[reaction[0] + arm.cart * point_acceleration[0]], forces])
+    for number, resistance in enumerate(arm.resistances):
+        forces[number] = forces[number] + resisting_force(
+            resistance, *(each[number] for each in travel)
+        )
+    forces[-2:] += resisting_force(arm.belt, *(each[-2:].sum(axis=0) for each in travel))
+    return forces

@@ -1,9 +1,8 @@
-"""Two benches of the referee's: a positioning actuator and a damper. Written from their physics and
-from nothing of the twin.
+"""Two benches of the referee: a positioning actuator and a damper.
 
-The actuator is integrated in steps of 50 us: each lag by the trapezoidal rule, a delay by shifting
-the command. The damper's dry friction is a stop operator in the stretch of what stands between
-piston and rod: the play, then the spring, then the slider.
+Both are written from physics and share no code with the twin. The actuator is integrated with
+`FINE` steps per tick: every lag by the trapezoidal rule, a delay by shifting the command. The dry
+friction of the damper is a stop operator on the stretch of play, spring and slider in series.
 """
 
 from __future__ import annotations
@@ -17,34 +16,64 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 FINE = 20
-"""Steps a tick."""
+"""Integration steps per tick."""
 
 
 @dataclass(frozen=True)
 class ActuatorTruth:
-    """lags: s, one after another; late: s; own: (natural frequency Hz, damping ratio) or none;
-    fastest: m/s; lost: m of play."""
+    """Parameters of the positioning actuator.
+
+    Attributes
+    ----------
+    lags : tuple of float
+        Time constants of first-order lags in series, s.
+    delay : float
+        Delay of the command, s.
+    resonance : tuple of float, optional
+        Natural frequency, Hz, and damping ratio of the load. None for a rigid load.
+    gain : float
+        Gain of the command.
+    speed_limit : float
+        Largest speed, m/s.
+    play : float
+        Play between command and actuator, m.
+    """
 
     lags: tuple[float, ...] = ()
-    late: float = 0.0
-    own: tuple[float, float] | None = None
-    scale: float = 1.0
-    fastest: float = math.inf
-    lost: float = 0.0
+    delay: float = 0.0
+    resonance: tuple[float, float] | None = None
+    gain: float = 1.0
+    speed_limit: float = math.inf
+    play: float = 0.0
 
 
 @dataclass(frozen=True)
 class DamperTruth:
-    """slip: N; spring: N/m in series with it, infinite if rigid; lost: m of play in series;
-    viscous: Ns/m when extending and when compressing; rate: N/m beside them; charge: N."""
+    """Parameters of the damper.
+
+    Attributes
+    ----------
+    slip : float
+        Coulomb friction, N.
+    spring : float
+        Stiffness in series with the friction, N/m. Infinite if rigid.
+    play : float
+        Play in series with the friction, m.
+    viscous : tuple of float
+        Damping in extension and in compression, Ns/m.
+    stiffness, preload : float
+        Spring parallel to the damper, N/m, and its preload, N.
+    quadratic : float
+        Drag coefficient of the squared speed, N/(m/s)².
+    """
 
     slip: float = 0.0
     spring: float = math.inf
-    lost: float = 0.0
+    play: float = 0.0
     viscous: tuple[float, float] = (0.0, 0.0)
-    rate: float = 0.0
-    charge: float = 0.0
-    square: float = 0.0
+    stiffness: float = 0.0
+    preload: float = 0.0
+    quadratic: float = 0.0
 
 
 def wander(
@@ -55,15 +84,28 @@ def wander(
     lowest: float,
     highest: float,
 ) -> Array:
-    """A motion without end of many sines of falling size, at most `reach` m from its middle, from
-    rest."""
+    """Return a random motion from rest, m, shape (ticks,): many sines of falling amplitude.
+
+    Parameters
+    ----------
+    random : Generator
+        Source of frequencies and phases.
+    seconds, period : float
+        Length and sample period, s.
+    reach : float
+        Largest deviation from the middle, m.
+    lowest, highest : float
+        Range of the frequencies, Hz.
+    """
     time = np.arange(round(seconds / period)) * period
+    # Frequencies off a common grid: the motion does not repeat.
     frequencies = np.geomspace(lowest, highest, 25) * random.uniform(0.97, 1.03, 25)
     phases = random.uniform(0.0, 2.0 * math.pi, 25)
     motion = sum(
         np.sin(2 * math.pi * f * time + p) / (1.0 + f)
         for f, p in zip(frequencies, phases, strict=True)
     )
+    # Smoothstep over the first half second: the motion starts at rest.
     eased = np.clip(time / 0.5, 0.0, 1.0) ** 2 * (3.0 - 2.0 * np.clip(time / 0.5, 0.0, 1.0))
     motion = np.asarray(motion) * eased
     return reach * motion / float(np.max(np.abs(motion)))
@@ -71,67 +113,74 @@ def wander(
 
 @numba.njit
 def _integrate(
-    wanted: Array, lags: Array, own: Array, fastest: float, half: float, step: float
+    demand: Array, lags: Array, resonance: Array, speed_limit: float, half_play: float, step: float
 ) -> Array:
-    levels = np.full(len(lags), wanted[0])
-    place, speed, out, held = wanted[0], 0.0, np.empty(len(wanted)), wanted[0]
-    carried = wanted[0]
-    before = np.full(len(lags) + 1, wanted[0])
-    for n in range(len(wanted)):
-        carried = min(max(carried, wanted[n] - half), wanted[n] + half)
-        held += min(max(carried - held, -fastest * step), fastest * step)
-        now = held
+    """Return the actuator's position at every integration step, m; step: s."""
+    levels = np.full(len(lags), demand[0])
+    position, speed, out, limited = demand[0], 0.0, np.empty(len(demand)), demand[0]
+    after_play = demand[0]
+    previous = np.full(len(lags) + 1, demand[0])
+    for n in range(len(demand)):
+        after_play = min(max(after_play, demand[n] - half_play), demand[n] + half_play)
+        limited += min(max(after_play - limited, -speed_limit * step), speed_limit * step)
+        value = limited
         for k in range(len(lags)):
-            a = step / (2.0 * lags[k])
-            level = ((1.0 - a) * levels[k] + a * (now + before[k])) / (1.0 + a)
-            before[k] = now
+            # Trapezoidal rule for T ẏ + y = u, exact in phase to second order.
+            half_step = step / (2.0 * lags[k])
+            level = ((1.0 - half_step) * levels[k] + half_step * (value + previous[k])) / (
+                1.0 + half_step
+            )
+            previous[k] = value
             levels[k] = level
-            now = level
-        if own[0] > 0.0:
-            # Midpoint rule.
-            w = 2.0 * math.pi * own[0]
-            mid_speed = speed + 0.5 * step * (w * w * (now - place) - 2.0 * own[1] * w * speed)
-            mid_place = place + 0.5 * step * speed
-            speed += step * (w * w * (now - mid_place) - 2.0 * own[1] * w * mid_speed)
-            place += step * mid_speed
-            now = place
-        out[n] = now
+            value = level
+        if resonance[0] > 0.0:
+            # Midpoint rule: explicit Euler would add energy to the oscillation.
+            w = 2.0 * math.pi * resonance[0]
+            mid_speed = speed + 0.5 * step * (
+                w * w * (value - position) - 2.0 * resonance[1] * w * speed
+            )
+            mid_position = position + 0.5 * step * speed
+            speed += step * (w * w * (value - mid_position) - 2.0 * resonance[1] * w * mid_speed)
+            position += step * mid_speed
+            value = position
+        out[n] = value
     return out
 
 
 def actuator_position(truth: ActuatorTruth, command: Array, period: float) -> Array:
-    """Where the actuator is at every tick, under a command held from tick to tick."""
+    """Return the position of the actuator at every tick, m, with the command held over a tick."""
     step = period / FINE
-    held = np.repeat(truth.scale * command, FINE)
-    behind = round(truth.late / step)
-    if behind:
-        held = np.concatenate([np.full(behind, held[0]), held[:-behind]])
-    own = np.array(truth.own or (0.0, 0.0))
-    moved = _integrate(
-        held, np.array(truth.lags, float), own, truth.fastest, 0.5 * truth.lost, step
+    held = np.repeat(truth.gain * command, FINE)
+    delay_steps = round(truth.delay / step)
+    if delay_steps:
+        held = np.concatenate([np.full(delay_steps, held[0]), held[:-delay_steps]])
+    resonance = np.array(truth.resonance or (0.0, 0.0))
+    positions = _integrate(
+        held, np.array(truth.lags, float), resonance, truth.speed_limit, 0.5 * truth.play, step
     )
     # A sample is taken before the command of its tick acts.
-    return np.concatenate([[held[0]], moved[FINE - 1 :: FINE][:-1]])
+    return np.concatenate([[held[0]], positions[FINE - 1 :: FINE][:-1]])
 
 
 def damper_force(truth: DamperTruth, motion: Array, speed: Array) -> Array:
-    """The force that moves the piston so, at every tick."""
+    """Return the force that moves the piston as prescribed, N; motion: m, speed: m/s, (n,)."""
     viscous = np.where(
         speed > 0.0, truth.viscous[0], truth.viscous[1]
-    ) * speed + truth.square * speed * np.abs(speed)
+    ) * speed + truth.quadratic * speed * np.abs(speed)
+    # A rigid connection is a very stiff spring, so both use the same operator.
     spring = min(truth.spring, 1e9)
-    most = truth.slip / spring + 0.5 * truth.lost
+    largest_stretch = truth.slip / spring + 0.5 * truth.play
     stretch, dry = 0.0, np.empty(len(motion))
-    last = motion[0]
-    for n, here in enumerate(motion):
-        stretch = min(max(stretch + here - last, -most), most)
-        last = here
-        beyond = max(abs(stretch) - 0.5 * truth.lost, 0.0)
-        dry[n] = math.copysign(spring * beyond, stretch)
-    return dry + viscous + truth.rate * motion + truth.charge
+    previous = motion[0]
+    for n, position in enumerate(motion):
+        stretch = min(max(stretch + position - previous, -largest_stretch), largest_stretch)
+        previous = position
+        spring_stretch = max(abs(stretch) - 0.5 * truth.play, 0.0)
+        dry[n] = math.copysign(spring * spring_stretch, stretch)
+    return dry + viscous + truth.stiffness * motion + truth.preload
 
 
 def sample(random: np.random.Generator, signal: Array, noise: float, bit: float) -> Array:
-    """What a converter makes of a signal."""
+    """Return a signal with white noise, rms, rounded to a bit, both in its unit."""
     noisy = signal + noise * random.standard_normal(len(signal))
     return np.round(noisy / bit) * bit if bit > 0.0 else noisy

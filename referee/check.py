@@ -1,5 +1,4 @@
-"""Runs the withheld-effect check: the referee in one process, diagnoses in others, the key opened
-last."""
+"""The withheld-effect check: a referee process, diagnoses in others, and a key opened last."""
 
 from __future__ import annotations
 
@@ -18,16 +17,31 @@ from rigtwin.interruptions import held_back
 from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
-"""Contents of a case's recordings: the one that is diagnosed, the one held out, and further ones to
-be diagnosed with the first. A worker needs no disk in common."""
+"""Contents of a case's recordings: the diagnosed one, the held-out one, then further ones.
+
+Contents travel instead of paths, so workers need no shared disk.
+"""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A check. key: what the referee did, an entry a case; answers: what the diagnosis said, a JSON
-    document a case; crude: what the black-box baseline named, of the cases it was tried on;
-    settled: what it said of the cases for which it had proposed a next test, with that test;
-    commitment: SHA-256 of salt and key, given before any answer."""
+    """Result of a check.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of the referee.
+    commitment : str
+        SHA-256 of salt and key, published before any answer.
+    key : list of dict
+        The referee's key, one entry per case.
+    answers : list of dict
+        The diagnoses' answers, one JSON document per case.
+    crude : dict
+        Number of a case → effect named by the black-box baseline.
+    settled : dict
+        Number of a case → answer after the next test that its diagnosis had proposed.
+    """
 
     seed: int
     commitment: str
@@ -45,15 +59,37 @@ def check(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Result:
-    """The whole check. folder: recordings and answers; answers that are there for the same
-    recordings are kept, so that an interrupted check goes on. progress is called once a recording
-    and once an answer.
+    """Run the whole check.
 
-    Raises RigtwinError if the referee fails, or its key is not the one that it committed itself to.
+    Parameters
+    ----------
+    folder : Path
+        Folder of recordings and answers. Answers to equal recordings are reused, so an
+        interrupted check resumes.
+    cases, seed : int
+        Number of cases, and seed of the referee.
+    baselines : bool
+        Whether the black-box baseline runs as well.
+    workers : Workers
+        Processes that diagnose.
+    progress : callable
+        Function called with 1 after every recording and every answer.
+
+    Returns
+    -------
+    Result
+        Key and answers.
+
+    Raises
+    ------
+    RigtwinError
+        If the referee fails, or its key does not match its commitment.
     """
     recordings = folder / f"seed-{seed}"
+    # The seed is part of the path: two checks never mix their recordings.
     recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
+    # Block SIGINT while the referee starts: Ctrl-C would end it in its imports.
     with held_back():
         started = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -64,17 +100,17 @@ def check(
         commitment = ""
         try:
             for line in referee.stdout:
-                word, _, rest = line.partition(" ")
+                word, _, value = line.partition(" ")
                 if word == "case":
                     progress(1)
                 elif word == "commitment":
-                    commitment = rest.strip()
+                    commitment = value.strip()
                     break
             if not commitment:
-                raise RigtwinError("the referee ended before it committed itself to a key")
+                raise RigtwinError("the referee ended before it published a commitment to its key")
             (recordings / "commitment.txt").write_text(commitment + "\n")
-            given = _diagnose_all(recordings, cases, workers, progress)
-            settled = _run_next_tests(recordings, given, referee.stdin, referee.stdout, workers)
+            answers = _diagnose_all(recordings, cases, workers, progress)
+            settled = _run_next_tests(recordings, answers, referee.stdin, referee.stdout, workers)
             crude = _crude(recordings, cases, workers) if baselines else {}
         except BaseException:
             referee.kill()
@@ -83,15 +119,18 @@ def check(
         referee.stdin.flush()
         salt = referee.stdout.readline().partition(" ")[2].strip()
         opened = referee.stdout.readline().strip()
+    # The key was fixed before the first answer only if its hash matches.
     if hashlib.sha256((salt + opened).encode()).hexdigest() != commitment:
-        raise RigtwinError("the referee's key is not the one that it committed itself to")
+        raise RigtwinError("the referee's key does not match its commitment")
     (recordings / "key.json").write_text(opened + "\n")
-    return Result(seed, commitment, json.loads(opened), given, crude, settled)
+    return Result(seed, commitment, json.loads(opened), answers, crude, settled)
 
 
 def _diagnose_all(
     recordings: Path, cases: int, workers: Workers, progress: Callable[[int], object]
 ) -> list[dict[str, Any]]:
+    """Return the answers to all cases, in their order."""
+
     def jobs() -> Iterator[tuple[str, Files]]:
         for number in range(cases):
             files = [path.read_bytes() for path in _paths(recordings, number)]
@@ -105,19 +144,19 @@ def _diagnose_all(
 
 def _run_next_tests(
     recordings: Path,
-    given: Sequence[dict[str, Any]],
-    ask: IO[str],
+    first_answers: Sequence[dict[str, Any]],
+    requests: IO[str],
     answers: IO[str],
     workers: Workers,
 ) -> dict[int, dict[str, Any]]:
-    """What the diagnosis says with the test that it proposed, of the cases where it did."""
+    """Return the answers with the next test, for the cases whose diagnosis proposed one."""
     keys: dict[int, str] = {}
-    for number, said in enumerate(given):
-        if said["next_test"] is not None:
-            ask.write(f"next {number} {said['next_test']['experiment']}\n")
-            ask.flush()
+    for number, first_answer in enumerate(first_answers):
+        if first_answer["next_test"] is not None:
+            requests.write(f"next {number} {first_answer['next_test']['experiment']}\n")
+            requests.flush()
             if not answers.readline().startswith("recorded"):
-                raise RigtwinError("the referee ended before it recorded the test it was asked for")
+                raise RigtwinError("the referee ended before it recorded the requested test")
             keys[number] = _key(recordings, number, FURTHER)
 
     def jobs() -> Iterator[tuple[str, Files]]:
@@ -130,25 +169,28 @@ def _run_next_tests(
 
 
 RECORDED = ("", "-held-out")
-"""Endings of the names of a case's recordings,"""
+"""Suffixes of the names of a case's recordings."""
 FURTHER = (*RECORDED, "-next")
-"""and with the test that was proposed."""
+"""Suffixes that include the proposed test."""
 
 
 def _paths(recordings: Path, number: int, endings: Sequence[str] = RECORDED) -> list[Path]:
+    """Return the paths of a case's recordings."""
     return [recordings / f"{number:03d}{ending}.mcap" for ending in endings]
 
 
 def _key(recordings: Path, number: int, endings: Sequence[str] = RECORDED) -> str:
-    """Of a case: another recording is another question."""
+    """Return the key of a stored answer: a hash of the recordings it is based on."""
     return hashlib.sha256(
         b"".join(path.read_bytes() for path in _paths(recordings, number, endings))
     ).hexdigest()
 
 
 def answer(files: Files) -> dict[str, Any]:
-    """One case's answer, of its recording, the one held out, and a further one if there is one.
-    Runs where there are neither the key nor the other cases."""
+    """Return the answer to one case: its recording, the held-out one, and further ones if any.
+
+    The function runs in a worker, which has neither the key nor the other cases.
+    """
     from machines import DEFAULT_MACHINE
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
@@ -164,12 +206,12 @@ def answer(files: Files) -> dict[str, Any]:
         first, held_out, *further = recordings
         machine = find(DEFAULT_MACHINE)
         tests = [find_experiment(machine, name) for name in machine.next_tests]
-        found = diagnose(machine, [first, *further], held_out=[held_out], tests=tests)
-        return found.document()
+        diagnosis = diagnose(machine, [first, *further], held_out=[held_out], tests=tests)
+        return diagnosis.document()
 
 
 def name_effect(content: bytes) -> str:
-    """What the black-box baseline names in a recording."""
+    """Return the effect that the black-box baseline names in a recording."""
     from referee.crude import black_box
 
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
@@ -179,6 +221,7 @@ def name_effect(content: bytes) -> str:
 
 
 def _crude(recordings: Path, cases: int, workers: Workers) -> dict[int, str]:
+    """Return the baseline's names for the first cases, by number."""
     from referee.crude import TRIED
 
     jobs = (

@@ -1,5 +1,4 @@
-"""What the diagnosis is measured against: the twin's own closed loop with each effect, the best fit
-named."""
+"""A baseline for the diagnosis: simulate the closed loop with every effect, name the best fit."""
 
 from __future__ import annotations
 
@@ -18,22 +17,22 @@ from rigtwin.signals.noise import white_noise
 from rigtwin.simulation.runner import simulate, without_limits
 
 TRIED = 24
-"""Cases that it is tried on: it runs the twin some two hundred times for each."""
+"""Number of cases that the baseline runs on: each takes about two hundred simulations."""
 SECONDS = 6.0
-"""s of each test."""
+"""Part of a test that is compared, s."""
 BETTER = 0.98
-"""Share of the nominal misfit below which an effect counts as found."""
+"""Share of the nominal misfit below which an effect is named."""
 NO_SIZES = Scales(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-"""The rig's starts need no sizes of its motion."""
+"""Placeholder scales: the search starts of the rig do not depend on its motion."""
 
 
 def black_box(path: Path) -> str:
-    """The effect whose closed loop comes nearest to a recording tick by tick, or `none`."""
+    """Return the effect whose closed loop fits a recording best, tick by tick, or `none`."""
     recording = load(path)
     machine = find(DEFAULT_MACHINE)
     configuration = machine.configuration_of(recording)
     ticks = min(recording.ticks, round(SECONDS / recording.period))
-    free = without_limits(
+    unlimited = without_limits(
         configuration._replace(
             timing=configuration.timing._replace(timestep=0.5 * recording.period)
         )
@@ -47,7 +46,8 @@ def black_box(path: Path) -> str:
     noise = np.array([white_noise(row) for row in measured])
 
     def misfit(plant: RigPlant) -> float:
-        truth = simulate(free._replace(plant=plant), demands, 0).truth.T
+        # The closed loop amplifies every difference, so this misfit is far from convex.
+        truth = simulate(unlimited._replace(plant=plant), demands, 0).truth.T
         return float(np.mean(((measured - truth) / noise[:, None]) ** 2))
 
     best, name = BETTER * misfit(configuration.plant), "none"

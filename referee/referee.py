@@ -1,10 +1,10 @@
-"""The referee: draws rigs, runs them, writes recordings without a hint, commits itself to a key,
-and opens it when asked.
+"""The referee: draws rigs, records tests, commits itself to a key, and opens it on request.
 
-Run as a process of its own: `python -m referee.referee FOLDER CASES SEED`. It answers on standard
-output: one line a case, then `commitment SHA-256`. On its standard input `next NUMBER TEST` asks
-for that test on the rig of a case, and `open` for the salt and the key. It imports nothing of the
-twin, its effects or its controllers.
+The recordings contain no hint of the defects. The referee runs as a separate process,
+`python -m referee.referee FOLDER CASES SEED`. On standard output it prints one line per case, then
+`commitment SHA-256`. On standard input, `next NUMBER TEST` requests a further test on the rig of a
+case, and `open` requests the salt and the key. It imports nothing of the twin, its effects or its
+controllers.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from referee.draw import (
     draw_tolerated,
     draw_unnamed,
     effect_size,
-    library,
+    named_defects,
     summary,
 )
 from referee.reference_plant import Array, Truth
@@ -34,13 +34,13 @@ from referee.reference_rig import Law, run
 from referee.test_signals import PROPOSED, TESTS, draw_demands
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}
-"""Of all cases."""
+"""Share of every sort among the cases."""
 COMMANDS = ("ground", "structure", "force", "voltage")
 READ = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
 
 
 def sorts(cases: int, random: np.random.Generator) -> list[str]:
-    """The sort of each case, in random order, with the shares as near as whole numbers allow."""
+    """Return the sorts of all cases in random order, in the shares of `SHARES`, rounded."""
     counts = {name: int(share * cases) for name, share in SHARES.items()}
     counts["single"] += cases - sum(counts.values())
     names = [name for name, count in counts.items() for _ in range(count)]
@@ -49,14 +49,25 @@ def sorts(cases: int, random: np.random.Generator) -> list[str]:
 
 
 def choose(groups: list[list[Any]], random: np.random.Generator) -> Defect:
-    """One defect: the component first, so that none is rare because it has few kinds."""
+    """Draw a defect: first its component, so that components with few kinds are not rare."""
     group = groups[int(random.integers(len(groups)))]
     return group[int(random.integers(len(group)))]()
 
 
-class Case(NamedTuple):
-    """entry: of the key; recordings: what the operator set, commands and sensors, the second held
-    out; truth, change: the rig, and what becomes of a controller on it."""
+class RigCase(NamedTuple):
+    """A rig with its defects and its recordings.
+
+    Attributes
+    ----------
+    entry : dict
+        Entry of the key.
+    recordings : list
+        Recorded settings, commands and sensors; the second recording is held out.
+    truth : Truth
+        Rig with its defects.
+    change : callable
+        Function that returns the true settings of a controller on this rig.
+    """
 
     entry: dict[str, Any]
     recordings: list[tuple[Law, Array, Array]]
@@ -64,12 +75,12 @@ class Case(NamedTuple):
     change: Callable[[Law], Law]
 
 
-def draw_case(sort: str, random: np.random.Generator) -> Case:
-    """One case."""
+def draw_case(sort: str, random: np.random.Generator) -> RigCase:
+    """Draw a case of a sort: `single`, `null`, `pair` or `outside`."""
     rig = draw_tolerated(random)
     test = str(random.choice(TESTS if sort != "pair" else TESTS[:3]))
     law, demands = draw_demands(test, random)
-    plain, _ = run(rig, law, demands, np.random.default_rng(0))
+    nominal_commands, _ = run(rig, law, demands, np.random.default_rng(0))
     defects: list[Defect] = []
     sizes: list[float] = []
     while len(defects) < {"single": 1, "null": 0, "pair": 2, "outside": 1}[sort]:
@@ -77,20 +88,20 @@ def draw_case(sort: str, random: np.random.Generator) -> Case:
             options = draw_unnamed(random)
             drawn = options[int(random.integers(len(options)))]()
         else:
-            drawn = choose(library(plain, random), random)
-        size = effect_size(rig, law, drawn, plain)
-        # A defect that this test does not show is asked for only where it is alone and inside the
-        # library.
-        shown = sort == "single" or size >= MATERIAL
-        if shown and drawn.component not in [other.component for other in defects]:
+            drawn = choose(named_defects(nominal_commands, random), random)
+        size = effect_size(rig, law, drawn, nominal_commands)
+        # Immaterial defects are kept as single ones of the library only: there they test that the
+        # diagnosis names nothing wrong.
+        accepted = sort == "single" or size >= MATERIAL
+        if accepted and drawn.component not in [defect.component for defect in defects]:
             defects.append(drawn)
             sizes.append(size)
-    truth, real = rig, law
+    truth, true_law = rig, law
     for defect in defects:
-        truth, real = defect.change(truth, real)
-    recordings = [(law, *run(truth, real, demands, random))]
-    _, again = draw_demands("imposed" if test == "tripped" else test, random)
-    recordings.append((law, *run(truth, real, again, random)))
+        truth, true_law = defect.change(truth, true_law)
+    recordings = [(law, *run(truth, true_law, demands, random))]
+    _, held_out_demands = draw_demands("imposed" if test == "tripped" else test, random)
+    recordings.append((law, *run(truth, true_law, held_out_demands, random)))
     entry = {
         "sort": sort,
         "test": test,
@@ -99,23 +110,23 @@ def draw_case(sort: str, random: np.random.Generator) -> Case:
         "effects": [summary(defect, size) for defect, size in zip(defects, sizes, strict=True)],
     }
 
-    def change(told: Law) -> Law:
-        own = rig, told
+    def change(intended: Law) -> Law:
+        changed = rig, intended
         for defect in defects:
-            own = defect.change(*own)
-        return own[1]
+            changed = defect.change(*changed)
+        return changed[1]
 
-    return Case(entry, recordings, truth, change)
+    return RigCase(entry, recordings, truth, change)
 
 
-def record_next(case: Case, test: str, random: np.random.Generator) -> tuple[Law, Array, Array]:
-    """A further test on the rig of a case."""
+def record_next(case: RigCase, test: str, random: np.random.Generator) -> tuple[Law, Array, Array]:
+    """Record a further test on the rig of a case."""
     law, demands = draw_demands(test, random)
     return law, *run(case.truth, case.change(law), demands, random)
 
 
 def operator(law: Law) -> dict[str, Any]:
-    """The settings as a recording keeps them."""
+    """Return the settings as a recording stores them."""
     return {
         "mode": "imposed" if law.imposed else "mil",
         "travel": "wheel",
@@ -142,11 +153,12 @@ def operator(law: Law) -> dict[str, Any]:
 
 
 def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
-    """A recording in the project's format, JSON messages."""
+    """Write a recording in the project's format, with JSON messages."""
     with path.open("wb") as file:
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start()
         config = json.dumps({"controller": operator(law)})
+        # No seed, no truth: the metadata must not hint at the defects.
         about = {
             "format": "1",
             "machine": "suspension-rig",
@@ -166,6 +178,7 @@ def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
                 channels, (commands[tick], sensors[tick]), strict=True
             ):
                 message = json.dumps(
+                    # Nine digits: more would only store the rounding of the simulation.
                     dict(zip(names, (float(f"{value:.9g}") for value in row), strict=True))
                 ).encode()
                 writer.add_message(channel, tick * 1_000_000, message, tick * 1_000_000)
@@ -173,12 +186,13 @@ def write(path: Path, law: Law, commands: Array, sensors: Array) -> None:
 
 
 def main(arguments: list[str]) -> int:
+    """Run the referee's protocol; arguments: folder, number of cases, seed."""
     folder, cases, seed = Path(arguments[0]), int(arguments[1]), int(arguments[2])
     folder.mkdir(parents=True, exist_ok=True)
     order = sorts(cases, np.random.default_rng([seed, 0]))
-    cases_drawn: list[Case] = []
+    cases_drawn: list[RigCase] = []
     for number, sort in enumerate(order):
-        # Each case has a stream of its own, so that one more case leaves the others as they are.
+        # Every case has a random stream of its own, so a further case does not change the others.
         case = draw_case(sort, np.random.default_rng([seed, 1, number]))
         for name, recording in zip(
             (f"{number:03d}.mcap", f"{number:03d}-held-out.mcap"), case.recordings, strict=True
@@ -186,6 +200,7 @@ def main(arguments: list[str]) -> int:
             write(folder / name, *recording)
         cases_drawn.append(case)
         print(f"case {number}", flush=True)
+    # The salt keeps the key from being guessed by hashing all possible keys.
     salt = hashlib.sha256(np.random.default_rng([seed, 2]).bytes(32)).hexdigest()
     opened = json.dumps([case.entry for case in cases_drawn])
     print("commitment", hashlib.sha256((salt + opened).encode()).hexdigest(), flush=True)
@@ -203,8 +218,8 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    # Who interrupts the check interrupts this too, and hears of it once. Until now, while packages
-    # were imported, the check kept it back.
+    # Ctrl-C reaches the check and this process. The check blocked the signal while packages were
+    # imported; from here on it ends this process without a traceback.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -1,5 +1,4 @@
-"""The rig's own controller on the referee's plant: what a test would be on a rig that the twin is
-not."""
+"""The rig's controller on the referee's plant: tests on a rig that differs from the twin."""
 
 from __future__ import annotations
 
@@ -45,13 +44,15 @@ def _ticks(
     sensors_out: Array,
     truth_out: Array,
 ) -> tuple[int, int]:
-    """Ticks done, and the number of a Trip."""
+    """Run a test in place; return the completed ticks and the number of a `Trip`."""
+    # Compiled code takes tuples of fixed size, so the packed state travels as an array.
     state = unpacked(to_fixed_tuple(memory, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(demands)):
         values = true_values(body)
         sample(truth, body, tick, noise[tick], sensors_out[tick])
         row = sensors_out[tick]
         measured = Measurements(row[0], row[1], row[2], row[3])
+        # A missed tick keeps the commands of the tick before.
         if missed[tick] == 0.0:
             state, commands = update(
                 controlling,
@@ -80,8 +81,24 @@ def _ticks(
 def drive(
     truth: Truth, configuration: Configuration, demands: Array, seed: int
 ) -> SimulationResult:
-    """Runs `demands`, shape (ticks, 3), with the configuration's controller and limits; its plant
-    is not looked at."""
+    """Run a test on the referee's plant with the rig's controller and limits.
+
+    Parameters
+    ----------
+    truth : Truth
+        Plant.
+    configuration : Configuration
+        Settings of controller, limits and timing. Its plant is ignored.
+    demands : ndarray
+        Ground, m, structure, m, and force, N, shape (ticks, 3).
+    seed : int
+        Seed of noise and missed ticks.
+
+    Returns
+    -------
+    SimulationResult
+        Result up to the end or the trip.
+    """
     settings, ticks = configuration.controller, len(demands)
     controlling = controller(settings, configuration.timing.period)
     start = initial_state(controlling)
@@ -89,7 +106,7 @@ def drive(
     noise, missed = draw_noise(truth, ticks, np.random.default_rng([seed, 5]))
     commands, sensors, true = (np.empty((ticks, 4)) for _ in range(3))
     held = np.array([demands[0, 0], settings.start, settings.preload, settings.preload / 186.0])
-    done, number = _ticks(
+    completed, number = _ticks(
         truth=truth,
         body=body,
         controlling=controlling,
@@ -105,4 +122,6 @@ def drive(
         sensors_out=sensors,
         truth_out=true,
     )
-    return SimulationResult(commands[:done], sensors[:done], true[:done], Trip(number))
+    return SimulationResult(
+        commands[:completed], sensors[:completed], true[:completed], Trip(number)
+    )

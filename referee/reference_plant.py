@@ -1,9 +1,9 @@
-"""The referee's rig: written from the same description as the twin, and from nothing of the twin.
+"""The referee's rig, written from the same description as the twin but without any of its code.
 
-Steps of 50 us; hydraulics as a chain of integrators advanced by the midpoint rule; dry friction
-either set-valued, solved by projection, or as a bristle that yields before it slides; a tyre whose
-contact sets in over a tenth of a millimetre. Every defect that the referee can give the rig is a
-number of `Truth`; its defaults are the rig without defects.
+The integration step is 50 µs. The hydraulics are a chain of integrators, advanced by the midpoint
+rule. Dry friction is set-valued, solved by projection, or a bristle that yields before it slides.
+The contact of the tyre sets in over a tenth of a millimetre. Every defect of the rig is a field of
+`Truth`, whose defaults are the rig without defects.
 """
 
 from __future__ import annotations
@@ -17,78 +17,164 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 STEP = 5e-5
-"""s"""
+"""Integration step, s."""
 ONSET = 1e-4
-"""m, over which the tyre's contact sets in."""
+"""Deflection over which the contact of the tyre sets in, m."""
 NEVER = 1e9
+"""Value of a limit that is never reached."""
 
 
 class Slider(NamedTuple):
-    """Something that slides. lost: play in series with the friction, m; wave: share by which
-    friction changes along the way; drag: friction with the square of the speed, N/(m/s)²."""
+    """Sliding part with dry and viscous friction.
+
+    Attributes
+    ----------
+    coulomb, viscous : float
+        Coulomb friction, N, and viscous friction, Ns/m.
+    peak, peak_speed, peak_shape : float
+        Additional friction at standstill, N, the speed at which it fades, m/s, and the exponent.
+    asymmetry : float
+        Difference of the dry friction between the two directions, N.
+    play : float
+        Play in series with the friction, m.
+    wave, wave_length : float
+        Share by which friction varies along the way, and its wavelength, m.
+    drag : float
+        Friction with the squared speed, N/(m/s)².
+    """
 
     coulomb: float
     viscous: float = 0.0
     peak: float = 0.0
     peak_speed: float = 0.01
     peak_shape: float = 2.0
-    uneven: float = 0.0
-    lost: float = 0.0
+    asymmetry: float = 0.0
+    play: float = 0.0
     wave: float = 0.0
     wave_length: float = 0.02
     drag: float = 0.0
 
 
 class Drive(NamedTuple):
-    """What happens to a command. fading: share of the gain lost over a minute; dead is a dead
-    zone."""
+    """Path of a command to its actuator.
+
+    Attributes
+    ----------
+    gain : float
+        Gain.
+    lag, delay : float
+        First-order lag and delay, s.
+    limit, rate : float
+        Largest command, in its unit, and largest rate, per second.
+    dead_zone : float
+        Half width of a dead zone, in the command's unit.
+    fading : float
+        Share of the gain lost within a minute.
+    """
 
     gain: float = 1.0
     lag: float = 0.0
     delay: float = 0.0
     limit: float = NEVER
-    dead: float = 0.0
+    dead_zone: float = 0.0
     rate: float = NEVER
     fading: float = 0.0
 
 
 class Hydraulic(NamedTuple):
-    """speed m/s; yields m/N; lost: play between piston and plate, m; slower: its natural
-    frequencies are lower by this share; creep: m/s of its own motion."""
+    """Hydraulic cylinder.
+
+    Attributes
+    ----------
+    speed : float
+        Largest speed, m/s.
+    compliance : float
+        Yield under load, m/N.
+    play : float
+        Play between piston and plate, m.
+    slowdown : float
+        Share by which the natural frequencies are lower than nominal.
+    creep : float
+        Own motion of the piston, m/s.
+    """
 
     speed: float = 0.3
-    yields: float = 0.0
-    lost: float = 0.0
-    slower: float = 0.0
+    compliance: float = 0.0
+    play: float = 0.0
+    slowdown: float = 0.0
     creep: float = 0.0
 
 
 class Sensor(NamedTuple):
-    """white, mains, bit in the sensor's unit; bend: share of the full swing lost at its end; drift:
-    unit/s; picks_up: of the carriage's acceleration, unit/(m/s²)."""
+    """Sensor with its noise and defects; `u` stands for the sensor's unit.
+
+    Attributes
+    ----------
+    white, mains : float
+        White noise, u rms, and amplitude of the 50 Hz hum, u.
+    bit : float
+        Resolution, u.
+    gain, offset : float
+        Gain, and offset, u.
+    lag, delay : float
+        First-order lag and delay, s.
+    curvature, full_scale : float
+        Share of the reading lost at full scale, and the full scale, u.
+    drift : float
+        Drift, u/s.
+    crosstalk : float
+        Reading per acceleration of the carriage, u/(m/s²).
+    """
 
     white: float
     mains: float
     bit: float
     gain: float = 1.0
-    zero: float = 0.0
+    offset: float = 0.0
     lag: float = 0.0
     delay: float = 0.0
-    bend: float = 0.0
-    full: float = 1.0
+    curvature: float = 0.0
+    full_scale: float = 1.0
     drift: float = 0.0
-    picks_up: float = 0.0
+    crosstalk: float = 0.0
 
 
-LVDT = Sensor(6e-5, 2e-4, 4.6e-6, full=0.03)
-CELL = Sensor(1.5, 5.0, 0.076, full=400.0)
+LVDT = Sensor(6e-5, 2e-4, 4.6e-6, full_scale=0.03)
+CELL = Sensor(1.5, 5.0, 0.076, full_scale=400.0)
 
 
 class Truth(NamedTuple):
-    """The whole rig. bristle: N/m, 0 for set-valued friction; relaxing: share of the tyre's
-    stiffness that relaxes, in `relaxing_time` s; yielding: s, a cylinder's lag behind its load, 0
-    for none;
-    late: computation delay, s; missed: share of ticks."""
+    """Parameters of the whole rig.
+
+    Attributes
+    ----------
+    mass : float
+        Mass of the carriage, kg.
+    rail, motor : Slider
+        Friction of the rail and of the motor's rod.
+    tyre, tyre_damping, tyre_hardening : float
+        Stiffness, N/m, and damping, Ns/m, of the tyre, and its stiffening, 1/m.
+    relaxing, relaxing_time : float
+        Share of the tyre's stiffness that relaxes, and its time constant, s.
+    motor_constant, electrical_lag : float
+        Force per voltage of the motor, N/V, and lag of its current, s.
+    ripple, ripple_pitch, ripple_phase : float
+        Cogging of the motor: amplitude, N, pitch, m, and phase, rad.
+    voltage, ground, structure : Drive
+        Paths of the three commands.
+    ground_hydraulic, structure_hydraulic : Hydraulic
+        Cylinders.
+    ground_lvdt, structure_lvdt, suspension_lvdt, load_cell : Sensor
+        Sensors.
+    computation_delay : float
+        Delay of all commands by the computer, s.
+    missed : float
+        Share of missed ticks.
+    bristle : float
+        Stiffness of bristle friction, N/m. 0 stands for set-valued friction.
+    load_lag : float
+        Lag of a compliant cylinder behind its load, s. 0 stands for none.
+    """
 
     mass: float = 34.0
     rail: Slider = Slider(50.0)
@@ -97,8 +183,8 @@ class Truth(NamedTuple):
     tyre_hardening: float = 0.0
     relaxing: float = 0.0
     relaxing_time: float = 0.05
-    constant: float = 186.0
-    electrical: float = 1.26e-3
+    motor_constant: float = 186.0
+    electrical_lag: float = 1.26e-3
     motor: Slider = Slider(14.0)
     ripple: float = 0.0
     ripple_pitch: float = 0.03
@@ -112,19 +198,23 @@ class Truth(NamedTuple):
     structure_lvdt: Sensor = LVDT
     suspension_lvdt: Sensor = LVDT
     load_cell: Sensor = CELL
-    late: float = 0.0
+    computation_delay: float = 0.0
     missed: float = 0.0
     bristle: float = 0.0
-    yielding: float = 4e-3
+    load_lag: float = 4e-3
 
 
 @numba.njit(cache=True, nogil=True)
-def dry(of: Slider, speed: float, place: float) -> tuple[float, float]:
-    """The bounds of dry friction at this speed and place: in positive and in negative direction,
-    N."""
-    size = of.coulomb + of.peak * math.exp(-((abs(speed) / of.peak_speed) ** of.peak_shape))
-    size *= 1.0 + of.wave * math.sin(2.0 * math.pi * place / of.wave_length)
-    return max(size + 0.5 * of.uneven, 0.0), max(size - 0.5 * of.uneven, 0.0)
+def dry_bounds(slider: Slider, speed: float, position: float) -> tuple[float, float]:
+    """Return the bounds of dry friction in positive and in negative direction, N.
+
+    The size is F_c + F_p exp(−(|v|/v_s)^n), times the variation along the way.
+    """
+    size = slider.coulomb + slider.peak * math.exp(
+        -((abs(speed) / slider.peak_speed) ** slider.peak_shape)
+    )
+    size *= 1.0 + slider.wave * math.sin(2.0 * math.pi * position / slider.wave_length)
+    return max(size + 0.5 * slider.asymmetry, 0.0), max(size - 0.5 * slider.asymmetry, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -137,12 +227,16 @@ def solve(
     rod_down: float,
     plate: float,
 ) -> float:
-    """The carriage's velocity by bisection on the monotone balance of impulses; rod friction acts
-    on plate − v."""
+    """Return the velocity of the carriage after a step, m/s.
+
+    Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with impulses in Ns. The left side rises
+    monotonically with v, with jumps where rail or rod stick, so bisection always converges.
+    """
+    # No friction can move the carriage beyond these bounds: they bracket the root.
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
     for guess in (0.0, plate):
-        # A velocity at which something sticks is a solution if the bounds straddle it.
+        # Sticking is a solution if zero lies within the jump of the balance there.
         least = mass * guess - rhs
         most = least
         least += -rail_down if guess <= 0.0 else rail_up
@@ -173,12 +267,14 @@ def slide(
     rod_up: float,
     rod_down: float,
 ) -> tuple[float, float, float]:
-    """The carriage's next velocity, and the rod's smooth and dry friction on it, for a velocity of
-    the plate; push: all other forces on the carriage."""
+    """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
+
+    v, plate: velocities of carriage and plate, m/s; push: all other forces on the carriage, N.
+    """
     sliding = plate - v
-    smooth = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-    after = solve(
-        truth.mass * v + STEP * (push + smooth),
+    viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
+    next_velocity = solve(
+        truth.mass * v + STEP * (push + viscous),
         truth.mass,
         STEP * rail_up,
         STEP * rail_down,
@@ -186,16 +282,16 @@ def slide(
         STEP * rod_down,
         plate,
     )
-    if after > plate:
-        return after, smooth, -rod_down
-    if after < plate:
-        return after, smooth, rod_up
-    rail = rail_up if after > 0.0 else (-rail_down if after < 0.0 else 0.0)
-    dry_force = truth.mass * (after - v) / STEP - push - smooth + rail
-    if after == 0.0:
-        # Both stick: what the rail can bear, it bears.
+    if next_velocity > plate:
+        return next_velocity, viscous, -rod_down
+    if next_velocity < plate:
+        return next_velocity, viscous, rod_up
+    rail = rail_up if next_velocity > 0.0 else (-rail_down if next_velocity < 0.0 else 0.0)
+    dry_force = truth.mass * (next_velocity - v) / STEP - push - viscous + rail
+    if next_velocity == 0.0:
+        # Both stick: the division between them is undetermined. The rail takes what it can.
         dry_force = dry_force - max(-rail_up, min(rail_down, dry_force))
-    return after, smooth, max(-rod_down, min(rod_up, dry_force))
+    return next_velocity, viscous, max(-rod_down, min(rod_up, dry_force))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -203,7 +299,7 @@ def plate_under_load(
     truth: Truth,
     v: float,
     unloaded: float,
-    yielded: float,
+    deflection: float,
     pull: float,
     push: float,
     rail_up: float,
@@ -211,16 +307,18 @@ def plate_under_load(
     rod_up: float,
     rod_down: float,
 ) -> float:
-    """The load of a structure plate that yields to it, N, by bisection: a greater one lets the
-    plate run ahead, which makes it smaller. pull: of the motor, N."""
-    slack = truth.yielding + STEP
-    wide = rod_up + rod_down + 1.0 + abs(pull)
-    low, high = pull - wide, pull + wide
+    """Return the load of a compliant structure plate, N, by bisection; pull: motor force, N.
+
+    A greater load lets the plate run ahead, which reduces the load, so the balance is monotone.
+    """
+    lag = truth.load_lag + STEP
+    reach = rod_up + rod_down + 1.0 + abs(pull)
+    low, high = pull - reach, pull + reach
     for _ in range(45):
         load = 0.5 * (low + high)
-        plate = unloaded + (truth.structure_hydraulic.yields * load - yielded) / slack
-        _, smooth, dry_force = slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
-        if load > pull - smooth - dry_force:
+        plate = unloaded + (truth.structure_hydraulic.compliance * load - deflection) / lag
+        _, viscous, dry_force = slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+        if load > pull - viscous - dry_force:
             high = load
         else:
             low = load
@@ -236,30 +334,39 @@ def pass_command(
     command: float,
     centred: bool,
     time: float,
-    late: float,
+    computation_delay: float,
 ) -> float:
-    """A command through a drive, one step. memory: rate limit's, lag's and dead zone's output."""
+    """Return a command after its path, for one step.
+
+    memory: outputs of rate limit, lag and dead zone, shape (3,); history: past commands, a ring of
+    steps; centred: whether the dead zone is about zero, as of a voltage, or follows the command as
+    play does, as of a position.
+    """
     length = len(history)
     history[count % length] = command
-    back = (drive.delay + late) / STEP
-    whole = int(back)
-    part = back - whole
-    one, other = history[(count - whole) % length], history[(count - whole - 1) % length]
-    wanted = one + part * (other - one)
-    if drive.dead > 0.0:
+    steps_back = (drive.delay + computation_delay) / STEP
+    whole = int(steps_back)
+    fraction = steps_back - whole
+    # A delay of a fraction of a step is interpolated, so it is continuous in its parameter.
+    newer, older = history[(count - whole) % length], history[(count - whole - 1) % length]
+    wanted = newer + fraction * (older - newer)
+    if drive.dead_zone > 0.0:
         if centred:
             wanted = (
-                0.0 if abs(wanted) <= drive.dead else wanted - math.copysign(drive.dead, wanted)
+                0.0
+                if abs(wanted) <= drive.dead_zone
+                else wanted - math.copysign(drive.dead_zone, wanted)
             )
         else:
-            if wanted > memory[2] + drive.dead:
-                memory[2] = wanted - drive.dead
-            elif wanted < memory[2] - drive.dead:
-                memory[2] = wanted + drive.dead
+            if wanted > memory[2] + drive.dead_zone:
+                memory[2] = wanted - drive.dead_zone
+            elif wanted < memory[2] - drive.dead_zone:
+                memory[2] = wanted + drive.dead_zone
             wanted = memory[2]
     wanted *= drive.gain * (1.0 - drive.fading * time / 60.0)
     wanted = max(-drive.limit, min(drive.limit, wanted))
     most = drive.rate * STEP
+    # Rate limit before the lag, as an amplifier limits its input.
     memory[0] += max(-most, min(most, wanted - memory[0]))
     if drive.lag > 0.0:
         memory[1] += STEP / (drive.lag + STEP) * (memory[0] - memory[1])
@@ -269,16 +376,20 @@ def pass_command(
 
 
 @numba.njit(cache=True, nogil=True)
-def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> float:
-    """The identified response in cascade form, midpoint rule; returns the plate's next position,
-    m."""
-    w = 1.0 - of.slower
+def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) -> float:
+    """Advance a cylinder by one step and return the next position of its piston, m.
+
+    z: states of the identified response in observer form, shape (4,); plate: position of the
+    piston, m.
+    """
+    # H(s) of thesis Eq. 6.2. A slower cylinder scales its frequencies: a_k → a_k w^(n − k).
+    w = 1.0 - cylinder.slowdown
     a3, a2, a1, a0 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3, 6.281e5 * w**4
     b2, b1, b0 = 1817.0 * w**2, 7.719e4 * w**3, 6.243e5 * w**4
     scale = 6.281e5 / 6.243e5
     z0, z1, z2, z3 = z[0], z[1], z[2], z[3]
     for half in range(2):
-        # Observer form: the output is the first state.
+        # Observer form: the output is the first state. Two passes make the midpoint rule.
         d0 = z1 - a3 * z0
         d1 = z2 - a2 * z0 + scale * b2 * command
         d2 = z3 - a1 * z0 + scale * b1 * command
@@ -286,33 +397,34 @@ def hydraulic_step(of: Hydraulic, z: Array, plate: float, command: float) -> flo
         share = 0.5 * STEP if half == 0 else STEP
         z0, z1, z2, z3 = z[0] + share * d0, z[1] + share * d1, z[2] + share * d2, z[3] + share * d3
     z[0], z[1], z[2], z[3] = z0, z1, z2, z3
-    most = of.speed * STEP
-    return plate + max(-most, min(most, z0 - plate)) + of.creep * STEP
+    # The servo valve saturates: the piston follows the linear response up to its largest speed.
+    most = cylinder.speed * STEP
+    return plate + max(-most, min(most, z0 - plate)) + cylinder.creep * STEP
 
 
 @numba.njit(cache=True, nogil=True)
-def take_up(of: Hydraulic, plate: float, piston: float) -> float:
-    """Where a piston with play leaves the plate, m."""
-    if piston - plate > 0.5 * of.lost:
-        return piston - 0.5 * of.lost
-    if plate - piston > 0.5 * of.lost:
-        return piston + 0.5 * of.lost
+def take_up(cylinder: Hydraulic, plate: float, piston: float) -> float:
+    """Return the position of a plate that a piston with play moves, m."""
+    if piston - plate > 0.5 * cylinder.play:
+        return piston - 0.5 * cylinder.play
+    if plate - piston > 0.5 * cylinder.play:
+        return piston + 0.5 * cylinder.play
     return plate
 
 
 @numba.njit(cache=True, nogil=True)
-def settle(z: Array, at: float, of: Hydraulic) -> None:
-    """At rest with its output at `at`."""
-    w, scale = 1.0 - of.slower, 6.281e5 / 6.243e5
+def settle(z: Array, position: float, cylinder: Hydraulic) -> None:
+    """Set the states of a cylinder at rest to a position, m."""
+    w, scale = 1.0 - cylinder.slowdown, 6.281e5 / 6.243e5
     a3, a2, a1 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3
-    z[0], z[1] = at, a3 * at
-    z[2] = a2 * at - scale * 1817.0 * w**2 * at
-    z[3] = a1 * at - scale * 7.719e4 * w**3 * at
+    z[0], z[1] = position, a3 * position
+    z[2] = a2 * position - scale * 1817.0 * w**2 * position
+    z[3] = a1 * position - scale * 7.719e4 * w**3 * position
 
 
 @numba.njit(cache=True, nogil=True)
 def reading(
-    of: Sensor,
+    sensor: Sensor,
     value: float,
     acceleration: float,
     history: Array,
@@ -320,36 +432,55 @@ def reading(
     tick: int,
     noise: float,
 ) -> float:
-    """A sensor's sample."""
+    """Return one sample of a sensor, in its unit.
+
+    history: past values, a ring of ticks; memory: output of the lag, shape (1,); noise: of this
+    sample.
+    """
     length = len(history)
     if tick == 0:
         history[:] = value
         memory[0] = value
     history[tick % length] = value
-    back = of.delay / 1e-3
-    whole = int(back)
-    part = back - whole
-    one, other = history[(tick - whole) % length], history[(tick - whole - 1) % length]
-    late = one + part * (other - one)
+    ticks_back = sensor.delay / 1e-3
+    whole = int(ticks_back)
+    fraction = ticks_back - whole
+    newer, older = history[(tick - whole) % length], history[(tick - whole - 1) % length]
+    delayed = newer + fraction * (older - newer)
     memory[0] = (
-        memory[0] + (1.0 - math.exp(-1e-3 / of.lag)) * (late - memory[0]) if of.lag > 0.0 else late
+        memory[0] + (1.0 - math.exp(-1e-3 / sensor.lag)) * (delayed - memory[0])
+        if sensor.lag > 0.0
+        else delayed
     )
     x = memory[0]
     x = (
-        of.gain * x * (1.0 - of.bend * (x / of.full) ** 2)
-        + of.zero
-        + of.drift * tick * 1e-3
-        + of.picks_up * acceleration
+        sensor.gain * x * (1.0 - sensor.curvature * (x / sensor.full_scale) ** 2)
+        + sensor.offset
+        + sensor.drift * tick * 1e-3
+        + sensor.crosstalk * acceleration
     )
     x += noise
-    return round(x / of.bit) * of.bit if of.bit > 0.0 else x
+    return round(x / sensor.bit) * sensor.bit if sensor.bit > 0.0 else x
 
 
 class Body(NamedTuple):
-    """What the rig is at a moment, changed in place. motion: see ENTRIES, shape (19,); histories:
-    of the three commands under way, shape (3, 2048); memories: of their rate limit, lag and dead
-    zone, shape (3, 3); sensed: past values of the sensors, shape (4, 64); lags: of the sensors,
-    shape (4, 1); ground_z, structure_z: of the hydraulics, shape (4,)."""
+    """State of the rig, changed in place.
+
+    Attributes
+    ----------
+    motion : ndarray
+        Entries of `ENTRIES`, shape (19,).
+    histories : ndarray
+        Rings of past commands: voltage, ground, structure, shape (3, 2048).
+    memories : ndarray
+        Rate limit, lag and dead zone of these commands, shape (3, 3).
+    sensed : ndarray
+        Rings of past values of the sensors, shape (4, 64).
+    lags : ndarray
+        Lags of the sensors, shape (4, 1).
+    ground_z, structure_z : ndarray
+        States of the hydraulics, shape (4,).
+    """
 
     motion: Array
     histories: Array
@@ -385,14 +516,21 @@ ENTRIES = (
         "structure_piston",
     ),
 )
-"""Of `Body.motion`: plates, carriage, motor, tyre's relaxed part, bristles, ends of the play,
-yielding now and a step ago, carriage's acceleration, load cell, steps made, pistons; m, N, s."""
+"""Entries of `Body.motion`, in m, N and s.
+
+They are the plates, the carriage, the motor force, the relaxed part of the tyre, the bristles, the
+ends of the play, the yielding now and a step ago, the acceleration of the carriage, the load cell,
+the number of steps, and the pistons.
+"""
 
 
 @numba.njit(cache=True, nogil=True)
 def at_rest(truth: Truth, ground_command: float, structure_command: float, preload: float) -> Body:
-    """Before the first tick: all at rest, tyre and motor carrying the preload, N; commands, m, held
-    for long."""
+    """Return the state before the first tick.
+
+    Everything rests, the commands, m, have been constant for a long time, and tyre and motor carry
+    the preload, N.
+    """
     body = Body(
         np.zeros(19),
         np.empty((3, 2048)),
@@ -406,7 +544,7 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
     x = ground - preload / truth.tyre
     settle(body.ground_z, ground, truth.ground_hydraulic)
     settle(body.structure_z, x, truth.structure_hydraulic)
-    first = (preload / truth.constant, ground_command, structure_command)
+    first = (preload / truth.motor_constant, ground_command, structure_command)
     for number in range(3):
         body.histories[number, :] = first[number]
     body.memories[0, 0] = body.memories[0, 1] = first[0] * truth.voltage.gain
@@ -421,7 +559,7 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
 
 @numba.njit(cache=True, nogil=True)
 def true_values(body: Body) -> tuple[float, float, float, float]:
-    """What ideal sensors read: ground, structure, travel in m, load cell in N."""
+    """Return the readings of ideal sensors: ground, structure and travel, m, and load cell, N."""
     motion = body.motion
     ground, structure = motion[0] + motion[10], motion[1] + motion[11]
     return ground, structure, structure - motion[2], motion[15]
@@ -429,12 +567,12 @@ def true_values(body: Body) -> tuple[float, float, float, float]:
 
 @numba.njit(cache=True, nogil=True)
 def sample(truth: Truth, body: Body, tick: int, noise: Array, out: Array) -> None:
-    """All sensors at a tick into `out`, shape (4,), as noise."""
+    """Write the samples of all sensors at a tick into `out`, shape (4,); noise: shape (4,)."""
     values = true_values(body)
-    of = (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
+    sensors = (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
     for number in range(4):
         out[number] = reading(
-            of[number],
+            sensors[number],
             values[number],
             body.motion[14],
             body.sensed[number],
@@ -445,9 +583,56 @@ def sample(truth: Truth, body: Body, tick: int, noise: Array, out: Array) -> Non
 
 
 @numba.njit(cache=True, nogil=True)
+def tyre_force(
+    truth: Truth, deflection: float, squeeze: float, relaxed: float
+) -> tuple[float, float]:
+    """Return the force of the tyre, N, and its relaxed deflection after a step, m.
+
+    deflection: m, positive in compression; squeeze: its rate, m/s.
+    """
+    # A hyperbola instead of max(deflection, 0): the contact sets in smoothly over `ONSET`. The
+    # second term keeps the force at the working point, 4 mm, unchanged.
+    contact = (
+        0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET))
+        - 0.25 * ONSET**2 / 0.004
+    )
+    # Standard linear solid: a share of the stiffness relaxes towards the present deflection.
+    relaxed += STEP / truth.relaxing_time * (contact - relaxed)
+    tyre = truth.tyre * (contact * (1.0 + truth.tyre_hardening * contact))
+    tyre += truth.relaxing * truth.tyre * (contact - relaxed)
+    tyre += truth.tyre_damping * squeeze if deflection > 0.0 else 0.0
+    # A tyre pushes only.
+    return max(tyre, 0.0) if contact > 0.0 else 0.0, relaxed
+
+
+@numba.njit(cache=True, nogil=True)
+def end_of_play(play: float, position: float, end: float) -> tuple[float, bool, bool]:
+    """Return the trailing end of a play, m, and whether friction is felt upwards and downwards."""
+    end = max(min(end, position + 0.5 * play), position - 0.5 * play)
+    return end, position - end >= 0.5 * play - 1e-12, end - position >= 0.5 * play - 1e-12
+
+
+@numba.njit(cache=True, nogil=True)
+def bristle_force(
+    stiffness: float, mass: float, bristle: float, speed: float, bound: float
+) -> tuple[float, float]:
+    """Return the friction of a bristle, N, and its deflection after a step, m; bound: N.
+
+    LuGre bristle (Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419):
+    ż = v − σ |v| z / F, stepped implicitly, because σ is stiff; damping ratio 0.3 of mass on σ.
+    """
+    bent = (bristle + STEP * speed) / (1.0 + STEP * abs(speed) * stiffness / max(bound, 1e-3))
+    rate = (bent - bristle) / STEP
+    return stiffness * bent + 2.0 * math.sqrt(stiffness * mass) * 0.3 * rate, bent
+
+
+@numba.njit(cache=True, nogil=True)
 def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
-    """One tick under commands, shape (4,): ground m, structure m, force N (not looked at), voltage
-    V."""
+    """Advance the rig by one tick.
+
+    commands: ground, m, structure, m, force, N, which is ignored, and voltage, V, shape (4,); time:
+    of the tick, s.
+    """
     motion, histories, memories = body.motion, body.histories, body.memories
     ground_z, structure_z, held = body.ground_z, body.structure_z, commands
     ground, structure, x, v, force, relaxed = (
@@ -467,110 +652,122 @@ def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
     )
     acceleration, cell, count = motion[14], motion[15], int(motion[16])
     for _ in range(round(1e-3 / STEP)):
-        asked = pass_command(
-            truth.voltage, memories[0], histories[0], count, held[3], True, time, truth.late
+        voltage = pass_command(
+            truth.voltage,
+            memories[0],
+            histories[0],
+            count,
+            held[3],
+            True,
+            time,
+            truth.computation_delay,
         )
-        asked = max(
-            -1860.0 / truth.constant, min(1860.0 / truth.constant, max(-10.0, min(10.0, asked)))
+        # The amplifier ends at ±10 V, the motor at ±1860 N.
+        voltage = max(
+            -1860.0 / truth.motor_constant,
+            min(1860.0 / truth.motor_constant, max(-10.0, min(10.0, voltage))),
         )
-        asked_ground = pass_command(
-            truth.ground, memories[1], histories[1], count, held[0], False, time, truth.late
+        ground_command = pass_command(
+            truth.ground,
+            memories[1],
+            histories[1],
+            count,
+            held[0],
+            False,
+            time,
+            truth.computation_delay,
         )
-        asked_structure = pass_command(
-            truth.structure, memories[2], histories[2], count, held[1], False, time, truth.late
+        structure_command = pass_command(
+            truth.structure,
+            memories[2],
+            histories[2],
+            count,
+            held[1],
+            False,
+            time,
+            truth.computation_delay,
         )
         count += 1
-        motion[17] = hydraulic_step(truth.ground_hydraulic, ground_z, motion[17], asked_ground)
+        motion[17] = hydraulic_step(truth.ground_hydraulic, ground_z, motion[17], ground_command)
         motion[18] = hydraulic_step(
-            truth.structure_hydraulic, structure_z, motion[18], asked_structure
+            truth.structure_hydraulic, structure_z, motion[18], structure_command
         )
         next_ground = take_up(truth.ground_hydraulic, ground, motion[17])
         next_structure = take_up(truth.structure_hydraulic, structure, motion[18])
 
+        # Forces on the carriage at the old position, with the velocities over this step.
         deflection = ground + ground_yield - x
+        # Rates over this step come from differences, so yielding and play are included.
         squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
-        contact = (
-            0.5 * (deflection + math.sqrt(deflection * deflection + ONSET * ONSET))
-            - 0.25 * ONSET**2 / 0.004
-        )
-        relaxed += STEP / truth.relaxing_time * (contact - relaxed)
-        tyre = truth.tyre * (contact * (1.0 + truth.tyre_hardening * contact))
-        tyre += truth.relaxing * truth.tyre * (contact - relaxed)
-        tyre += truth.tyre_damping * squeeze if deflection > 0.0 else 0.0
-        tyre = max(tyre, 0.0) if contact > 0.0 else 0.0
+        tyre, relaxed = tyre_force(truth, deflection, squeeze, relaxed)
 
         plate = (next_structure - structure + structure_yield - structure_before) / STEP
-        way = structure + structure_yield - x
+        rod_position = structure + structure_yield - x
         sliding = plate - v
         ripple = truth.ripple * math.sin(
-            2.0 * math.pi * way / truth.ripple_pitch + truth.ripple_phase
+            2.0 * math.pi * rod_position / truth.ripple_pitch + truth.ripple_phase
         )
-        rail_up, rail_down = dry(truth.rail, v, x)
-        rod_up, rod_down = dry(truth.motor, sliding, way)
-        if truth.rail.lost > 0.0:
-            rail_end = max(min(rail_end, x + 0.5 * truth.rail.lost), x - 0.5 * truth.rail.lost)
-            rail_up *= 1.0 if x - rail_end >= 0.5 * truth.rail.lost - 1e-12 else 0.0
-            rail_down *= 1.0 if rail_end - x >= 0.5 * truth.rail.lost - 1e-12 else 0.0
-        if truth.motor.lost > 0.0:
-            rod_end = max(min(rod_end, way + 0.5 * truth.motor.lost), way - 0.5 * truth.motor.lost)
-            rod_up *= 1.0 if way - rod_end >= 0.5 * truth.motor.lost - 1e-12 else 0.0
-            rod_down *= 1.0 if rod_end - way >= 0.5 * truth.motor.lost - 1e-12 else 0.0
+        rail_up, rail_down = dry_bounds(truth.rail, v, x)
+        rod_up, rod_down = dry_bounds(truth.motor, sliding, rod_position)
+        if truth.rail.play > 0.0:
+            rail_end, up, down = end_of_play(truth.rail.play, x, rail_end)
+            rail_up, rail_down = rail_up if up else 0.0, rail_down if down else 0.0
+        if truth.motor.play > 0.0:
+            rod_end, up, down = end_of_play(truth.motor.play, rod_position, rod_end)
+            rod_up, rod_down = rod_up if up else 0.0, rod_down if down else 0.0
         smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
-        push = tyre - force - ripple - smooth_rail
-        before = v
+        carriage_force = tyre - force - ripple - smooth_rail
+        previous_v = v
         unloaded, load = (next_structure - structure) / STEP, 0.0
-        if truth.structure_hydraulic.yields > 0.0:
+        if truth.structure_hydraulic.compliance > 0.0:
             load = plate_under_load(
                 truth,
                 v,
                 unloaded,
                 structure_yield,
                 force + ripple,
-                push,
+                carriage_force,
                 rail_up,
                 rail_down,
                 rod_up,
                 rod_down,
             )
-            give = truth.structure_hydraulic.yields * load - structure_yield
-            plate = unloaded + give / (truth.yielding + STEP)
+            compression = truth.structure_hydraulic.compliance * load - structure_yield
+            plate = unloaded + compression / (truth.load_lag + STEP)
         sliding = plate - v
         smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
         if truth.bristle > 0.0:
             bound = rail_up if v > 0.0 else rail_down
-            bent = (bristle_rail + STEP * v) / (
-                1.0 + STEP * abs(v) * truth.bristle / max(bound, 1e-3)
-            )
-            rate, bristle_rail = (bent - bristle_rail) / STEP, bent
-            rail_force = (
-                truth.bristle * bristle_rail
-                + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
+            rail_force, bristle_rail = bristle_force(
+                truth.bristle, truth.mass, bristle_rail, v, bound
             )
             bound = rod_up if sliding > 0.0 else rod_down
-            bent = (bristle_rod + STEP * sliding) / (
-                1.0 + STEP * abs(sliding) * truth.bristle / max(bound, 1e-3)
+            rod_force, bristle_rod = bristle_force(
+                truth.bristle, truth.mass, bristle_rod, sliding, bound
             )
-            rate, bristle_rod = (bent - bristle_rod) / STEP, bent
-            rod_force = (
-                truth.bristle * bristle_rod
-                + 2.0 * math.sqrt(truth.bristle * truth.mass) * 0.3 * rate
-            )
-            v += STEP / truth.mass * (push + smooth_rod - rail_force + rod_force)
+            v += STEP / truth.mass * (carriage_force + smooth_rod - rail_force + rod_force)
         else:
             v, smooth_rod, rod_force = slide(
-                truth, v, plate, push, rail_up, rail_down, rod_up, rod_down
+                truth, v, plate, carriage_force, rail_up, rail_down, rod_up, rod_down
             )
-        acceleration = (v - before) / STEP
+        # The acceleration feeds the crosstalk of the load cell.
+        acceleration = (v - previous_v) / STEP
         x += STEP * v
-        force += (1.0 - math.exp(-STEP / truth.electrical)) * (truth.constant * asked - force)
+        # Exact step of the motor's lag, with the voltage constant over it.
+        force += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
+            truth.motor_constant * voltage - force
+        )
         cell = force + ripple - smooth_rod - rod_force
+        # The yielding of a step ago gives the plate's velocity in the next step.
         ground_before, structure_before = ground_yield, structure_yield
         ground_yield += (
-            STEP / (truth.yielding + STEP) * (-truth.ground_hydraulic.yields * tyre - ground_yield)
+            STEP
+            / (truth.load_lag + STEP)
+            * (-truth.ground_hydraulic.compliance * tyre - ground_yield)
         )
-        if truth.structure_hydraulic.yields > 0.0:
+        if truth.structure_hydraulic.compliance > 0.0:
             structure_yield += STEP * (plate - unloaded)
-            # Where rod and rail both stick, only the plate's own spring says what it is.
+            # If rod and rail both stick, only the deflection of the plate determines the force.
             cell = load
         ground, structure = next_ground, next_structure
     motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (

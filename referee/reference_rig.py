@@ -1,5 +1,4 @@
-"""The referee's rig with its own controller: the plant of `reference_plant` under the law that its
-operator set."""
+"""The referee's rig with its own controller: the plant of `reference_plant` under a set law."""
 
 from __future__ import annotations
 
@@ -12,7 +11,27 @@ from referee.reference_plant import Array, Truth, advance, at_rest, sample
 
 
 class Law(NamedTuple):
-    """The controller as its operator set it."""
+    """Settings of the controller.
+
+    Attributes
+    ----------
+    imposed : bool
+        Whether force and motions are imposed. Otherwise suspension and body are simulated.
+    start : float
+        Initial position of the structure plate, m.
+    sprung_mass, stiffness, damping : float
+        Simulated body, kg, and suspension, N/m and Ns/m.
+    preload : float
+        Preload of the suspension, N.
+    gravity : float
+        Gravity, m/s².
+    filter_position, filter_velocity, filter_force : float
+        Lags of the three filters, s.
+    kff, kp, ki : float
+        Gains of the force loop: feedforward, proportional, and integral, 1/s.
+    limit : float
+        Largest voltage, V.
+    """
 
     imposed: bool = True
     start: float = -0.004
@@ -41,44 +60,70 @@ def simulate(
     commands: Array,
     sensors: Array,
 ) -> int:
-    """Runs a test. demands: ground m, structure m, force N, shape (ticks, 3); voltages: V, in place
-    of the controller's, or empty; noise: of the sensors, shape (ticks, 4); missed: 1 where a tick
-    is missed, shape (ticks,); commands, sensors: what is recorded, shape (ticks, 4). Returns
-    ticks."""
+    """Run a test and return the number of completed ticks.
+
+    Parameters
+    ----------
+    truth, law
+        Rig and controller.
+    demands : ndarray
+        Ground, m, structure, m, and force, N, shape (ticks, 3).
+    voltages : ndarray
+        Voltages that replace the controller's, V, shape (ticks,) or empty.
+    noise : ndarray
+        Noise of the sensors, shape (ticks, 4).
+    missed : ndarray
+        1 for a missed tick, shape (ticks,).
+    commands, sensors : ndarray
+        Recorded commands and sensors, written in place, shape (ticks, 4).
+    """
     body = at_rest(truth, demands[0, 0], law.start, law.preload)
-    last = travel = speed = filtered = integral = 0.0
+    previous_travel = travel = speed = filtered_force = integral = 0.0
     plate_model, plate_speed = law.start, 0.0
     held = np.array([demands[0, 0], law.start, law.preload, law.preload / 186.0])
     for tick in range(len(demands)):
         time = tick * 1e-3
         sample(truth, body, tick, noise[tick], sensors[tick])
         if missed[tick] == 0.0:
-            travelled, measured = sensors[tick, 2], sensors[tick, 3]
+            measured_travel, measured_force = sensors[tick, 2], sensors[tick, 3]
             if tick == 0:
-                last, travel, filtered = travelled, travelled, measured
-            travel += 1e-3 / (law.filter_position + 1e-3) * (travelled - travel)
-            speed += 1e-3 / (law.filter_velocity + 1e-3) * ((travelled - last) / 1e-3 - speed)
-            filtered += 1e-3 / (law.filter_force + 1e-3) * (measured - filtered)
-            last = travelled
+                previous_travel, travel, filtered_force = (
+                    measured_travel,
+                    measured_travel,
+                    measured_force,
+                )
+            # First-order lags, implicit Euler at 1 ms.
+            travel += 1e-3 / (law.filter_position + 1e-3) * (measured_travel - travel)
+            speed += (
+                1e-3
+                / (law.filter_velocity + 1e-3)
+                * ((measured_travel - previous_travel) / 1e-3 - speed)
+            )
+            filtered_force += 1e-3 / (law.filter_force + 1e-3) * (measured_force - filtered_force)
+            previous_travel = measured_travel
             if law.imposed:
-                wanted, position = demands[tick, 2], demands[tick, 1]
+                demanded_force, position = demands[tick, 2], demands[tick, 1]
             else:
-                wanted = law.preload - law.stiffness * travel - law.damping * speed
-                plate_speed += (filtered / law.sprung_mass - law.gravity) * 1e-3
+                # F = F_0 − k x − b v: the suspension in the model.
+                demanded_force = law.preload - law.stiffness * travel - law.damping * speed
+                # Semi-implicit Euler: the velocity first, then the position with the new velocity.
+                plate_speed += (filtered_force / law.sprung_mass - law.gravity) * 1e-3
                 plate_model += plate_speed * 1e-3
                 position = plate_model
-            error = wanted - filtered
-            grown = integral + law.ki * error * 1e-3
-            voltage = (law.kff * wanted + law.kp * error + grown) / 186.0
+            error = demanded_force - filtered_force
+            next_integral = integral + law.ki * error * 1e-3
+            voltage = (law.kff * demanded_force + law.kp * error + next_integral) / 186.0
+            # Anti-windup: the integral stands still while the voltage saturates.
             if abs(voltage) >= law.limit:
                 voltage = max(-law.limit, min(law.limit, voltage))
             else:
-                integral = grown
+                integral = next_integral
             if len(voltages):
                 position, voltage = demands[tick, 1], voltages[tick]
-            held[0], held[1], held[2], held[3] = demands[tick, 0], position, wanted, voltage
+            held[0], held[1], held[2], held[3] = demands[tick, 0], position, demanded_force, voltage
         for number in range(4):
             commands[tick, number] = held[number]
+        # The limits of the rig: 0.15 m of the structure plate, 1500 N of the load cell.
         if len(voltages) == 0 and (abs(sensors[tick, 1]) > 0.15 or abs(sensors[tick, 3]) > 1500.0):
             return tick + 1
         advance(truth, body, held, time)
@@ -86,25 +131,25 @@ def simulate(
 
 
 def run(truth: Truth, law: Law, demands: Array, random: np.random.Generator) -> tuple[Array, Array]:
-    """A whole test: the commands and sensors as recorded, shape (ticks, 4) each."""
+    """Run a test and return the recorded commands and sensors, each of shape (ticks, 4)."""
     ticks = len(demands)
-    noise, absent = draw_noise(truth, ticks, random)
+    noise, missed = draw_noise(truth, ticks, random)
     commands, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
-    done = simulate(
+    completed = simulate(
         truth=truth,
         law=law,
         demands=np.ascontiguousarray(demands),
         voltages=np.empty(0),
         noise=noise,
-        missed=absent,
+        missed=missed,
         commands=commands,
         sensors=sensors,
     )
-    return commands[:done], sensors[:done]
+    return commands[:completed], sensors[:completed]
 
 
 def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[Array, Array]:
-    """The sensors' noise, shape (ticks, 4), and 1 where a tick is missed, shape (ticks,)."""
+    """Draw the sensors' noise, shape (ticks, 4), and the missed ticks, 1 or 0, shape (ticks,)."""
     time = np.arange(ticks) * 1e-3
     noise = np.empty((ticks, 4))
     for number, sensor in enumerate(
@@ -112,13 +157,14 @@ def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[A
     ):
         mains = sensor.mains * np.sin(2 * np.pi * 50.0 * time + random.uniform(0.0, 2.0 * np.pi))
         noise[:, number] = sensor.white * random.standard_normal(ticks) + mains
-    absent = (random.random(ticks) < truth.missed).astype(float)
-    absent[0] = 0.0
-    return noise, absent
+    missed = (random.random(ticks) < truth.missed).astype(float)
+    # The first tick sets the initial state of the controller.
+    missed[0] = 0.0
+    return noise, missed
 
 
 def run_quiet(truth: Truth, law: Law, commands: Array) -> Array:
-    """The sensors without noise under given commands, shape (ticks, 4) both."""
+    """Return the sensors without noise under recorded commands; both have shape (ticks, 4)."""
     ticks = len(commands)
     out, sensors = np.empty((ticks, 4)), np.empty((ticks, 4))
     demands, voltages = np.ascontiguousarray(commands[:, :3]), np.ascontiguousarray(commands[:, 3])

@@ -1,4 +1,4 @@
-"""Draws how often names were right beside how sure the diagnosis said that it was."""
+"""The reliability diagram: share of correct names over the reported confidence."""
 
 from __future__ import annotations
 
@@ -16,38 +16,44 @@ BLUE, GREY = "#2a6fa8", "#6b7280"
 
 
 def draw_reliability(bins: Sequence[tuple[float, float, int]], path: Path) -> Path:
-    """A reliability diagram: a point a bin of confidence, with its 95 % interval and its count.
+    """Draw a reliability diagram: one point per bin, with its 95 % interval and its count.
 
     Parameters
     ----------
-    bins
-        Mean confidence, share of acceptable names, and how many names, of each.
-    path
-        PNG, SVG or PDF.
+    bins : sequence of tuple
+        Mean confidence, share of acceptable names, and number of names of every bin.
+    path : Path
+        File to write, PNG, SVG or PDF.
+
+    Returns
+    -------
+    Path
+        The written file.
 
     Raises
     ------
     RigtwinError
-        If it cannot be written.
+        Raised if the file cannot be written.
     """
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
+    # On the diagonal the reported confidence equals the share of correct names.
     axes.plot([0.5, 1.0], [0.5, 1.0], color=GREY, linewidth=1, linestyle="--")
     axes.annotate("as sure as right", (0.56, 0.53), color=GREY, fontsize=9)
-    for said, true, count in bins:
-        low, high = wilson(round(true * count), count)
+    for confidence, accepted, count in bins:
+        low, high = wilson(round(accepted * count), count)
         axes.errorbar(
-            said,
-            true,
-            yerr=np.array([[max(true - low, 0.0)], [max(high - true, 0.0)]]),
+            confidence,
+            accepted,
+            yerr=np.array([[max(accepted - low, 0.0)], [max(high - accepted, 0.0)]]),
             color=BLUE,
             marker="o",
             capsize=3,
         )
         axes.annotate(
             f"{count}\nnames",
-            (said, low),
+            (confidence, low),
             xytext=(0, -3),
             textcoords="offset points",
             ha="center",

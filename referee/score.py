@@ -1,4 +1,4 @@
-"""The score of a withheld-effect check, every row of the goals with its interval."""
+"""The score of a withheld-effect check: every measure with its goal and confidence interval."""
 
 from __future__ import annotations
 
@@ -13,17 +13,24 @@ import numpy as np
 from referee.check import Result
 
 CONFIDENT = 0.9
-"""Confidence from which a name must nearly always be right."""
+"""Confidence from which names must nearly always be right."""
 WORSE = -0.05
-"""Shrinkage on held-out data below which a correction made them worse."""
+"""Shrinkage on held-out data below which a correction made the gap larger."""
 VISIBLE = 1.1
-"""Gap in noise floors from which a shrinkage means something."""
+"""Smallest gap, in noise floors, for which a shrinkage is evaluated."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One measure. value: as printed; goal: as printed; low, high: 95 % Wilson interval of a share,
-    else None."""
+    """One measure of a score.
+
+    Attributes
+    ----------
+    measure, value, goal : str
+        Name, value and goal, as printed.
+    low, high : float, optional
+        95 % Wilson interval of a share. None for other values.
+    """
 
     measure: str
     value: str
@@ -33,9 +40,10 @@ class Row:
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
-    """The 95 % Wilson score interval of a share."""
+    """Return the 95 % score interval of a share (Wilson, JASA 22 (1927) 209)."""
     if count == 0:
         return 0.0, 1.0
+    # z is the 97.5 % quantile of the normal distribution.
     z, share = 1.959964, hits / count
     middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
     half = z * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2)) / (1 + z**2 / count)
@@ -43,6 +51,7 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
 
 
 def share_of(measure: str, hits: Sequence[bool], goal: str) -> Row:
+    """Return the row of a share, with its interval."""
     if not len(hits):
         return Row(measure, "no case", goal)
     low, high = wilson(sum(hits), len(hits))
@@ -56,91 +65,59 @@ def share_of(measure: str, hits: Sequence[bool], goal: str) -> Row:
 
 
 def names(answer: dict[str, Any]) -> list[str]:
-    """The effects that an answer names, as the key writes them."""
-    found = []
+    """Return the effects that an answer names, written as in the key."""
+    effects = []
     for effect in answer["effects"]:
         kind = effect["kind"]
         if kind == "setting":
             kind = f"setting:{next(iter(effect['parameters']))}"
-        found.append(f"{kind}@{effect['component']}")
-    return found
+        effects.append(f"{kind}@{effect['component']}")
+    return effects
 
 
 def truths(entry: dict[str, Any]) -> list[str]:
+    """Return the true effects of an entry of the key."""
     return [f"{effect['kind']}@{effect['component']}" for effect in entry["effects"]]
 
 
 def _class_of(effect: dict[str, Any]) -> set[str]:
+    """Return the look-alike class of a named effect, itself included."""
     return {f"{each['kind']}@{each['component']}" for each in effect["class"]} | set(
         names({"effects": [effect]})
     )
 
 
 def _error(entry: dict[str, Any], answer: dict[str, Any]) -> float:
-    """Relative error of the magnitude of a single effect that was named right."""
+    """Return the error of a correctly named magnitude, relative to its deviation from nominal."""
     truth = entry["effects"][0]
     value = next(iter(answer["effects"][0]["parameters"].values()))["value"]
     nominal = truth["nominal"] or 0.0
+    # Relative to the defect itself: 1 % of the total stiffness may be all of a defect.
     return abs(value - truth["value"]) / max(abs(truth["value"] - nominal), 1e-12)
 
 
+Pair = tuple[dict[str, Any], dict[str, Any]]
+"""Entry of the key, and the answer to it."""
+
+
 def rows(result: Result) -> list[Row]:
-    """Every measure."""
+    """Return every measure of the score, in the order of the goals."""
     pairs = list(zip(result.key, result.answers, strict=True))
+    # A defect below the noise of its test is a trace: naming it is neither expected nor wrong.
     single = [(k, a) for k, a in pairs if k["sort"] == "single" and k["effects"][0]["material"]]
     traces = [(k, a) for k, a in pairs if k["sort"] == "single" and not k["effects"][0]["material"]]
     null = [a for k, a in pairs if k["sort"] == "null"]
-    outside = [(k, a) for k, a in pairs if k["sort"] == "outside"]
-    double = [(k, a) for k, a in pairs if k["sort"] == "pair"]
-    right = [bool(names(a)) and names(a)[0] == truths(k)[0] for k, a in single]
-    classes = [(k, a["effects"][0]) for k, a in single if a["effects"]]
-    inside = [bool(a["effects"]) and truths(k)[0] in _class_of(a["effects"][0]) for k, a in single]
-    sizes = [len(_class_of(effect)) for _, effect in classes]
-    component = [
-        bool(a["where"] or a["effects"])
-        and k["effects"][0]["component"]
-        in {e["component"] for e in a["effects"][:1]} | {w["component"] for w in a["where"][:1]}
-        for k, a in single
-    ]
-    flagged = [a["verdict"] in ("unknown", "partly explained") for _, a in outside]
-    placed = [
-        bool(a["where"]) and a["where"][0]["component"] == k["effects"][0]["component"]
-        for k, a in outside
-    ]
-    both = [set(truths(k)) <= set(names(a)) for k, a in double]
-    wrong = [bool(set(names(a)) - set(truths(k))) for k, a in double]
-    errors = [_error(k, a) for (k, a), hit in zip(single, right, strict=True) if hit]
-    judged = [
-        a["gap"] for _, a in pairs if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE
-    ]
-    apart = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in judged]
-    worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in judged)
-    sure = [
-        name in truths(k)
-        for k, a in pairs
-        for name, effect in zip(names(a), a["effects"], strict=True)
-        if effect["confidence"] >= CONFIDENT
-    ]
     seconds = [a["seconds"] for _, a in pairs]
-    size = f"{np.mean(sizes):.2f}" if sizes else "no case"
+    right = [bool(names(a)) and names(a)[0] == truths(k)[0] for k, a in single]
+    errors = [_error(k, a) for (k, a), hit in zip(single, right, strict=True) if hit]
     return [
-        share_of("top-1 right, material single effects", right, ">= 95 %"),
-        share_of("truth inside the reported class", inside, ">= 97 %"),
-        Row("mean class size", size, "<= 1.3"),
-        share_of("component right", component, ">= 97 %"),
+        *_single_rows(single, right),
         share_of("false alarms on nulls", [a["verdict"] != "no gap" for a in null], "<= 2 in 60"),
-        share_of("effect not in the library: flagged", flagged, ">= 90 %"),
-        share_of("effect not in the library: component right", placed, ">= 90 %"),
-        share_of("both of two effects", both, ">= 80 %"),
-        share_of("a wrong name among them", wrong, "<= 5 %"),
+        *_outside_rows([(k, a) for k, a in pairs if k["sort"] == "outside"]),
+        *_pair_rows([(k, a) for k, a in pairs if k["sort"] == "pair"]),
         Row("magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"),
-        Row(
-            "predicted - achieved shrinkage, median / 90th percentile",
-            _plain(apart),
-            "<= 0.03 / <= 0.10",
-        ),
-        Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(judged)}", "0"),
-        share_of(f"right when confidence >= {CONFIDENT}", sure, ">= 97 %"),
+        *_shrinkage_rows([a for _, a in pairs]),
+        share_of(f"right when confidence >= {CONFIDENT}", _confident_hits(pairs), ">= 97 %"),
         share_of(
             "immaterial single effects: no wrong name",
             [not set(names(a)) - set(truths(k)) for k, a in traces],
@@ -160,21 +137,90 @@ def rows(result: Result) -> list[Row]:
     ]
 
 
+def _single_rows(single: Sequence[Pair], right: Sequence[bool]) -> list[Row]:
+    """Return the measures of material single effects; right: whether the first name is true."""
+    named = [a["effects"][0] for _, a in single if a["effects"]]
+    inside = [bool(a["effects"]) and truths(k)[0] in _class_of(a["effects"][0]) for k, a in single]
+    sizes = [len(_class_of(effect)) for effect in named]
+    # The component counts as right if the first named effect or the first place is there.
+    component = [
+        bool(a["where"] or a["effects"])
+        and k["effects"][0]["component"]
+        in {e["component"] for e in a["effects"][:1]} | {w["component"] for w in a["where"][:1]}
+        for k, a in single
+    ]
+    return [
+        share_of("top-1 right, material single effects", right, ">= 95 %"),
+        share_of("truth inside the reported class", inside, ">= 97 %"),
+        Row("mean class size", f"{np.mean(sizes):.2f}" if sizes else "no case", "<= 1.3"),
+        share_of("component right", component, ">= 97 %"),
+    ]
+
+
+def _outside_rows(outside: Sequence[Pair]) -> list[Row]:
+    """Return the measures of effects that the library does not have."""
+    flagged = [a["verdict"] in ("unknown", "partly explained") for _, a in outside]
+    placed = [
+        bool(a["where"]) and a["where"][0]["component"] == k["effects"][0]["component"]
+        for k, a in outside
+    ]
+    return [
+        share_of("effect not in the library: flagged", flagged, ">= 90 %"),
+        share_of("effect not in the library: component right", placed, ">= 90 %"),
+    ]
+
+
+def _pair_rows(double: Sequence[Pair]) -> list[Row]:
+    """Return the measures of two simultaneous effects."""
+    complete = [set(truths(k)) <= set(names(a)) for k, a in double]
+    wrong = [bool(set(names(a)) - set(truths(k))) for k, a in double]
+    return [
+        share_of("both of two effects", complete, ">= 80 %"),
+        share_of("a wrong name among them", wrong, "<= 5 %"),
+    ]
+
+
+def _shrinkage_rows(answers: Sequence[dict[str, Any]]) -> list[Row]:
+    """Return the measures of predicted and achieved shrinkage of the gap."""
+    gaps = [a["gap"] for a in answers if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE]
+    deviations = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in gaps]
+    worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in gaps)
+    return [
+        Row(
+            "predicted - achieved shrinkage, median / 90th percentile",
+            _plain(deviations),
+            "<= 0.03 / <= 0.10",
+        ),
+        Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(gaps)}", "0"),
+    ]
+
+
+def _confident_hits(pairs: Sequence[Pair]) -> list[bool]:
+    """Return for every confident name whether it is true."""
+    return [
+        name in truths(k)
+        for k, a in pairs
+        for name, effect in zip(names(a), a["effects"], strict=True)
+        if effect["confidence"] >= CONFIDENT
+    ]
+
+
 def _is_settled(entry: dict[str, Any], answer: dict[str, Any]) -> bool:
-    """Whether nothing but the truth is named, and nothing stands beside it."""
+    """Return whether the truth alone is named, confidently and without look-alikes."""
     alone = all(len(_class_of(effect)) == 1 for effect in answer["effects"])
     sure = all(effect["confidence"] >= CONFIDENT for effect in answer["effects"])
     return alone and sure and set(names(answer)) == set(truths(entry))
 
 
-def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]]]) -> list[Row]:
-    found = []
+def _baselines(result: Result, single: list[Pair]) -> list[Row]:
+    """Return the scores of two baselines: always the same name, and the black box."""
+    rows_of_baselines = []
     counts = Counter(truths(k)[0] for k, _ in single)
     if counts:
         name, hits = counts.most_common(1)[0]
         low, high = wilson(hits, len(single))
         value = f"{hits} of {len(single)} ({100 * hits / len(single):.1f} %)"
-        found.append(Row(f"baseline, always {name}: top-1 right", value, "", low, high))
+        rows_of_baselines.append(Row(f"baseline, always {name}: top-1 right", value, "", low, high))
     if result.crude:
         tried = [(result.key[number], name) for number, name in result.crude.items()]
         hits = [
@@ -183,12 +229,13 @@ def _baselines(result: Result, single: list[tuple[dict[str, Any], dict[str, Any]
             if k["sort"] == "single" and k["effects"][0]["material"]
         ]
         alarms = [name != "none" for k, name in tried if k["sort"] == "null"]
-        found.append(share_of("baseline, black box: top-1 right", hits, ""))
-        found.append(share_of("baseline, black box: false alarms on nulls", alarms, ""))
-    return found
+        rows_of_baselines.append(share_of("baseline, black box: top-1 right", hits, ""))
+        rows_of_baselines.append(share_of("baseline, black box: false alarms on nulls", alarms, ""))
+    return rows_of_baselines
 
 
 def _percentiles(values: Sequence[float]) -> str:
+    """Format the median and the 90th percentile as percentages."""
     return (
         f"{100 * np.median(values):.1f} % / {100 * np.quantile(values, 0.9):.1f} %"
         if len(values)
@@ -197,42 +244,44 @@ def _percentiles(values: Sequence[float]) -> str:
 
 
 def _plain(values: Sequence[float]) -> str:
+    """Format the median and the 90th percentile."""
     return f"{np.median(values):.3f} / {np.quantile(values, 0.9):.3f}" if len(values) else "no case"
 
 
 def _span(values: Sequence[float]) -> str:
+    """Format the median and the largest value."""
     return f"{np.median(values):.1f} / {max(values):.1f}" if len(values) else "no case"
 
 
 def misses(result: Result) -> list[str]:
-    """Every case that was not answered right, a line each: what was there and what was said."""
+    """Return one line for every wrong answer: the true effects, the named ones, and the verdict."""
     lines = []
     for number, (entry, answer) in enumerate(zip(result.key, result.answers, strict=True)):
-        truth, said = truths(entry), names(answer)
+        truth, named = truths(entry), names(answer)
         if entry["sort"] == "outside":
-            there = (
+            placed = (
                 bool(answer["where"])
                 and answer["where"][0]["component"] == entry["effects"][0]["component"]
             )
-            right = answer["verdict"] in ("unknown", "partly explained") and there
+            right = answer["verdict"] in ("unknown", "partly explained") and placed
         else:
-            right = set(truth) == set(said) and answer["verdict"] in ("explained", "no gap")
+            right = set(truth) == set(named) and answer["verdict"] in ("explained", "no gap")
         if not right:
             sizes = ", ".join(
                 "any" if e["size"] is None else f"{e['size']:.2f}" for e in entry["effects"]
             )
             place = answer["where"][0]["component"] if answer["where"] else "-"
-            said_so = " + ".join(said) or answer["verdict"]
+            named_text = " + ".join(named) or answer["verdict"]
             lines.append(
                 f"{number:03d} {entry['sort']}, {entry['test']}: "
                 f"{' + '.join(truth) or 'nothing'} (size {sizes or '-'}) -> "
-                f"{said_so} [{answer['verdict']}, at {place}]"
+                f"{named_text} [{answer['verdict']}, at {place}]"
             )
     return lines
 
 
 def table(result: Result) -> str:
-    """The score as text."""
+    """Return the score as text."""
     lines = [f"seed {result.seed}, {len(result.key)} cases, commitment {result.commitment}", ""]
     for row in rows(result):
         interval = (
@@ -246,7 +295,7 @@ def table(result: Result) -> str:
 
 
 def document(result: Result) -> dict[str, Any]:
-    """The score for other programs."""
+    """Return the score as a JSON document."""
     return {
         "seed": result.seed,
         "cases": len(result.key),

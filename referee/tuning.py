@@ -1,7 +1,7 @@
-"""Whether a diagnosis is worth tuning on.
+"""The benefit of a diagnosis for tuning a controller.
 
-Rigs with a friction that is withheld are diagnosed from one recording; the controller is tuned on
-the twin so corrected, and on the nominal one; both are evaluated on the rig itself.
+Rigs with a withheld friction are diagnosed from one recording. The controller is tuned on the
+corrected twin and on the nominal one, and both results are evaluated on the rig itself.
 """
 
 from __future__ import annotations
@@ -34,42 +34,42 @@ from rigtwin.studies.tuning.text import change, percent
 from rigtwin.studies.tuning.text import number as number_text
 
 KINDS = ("coulomb", "viscous", "stribeck", "asymmetry")
-"""Of friction at the motor, which a force loop feels most."""
+"""Kinds of friction at the motor, which disturb a force loop most."""
 TUNED_CALIBRATED = "tuned on the calibrated twin"
 
 
 @dataclass(frozen=True)
-class Case:
-    """One rig, and what its diagnosis was worth.
+class TuningCase:
+    """One rig, and the benefit of its diagnosis.
 
-    Parameters
+    Attributes
     ----------
     number : int
-        Which rig.
-    defect, found : str
-        What was withheld, and the diagnosis' sentence.
+        Number of the rig, from 0.
+    defect, sentence : str
+        Withheld defect, and the sentence of the diagnosis.
     against_nominal, against_before : Comparison
-        The settings tuned on the calibrated twin compared on the rig with those tuned on the
-        nominal one, and with the baseline.
+        Settings tuned on the calibrated twin, compared on the rig with those tuned on the nominal
+        twin, and with the baseline.
     """
 
     number: int
     defect: str
-    found: str
+    sentence: str
     against_nominal: Comparison
     against_before: Comparison
 
 
 @dataclass(frozen=True)
 class RigRun:
-    """A run to be made on a rig of the referee.
+    """A run on a rig of the referee.
 
-    Parameters
+    Attributes
     ----------
     truth : Truth
-        The rig.
+        Rig.
     run : Run
-        As it would be made on the twin.
+        Run, as it would be made on the twin.
     """
 
     truth: Truth
@@ -77,21 +77,23 @@ class RigRun:
 
     @property
     def key(self) -> str:
-        """The same for the same run, whoever asks."""
+        """Hash of rig and run, under which the result is stored."""
         return hashlib.sha256(f"{self.truth!r} {self.run.key}".encode()).hexdigest()[:32]
 
 
 def draw_rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator]:
-    """Draw a rig within its tolerances with a friction of its own.
+    """Draw a rig within its tolerances, with a defect of the motor's friction.
 
     Returns
     -------
-    Truth, Defect, Generator
-        The random numbers go on to the rig's recording.
+    tuple
+        Rig, defect, and the random generator, which continues with the rig's recording.
     """
     random = np.random.default_rng([seed, 6, number])
+    # Tolerances differ from rig to rig, as they would in a laboratory.
     plain = draw_tolerated(random)
-    options = [one for one in (make() for make in friction("motor", random)) if one.kind in KINDS]
+    drawn = [make() for make in friction("motor", random)]
+    options = [defect for defect in drawn if defect.kind in KINDS]
     defect = options[number % len(options)]
     truth, _ = defect.change(plain, Law())
     return truth, defect, random
@@ -108,7 +110,7 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     Returns
     -------
     str, str
-        What the diagnosis says, and the corrected twin's file.
+        Sentence of the diagnosis, and the file of the corrected twin as text.
     """
     from machines import DEFAULT_MACHINE
     from rigtwin.description.catalogue import find
@@ -121,15 +123,15 @@ def diagnose_rig(case: tuple[int, int]) -> tuple[str, str]:
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "recording.mcap"
         write(path, law, *run(truth, law, demands, random))
-        found = diagnose(find(DEFAULT_MACHINE), [load(path)])
-    return found.sentence, toml(found)
+        diagnosis = diagnose(find(DEFAULT_MACHINE), [load(path)])
+    return diagnosis.sentence, toml(diagnosis)
 
 
 def run_on_rig(job: RigRun) -> dict[str, float]:
-    """Make a run on a rig: name → figure, as the twin's runs give it."""
-    asked, configuration = job.run, job.run.configuration
-    demands = asked.experiment.demands(configuration, asked.seed)
-    return figures(asked, drive(job.truth, configuration, demands, asked.seed))
+    """Make a run on a rig and return its measures by name, as for a run on the twin."""
+    run, configuration = job.run, job.run.configuration
+    demands = run.experiment.demands(configuration, run.seed)
+    return figures(run, drive(job.truth, configuration, demands, run.seed))
 
 
 def check(
@@ -137,57 +139,63 @@ def check(
     cases: int,
     seed: int,
     stage: Callable[[str], object] = lambda _: None,
-    show: Callable[[Case], object] = lambda _: None,
-) -> list[Case]:
-    """Make the whole check.
+    show: Callable[[TuningCase], object] = lambda _: None,
+) -> list[TuningCase]:
+    """Run the whole check.
 
     Parameters
     ----------
     bench : Bench
-        Where the study's runs are made.
+        Workplace of the study's runs.
     cases : int
-        Rigs.
+        Number of rigs.
     seed : int
-        That they are drawn from.
+        Seed of the rigs.
     stage : callable, optional
-        Called with what begins.
+        Function called with a description of every stage.
     show : callable, optional
-        Called with each case as it is known.
+        Function called with every finished case.
+
+    Returns
+    -------
+    list of TuningCase
+        All cases.
 
     Raises
     ------
     RigtwinError
-        Where a tuning fails.
+        If a tuning fails.
     """
     stage("tuning on the nominal twin")
-    plain = find_settings(bench, NOMINAL, seed)
+    nominal = find_settings(bench, NOMINAL, seed)
     stage("diagnosing")
     jobs = [(f"diagnosis {seed} {number}", (seed, number)) for number in range(cases)]
     run_jobs(bench.store, bench.workers, diagnose_rig, jobs, bench.progress)
-    found = []
+    checked = []
     for number, (key, _) in enumerate(jobs):
         sentence, toml = bench.store[key]
         stage(f"rig {number + 1}: tuning on its calibrated twin")
         corrected = find_settings(bench, calibrated_rig(_posterior(toml)), seed)
         truth, defect, _ = draw_rig(seed, number)
-        settings = [bench.study.baseline_settings, plain, corrected]
-        before, one, other = _run_all(bench, truth, settings)
+        settings = [bench.study.baseline_settings, nominal, corrected]
+        before, on_nominal, on_calibrated = _run_all(bench, truth, settings)
         rig, measures = f"rig {number + 1}", bench.study.goals.measures
-        after = (TUNED_CALIBRATED, other)
+        after = (TUNED_CALIBRATED, on_calibrated)
         values = f"{number_text(defect.value)}, nominal {number_text(defect.nominal)}"
-        case = Case(
+        case = TuningCase(
             number=number,
             defect=f"{defect.kind}@{defect.component} {values}",
-            found=sentence,
-            against_nominal=compare(measures, rig, (TUNED_NOMINAL, one), after),
+            sentence=sentence,
+            against_nominal=compare(measures, rig, (TUNED_NOMINAL, on_nominal), after),
             against_before=compare(measures, rig, (BEFORE, before), after),
         )
-        found.append(case)
+        checked.append(case)
         show(case)
-    return found
+    return checked
 
 
 def _posterior(toml: str) -> Posterior:
+    """Return the posterior that a corrected twin's file holds."""
     with TemporaryDirectory(prefix="rigtwin-blindcheck-") as folder:
         path = Path(folder) / "calibrated.toml"
         path.write_text(toml)
@@ -199,17 +207,20 @@ def _run_all(
     truth: Truth,
     candidates: list[Settings],
 ) -> list[list[dict[str, float]]]:
-    """Run every candidate on a rig over the study's held-out roads, a row a candidate."""
+    """Run every candidate on a rig over the held-out roads; return one row per candidate."""
     base, count = bench.study.configuration, bench.study.budget.held_out
     roads = [Scenario(APART + road, base.plant) for road in range(count)]
-    jobs = [[RigRun(truth, bench.plan(base, one, road)) for road in roads] for one in candidates]
+    jobs = [
+        [RigRun(truth, bench.plan(base, candidate, road)) for road in roads]
+        for candidate in candidates
+    ]
     flat = ((job.key, job) for row in jobs for job in row)
     run_jobs(bench.store, bench.workers, run_on_rig, flat, bench.progress)
     return [[bench.store[job.key] for job in row] for row in jobs]
 
 
-def text(study: Study, cases: list[Case]) -> str:
-    """All cases as a table, and how many are better for the diagnosis."""
+def text(study: Study, cases: list[TuningCase]) -> str:
+    """Return all cases as a table, with the number of rigs that the diagnosis improved."""
     objective = study.goals.minimise[0]
     header = ("rig", "withheld", "tuned on nominal", "on calibrated", "change")
     rows: list[tuple[str, ...]] = [(*header, "95 % of the median", "against before")]
@@ -217,25 +228,28 @@ def text(study: Study, cases: list[Case]) -> str:
     for case in cases:
         name = str(case.number + 1)
         trips = [*case.against_nominal.trips, case.against_before.trips[0]]
+        # A rig that trips has no comparable figures: the trips are reported instead.
         if max(trips) > 0.0:
             tripped += 1
-            said = f"trips on nominal / calibrated / before: {' / '.join(map(percent, trips))}"
-            rows.append((name, case.defect, said, "", "", "", ""))
+            summary = f"trips on nominal / calibrated / before: {' / '.join(map(percent, trips))}"
+            rows.append((name, case.defect, summary, "", "", "", ""))
             continue
-        one = case.against_nominal.of(objective.name)
-        begun = case.against_before.of(objective.name)
-        better, worse = better + one.improved, worse + (one.low > 0.0)
-        spreads, unit = (one.before, one.after), objective.unit
-        medians = [f"{number_text(each.median)} {unit}" for each in spreads]
-        rows.append((name, case.defect, *medians, *change(one), change(begun)[0]))
-    said = f"{objective.title} on the rigs themselves: better for the diagnosis on {better}"
-    left = len(cases) - better - worse - tripped
-    rest = f"no difference to be told on {left}, tripped on {tripped}"
-    return f"{table(rows)}\n{said} of {len(cases)}, worse on {worse}, {rest}"
+        change_on_rig = case.against_nominal.of(objective.name)
+        change_from_baseline = case.against_before.of(objective.name)
+        better, worse = better + change_on_rig.improved, worse + (change_on_rig.low > 0.0)
+        spreads, unit = (change_on_rig.before, change_on_rig.after), objective.unit
+        medians = [f"{number_text(spread.median)} {unit}" for spread in spreads]
+        rows.append(
+            (name, case.defect, *medians, *change(change_on_rig), change(change_from_baseline)[0])
+        )
+    summary = f"{objective.title} on the rigs themselves: better for the diagnosis on {better}"
+    undecided = len(cases) - better - worse - tripped
+    remainder = f"no difference to be told on {undecided}, tripped on {tripped}"
+    return f"{table(rows)}\n{summary} of {len(cases)}, worse on {worse}, {remainder}"
 
 
-def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
-    """All cases for other programs."""
+def document(study: Study, cases: list[TuningCase]) -> list[dict[str, object]]:
+    """Return all cases as a JSON document."""
     name = study.goals.minimise[0].name
 
     def describe(comparison: Comparison) -> dict[str, object] | None:
@@ -246,7 +260,7 @@ def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
     return [
         {
             "defect": case.defect,
-            "diagnosed": case.found,
+            "diagnosed": case.sentence,
             "against_nominal": describe(case.against_nominal),
             "against_before": describe(case.against_before),
         }

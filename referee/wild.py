@@ -1,5 +1,4 @@
-"""How the diagnosis does on machines of other physics than the library's, scored by what a person
-would accept."""
+"""The check on machines whose physics differ from the library's, scored by acceptable answers."""
 
 from __future__ import annotations
 
@@ -17,16 +16,24 @@ from referee.withheld import Question, Withheld, check_machines, score_lines, se
 from rigtwin.studies.sweep import Workers
 
 SURE = 0.8
-"""Confidence from which nine names in ten must be right."""
+"""Confidence from which nine in ten names must be acceptable."""
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 1.0)
-"""Of the reliability diagram."""
+"""Bounds of the bins of confidence in the reliability diagram."""
 
 WildResult = Withheld[WildCase]
 
 
 @dataclass(frozen=True)
 class Named:
-    """An effect that was named. accepted: whether a person would say so too."""
+    """A named effect.
+
+    Attributes
+    ----------
+    confidence : float
+        Reported confidence.
+    accepted : bool
+        Whether the name is acceptable.
+    """
 
     confidence: float
     accepted: bool
@@ -39,7 +46,7 @@ def check_wild(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> WildResult:
-    """The whole check, its answers kept in a folder; see `check_machines`."""
+    """Run the whole check with its answers stored in a folder; see `check_machines`."""
 
     def ask(case: WildCase) -> Question:
         return MACHINES[case.machine], [record_wild(case, again) for again in (0, 1)]
@@ -49,7 +56,7 @@ def check_wild(
 
 
 def judge_names(result: WildResult) -> list[Named]:
-    """Every effect that was named, and whether it is accepted."""
+    """Return every named effect, and whether it is acceptable."""
     return [
         Named(effect["confidence"], name in case.accepted)
         for case, answer in zip(result.cases, result.answers, strict=True)
@@ -58,23 +65,23 @@ def judge_names(result: WildResult) -> list[Named]:
 
 
 def reliability(named: Sequence[Named]) -> list[tuple[float, float, int]]:
-    """(mean confidence, share accepted, how many) in bins of confidence."""
-    found = []
+    """Return mean confidence, share of acceptable names and count of every bin with names."""
+    bins = []
     for low, high in pairwise(BINS):
-        own = [n for n in named if low <= n.confidence < high or n.confidence == high == 1.0]
-        if own:
-            said = float(np.mean([n.confidence for n in own]))
-            found.append((said, float(np.mean([n.accepted for n in own])), len(own)))
-    return found
+        in_bin = [n for n in named if low <= n.confidence < high or n.confidence == high == 1.0]
+        if in_bin:
+            confidence = float(np.mean([n.confidence for n in in_bin]))
+            bins.append((confidence, float(np.mean([n.accepted for n in in_bin])), len(in_bin)))
+    return bins
 
 
 def wild_rows(result: WildResult) -> list[Row]:
-    """Every measure."""
+    """Return every measure of the score."""
     pairs = list(zip(result.cases, result.answers, strict=True))
     wrong = [bool(set(names(a)) - case.accepted) for case, a in pairs]
     right = [bool(a["effects"]) and not bad for (_, a), bad in zip(pairs, wrong, strict=True)]
     named = judge_names(result)
-    held = list(_intervals(result))
+    covered = list(_intervals(result))
     return [
         share_of("a wrong family named", wrong, "<= 5 %"),
         share_of("named, and all of it acceptable", right, "none set"),
@@ -84,22 +91,23 @@ def wild_rows(result: WildResult) -> list[Row]:
             [each.accepted for each in named if each.confidence >= SURE],
             ">= 90 %",
         ),
-        share_of("intervals that hold the truth", held, "90 to 98 %"),
+        share_of("intervals that hold the truth", covered, "90 to 98 %"),
         seconds_row(result.answers),
     ]
 
 
 def _intervals(result: WildResult) -> Iterator[bool]:
+    """Yield for every named effect with a true magnitude whether its interval covers it."""
     for case, answer in zip(result.cases, result.answers, strict=True):
         truth = record_wild(case).magnitudes
         for name, effect in zip(names(answer), answer["effects"], strict=True):
             if name in truth:
-                each = next(iter(effect["parameters"].values()))
-                yield each["low"] <= truth[name] <= each["high"]
+                interval = next(iter(effect["parameters"].values()))
+                yield interval["low"] <= truth[name] <= interval["high"]
 
 
 def wild_document(result: WildResult) -> dict[str, Any]:
-    """The score for other programs, with what was there and what was said of each machine."""
+    """Return the score as a JSON document, with the parts and the answer of every machine."""
     return {
         "seed": result.seed,
         "cases": len(result.cases),
@@ -120,11 +128,12 @@ def wild_document(result: WildResult) -> dict[str, Any]:
 
 
 def wild_table(result: WildResult) -> str:
-    """The score as text."""
+    """Return the score as text."""
     lines = score_lines(result.seed, len(result.cases), wild_rows(result))
     lines += ["", "confidence said, share acceptable, names"]
     lines += [
-        f"{said:.2f}  {true:.2f}  {count}" for said, true, count in reliability(judge_names(result))
+        f"{confidence:.2f}  {true:.2f}  {count}"
+        for confidence, true, count in reliability(judge_names(result))
     ]
     lines += ["", "named, and not acceptable:"]
     for case, answer in zip(result.cases, result.answers, strict=True):

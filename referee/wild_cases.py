@@ -1,8 +1,7 @@
-"""Draws machines whose physics have other forms than the library's, and says what a person would
-accept as an answer about each.
+"""Random machines whose physics differ from the library's, with the acceptable answers.
 
-The table of acceptable answers stood before the first diagnosis was made with it. A name that is
-not in a machine's row is wrong, whatever it explains; to name nothing is never wrong.
+The table of acceptable answers was fixed before the first diagnosis. A name outside a machine's
+row is wrong, whatever it explains. To name nothing is never wrong.
 """
 
 from __future__ import annotations
@@ -18,31 +17,32 @@ from referee.benches import wander
 from referee.wild_truth import (
     FINE,
     Array,
-    Bending,
-    Following,
-    Rubbing,
-    Sensing,
-    carriage,
-    drive,
-    follow,
-    hold,
-    sense,
+    ElasticTruth,
+    FollowerTruth,
+    FrictionTruth,
+    SensorTruth,
+    control_carriage,
+    drive_pendulum,
+    follow_command,
+    imposed_force,
+    read_sensor,
 )
 
-OWN = Path(__file__).parent / "machines"
+DESCRIPTIONS = Path(__file__).parent / "machines"
 MACHINES: Mapping[str, str] = {
     "damper": "damper-bench",
     "actuator": "position-actuator",
     "carriage": "emps",
-    "arm": str(OWN / "swinging_arm.toml"),
+    "arm": str(DESCRIPTIONS / "swinging_arm.toml"),
 }
-"""Sort of machine → its description."""
+"""Description of every sort of machine: a name or the path of a file."""
+# Component of each sort of machine that can have the effects of a guide, a drive or a sensor.
 GUIDES = {"damper": "damper", "carriage": "guide", "arm": "bearing"}
 DRIVES = {"carriage": "drive", "arm": "drive", "actuator": "actuator"}
 SENSORS = {"damper": "load_cell", "carriage": "encoder", "arm": "encoder", "actuator": "sensor"}
 DRY = ("coulomb", "stribeck", "breakaway")
 ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
-    # what is in it: kinds at the guide, at the drive, at the sensor
+    # part of a machine: accepted kinds at its guide, at its drive, at its sensor
     "viscous": (("viscous",), (), ()),
     "dry": (("coulomb",), (), ()),
     "lugre": ((*DRY, "compliance", "viscous"), (), ()),
@@ -113,17 +113,26 @@ SORTS: Mapping[str, tuple[str, ...]] = {
         "viscous, dry, sag",
     ),
 }
-"""Sort of machine → what may be in it."""
+"""Combinations of parts that are drawn for each sort of machine."""
 ROUND = ("damper", "actuator", "damper", "actuator", "carriage", "damper", "actuator", "arm")
-"""Machines in the order in which they are drawn."""
+"""Order in which the sorts of machine are drawn."""
 GAINS = (35.15065, 160.18, 243.45)
-"""Of the carriage's controller."""
+"""Gains of the carriage's controller: force per output, K_p and K_v."""
 
 
 @dataclass(frozen=True)
 class WildCase:
-    """machine: which sort; parts: what is in it, words of `ACCEPTED`; number, seed: it was drawn
-    with."""
+    """A random machine.
+
+    Attributes
+    ----------
+    machine : str
+        Sort of machine, one of `MACHINES`.
+    parts : tuple of str
+        Parts of its physics, words of `ACCEPTED`.
+    number, seed : int
+        Number and seed from which it is drawn.
+    """
 
     machine: str
     parts: tuple[str, ...]
@@ -132,21 +141,30 @@ class WildCase:
 
     @property
     def accepted(self) -> frozenset[str]:
-        """Names that a person would accept, kind@component."""
-        found = set()
+        """Acceptable names, kind@component."""
+        names = set()
         for part in self.parts:
             for places, kinds in zip((GUIDES, DRIVES, SENSORS), ACCEPTED[part], strict=True):
                 if self.machine in places:
-                    found |= {f"{kind}@{places[self.machine]}" for kind in kinds}
+                    names |= {f"{kind}@{places[self.machine]}" for kind in kinds}
             if "mass" in ACCEPTED[part][0]:
-                found |= {"mass@carriage", "mass@arm"}
-        return frozenset(found)
+                names |= {"mass@carriage", "mass@arm"}
+        return frozenset(names)
 
 
 @dataclass(frozen=True)
 class WildData:
-    """One test. columns: topic → field → values, shape (ticks,); period: s; magnitudes: what is
-    true of the parameters that have a true value, by kind@component."""
+    """One test of a machine.
+
+    Attributes
+    ----------
+    columns : dict
+        Topic → field → values, shape (ticks,).
+    period : float
+        Sample period, s.
+    magnitudes : dict
+        True values, by kind@component, of the parameters that have one.
+    """
 
     columns: dict[str, dict[str, Array]]
     period: float
@@ -154,7 +172,7 @@ class WildData:
 
 
 def draw_wild(number: int, seed: int) -> WildCase:
-    """The case of that number: every sort of every machine in turn."""
+    """Return a case by its number: all combinations of all machines in turn."""
     machine = ROUND[number % len(ROUND)]
     before = sum(ROUND[n % len(ROUND)] == machine for n in range(number))
     sorts = SORTS[machine]
@@ -163,104 +181,119 @@ def draw_wild(number: int, seed: int) -> WildCase:
 
 
 def record_wild(case: WildCase, again: int = 0) -> WildData:
-    """A test of a case. again: another one of the same machine."""
-    own = np.random.default_rng([case.seed, case.number, 11])
-    test = np.random.default_rng([case.seed, case.number, 13, again])
-    return RECORD[case.machine](case, own, test)
+    """Record a test of a case; again: number of the repetition on the same machine."""
+    # Separate streams: a repetition has another excitation and noise but the same machine.
+    machine_random = np.random.default_rng([case.seed, case.number, 11])
+    test_random = np.random.default_rng([case.seed, case.number, 13, again])
+    return RECORD[case.machine](case, machine_random, test_random)
 
 
 def _spread(random: np.random.Generator, low: float, high: float) -> float:
+    """Draw a number between two bounds, uniform in its logarithm."""
     return float(math.exp(random.uniform(math.log(low), math.log(high))))
 
 
-def _rubbing(
+def _draw_friction(
     parts: tuple[str, ...], random: np.random.Generator, slip: float, viscous: float, speed: float
-) -> Rubbing:
-    """Of sizes about `slip` N and `viscous` Ns/m, for a machine that goes up to `speed` m/s."""
+) -> FrictionTruth:
+    """Draw a friction of about `slip` N and `viscous` Ns/m, for speeds up to `speed` m/s."""
+    # Every number is drawn whether it is used or not, so parts do not shift the random stream.
     size = slip * _spread(random, 0.4, 2.0)
     damping = viscous * _spread(random, 0.4, 2.0)
     lugre, warms = "lugre" in parts, "warming" in parts
-    breakaway, slow = 1.0 + random.uniform(0.2, 0.8), speed * _spread(random, 0.02, 0.1)
-    bristle, smooth = _spread(random, 2e-4, 2e-3) * speed, speed * _spread(random, 0.02, 0.1)
-    by_load, cooled = _spread(random, 0.01, 0.04), random.uniform(0.2, 0.45)
-    warming, worn = random.uniform(2.0, 8.0), random.uniform(0.02, 0.05)
-    return Rubbing(
+    breakaway, fade_speed = 1.0 + random.uniform(0.2, 0.8), speed * _spread(random, 0.02, 0.1)
+    bristle, tanh_speed = _spread(random, 2e-4, 2e-3) * speed, speed * _spread(random, 0.02, 0.1)
+    load_friction, warming_loss = _spread(random, 0.01, 0.04), random.uniform(0.2, 0.45)
+    warming_time, wear_rate = random.uniform(2.0, 8.0), random.uniform(0.02, 0.05)
+    return FrictionTruth(
         slip=size if {"dry", "lugre", "tanh"} & set(parts) else 0.0,
         breakaway=breakaway if lugre else 1.0,
-        slow=slow,
+        fade_speed=fade_speed,
         bristle=bristle if lugre else (2e-5 if "frame" in parts else 2e-6) * speed,
-        smooth=smooth if "tanh" in parts else 0.0,
-        by_load=by_load if "load" in parts else 0.0,
+        tanh_speed=tanh_speed if "tanh" in parts else 0.0,
+        load_friction=load_friction if "load" in parts else 0.0,
         viscous=damping if {"viscous", "wearing"} & set(parts) else 0.0,
-        cooled=cooled if warms else 0.0,
-        warming=warming,
-        worn=worn if "wearing" in parts else 0.0,
+        warming_loss=warming_loss if warms else 0.0,
+        warming_time=warming_time,
+        wear_rate=wear_rate if "wearing" in parts else 0.0,
     )
 
 
-def _true_sizes(case: WildCase, r: Rubbing) -> dict[str, float]:
-    """Magnitudes of what has the library's form: interval and truth can be compared."""
-    guide, found = GUIDES[case.machine], {}
-    if "dry" in case.parts and not r.cooled:
-        found[f"coulomb@{guide}"] = r.slip
-    if "viscous" in case.parts and not r.cooled and not r.worn and not r.smooth:
-        found[f"viscous@{guide}"] = r.viscous
-    return found
+def _true_sizes(case: WildCase, friction: FrictionTruth) -> dict[str, float]:
+    """Return the true magnitudes of parts that have the library's form, for comparing intervals."""
+    guide, sizes = GUIDES[case.machine], {}
+    if "dry" in case.parts and not friction.warming_loss:
+        sizes[f"coulomb@{guide}"] = friction.slip
+    if (
+        "viscous" in case.parts
+        and not friction.warming_loss
+        and not friction.wear_rate
+        and not friction.tanh_speed
+    ):
+        sizes[f"viscous@{guide}"] = friction.viscous
+    return sizes
 
 
-def _record_damper(case: WildCase, own: np.random.Generator, test: np.random.Generator) -> WildData:
-    period, seconds, parts = float(own.choice([1e-3, 2e-3])), 12.0, case.parts
-    r = _rubbing(parts, own, 100.0, 900.0, 0.15)
-    bending = Bending(
-        rate=_spread(own, 500.0, 3000.0) if "hardening" in parts else 0.0,
-        cubic=_spread(own, 5e5, 5e6) if "hardening" in parts else 0.0,
-        rider=_spread(own, 1.0, 4.0) if "rider" in parts else 0.0,
-        frequency=_spread(own, 4.0, 12.0),
-        ratio=_spread(own, 0.03, 0.2),
-        frame=_spread(own, 2e4, 1e5) if "frame" in parts else 0.0,
+def _record_damper(
+    case: WildCase, machine_random: np.random.Generator, test_random: np.random.Generator
+) -> WildData:
+    """Record a damper that is moved as prescribed."""
+    period, seconds, parts = float(machine_random.choice([1e-3, 2e-3])), 12.0, case.parts
+    friction = _draw_friction(parts, machine_random, 100.0, 900.0, 0.15)
+    elastic = ElasticTruth(
+        rate=_spread(machine_random, 500.0, 3000.0) if "hardening" in parts else 0.0,
+        cubic=_spread(machine_random, 5e5, 5e6) if "hardening" in parts else 0.0,
+        rider=_spread(machine_random, 1.0, 4.0) if "rider" in parts else 0.0,
+        frequency=_spread(machine_random, 4.0, 12.0),
+        ratio=_spread(machine_random, 0.03, 0.2),
+        frame=_spread(machine_random, 2e4, 1e5) if "frame" in parts else 0.0,
     )
-    reach = float(test.uniform(0.02, 0.04))
-    motion = wander(test, seconds, period / FINE, reach, 0.1, 3.0)
-    force = hold(r, bending, motion, period)
+    reach = float(test_random.uniform(0.02, 0.04))
+    motion = wander(test_random, seconds, period / FINE, reach, 0.1, 3.0)
+    force = imposed_force(friction, elastic, motion, period)
     size = float(np.std(force))
-    cell = Sensing(
+    cell = SensorTruth(
         noise=0.01 * size,
-        coloured=_spread(own, 0.02, 0.06) * size if "coloured" in parts else 0.0,
-        bit=10.0 * size / 4096.0 * _spread(own, 1.0, 8.0) if "steps" in parts else 0.0,
-        late=_spread(own, 0.004, 0.02) if "late" in parts else 0.0,
+        coloured=_spread(machine_random, 0.02, 0.06) * size if "coloured" in parts else 0.0,
+        bit=10.0 * size / 4096.0 * _spread(machine_random, 1.0, 8.0) if "steps" in parts else 0.0,
+        delay=_spread(machine_random, 0.004, 0.02) if "late" in parts else 0.0,
     )
-    place = Sensing(noise=5e-6, bit=0.2 / 4096.0 if "steps" in parts else 1e-6)
+    place = SensorTruth(noise=5e-6, bit=0.2 / 4096.0 if "steps" in parts else 1e-6)
     columns = {
-        "displacement": sense(test, motion[::FINE], place, period),
-        "force": sense(test, force, cell, period),
+        "displacement": read_sensor(test_random, motion[::FINE], place, period),
+        "force": read_sensor(test_random, force, cell, period),
     }
-    return WildData({"/sensor": columns}, period, _true_sizes(case, r))
+    return WildData({"/sensor": columns}, period, _true_sizes(case, friction))
 
 
 def _record_actuator(
-    case: WildCase, own: np.random.Generator, test: np.random.Generator
+    case: WildCase, machine_random: np.random.Generator, test_random: np.random.Generator
 ) -> WildData:
-    period, parts = float(own.choice([1e-3, 2e-3])), case.parts
-    lag = _spread(own, 0.01, 0.05)
-    truth = Following(
+    """Record a positioning actuator."""
+    period, parts = float(machine_random.choice([1e-3, 2e-3])), case.parts
+    lag = _spread(machine_random, 0.01, 0.05)
+    truth = FollowerTruth(
         lag=0.3 * lag if "sprung load" in parts else lag,
-        late=_spread(own, 0.006, 0.03) if "late" in parts else 0.0,
-        fastest=_spread(own, 0.08, 0.2) if "soft limit" in parts else 0.0,
-        loose=_spread(own, 5e-4, 3e-3) if "loose" in parts else 0.0,
-        fades=_spread(own, 0.005, 0.02) if "fading" in parts else 0.0,
-        own=(_spread(own, 5.0, 15.0), float(own.uniform(0.1, 0.5)))
+        delay=_spread(machine_random, 0.006, 0.03) if "late" in parts else 0.0,
+        speed_limit=_spread(machine_random, 0.08, 0.2) if "soft limit" in parts else 0.0,
+        play=_spread(machine_random, 5e-4, 3e-3) if "loose" in parts else 0.0,
+        gain_loss=_spread(machine_random, 0.005, 0.02) if "fading" in parts else 0.0,
+        resonance=(_spread(machine_random, 5.0, 15.0), float(machine_random.uniform(0.1, 0.5)))
         if "sprung load" in parts
         else None,
-        curved=_spread(own, 50.0, 300.0) if "curved lag" in parts else 0.0,
+        lag_growth=_spread(machine_random, 50.0, 300.0) if "curved lag" in parts else 0.0,
     )
-    command = wander(test, 12.0, period, float(test.uniform(0.02, 0.04)), 0.1, 8.0)
-    moved = follow(truth, command, period)
-    by = Sensing(
+    command = wander(test_random, 12.0, period, float(test_random.uniform(0.02, 0.04)), 0.1, 8.0)
+    positions = follow_command(truth, command, period)
+    sensor = SensorTruth(
         noise=2e-5,
-        coloured=_spread(own, 1e-4, 5e-4) if "coloured" in parts else 0.0,
+        coloured=_spread(machine_random, 1e-4, 5e-4) if "coloured" in parts else 0.0,
         bit=0.2 / 4096.0 if "steps" in parts else 1e-6,
     )
-    columns = {"position": command}, {"position": sense(test, moved, by, period)}
+    columns = (
+        {"position": command},
+        {"position": read_sensor(test_random, positions, sensor, period)},
+    )
     plain = set(parts) <= {"lagging", "steps"}
     return WildData(
         {"/command": columns[0], "/sensor": columns[1]},
@@ -270,67 +303,77 @@ def _record_actuator(
 
 
 def _record_carriage(
-    case: WildCase, own: np.random.Generator, test: np.random.Generator
+    case: WildCase, machine_random: np.random.Generator, test_random: np.random.Generator
 ) -> WildData:
+    """Record a carriage under position control."""
     period, parts = 1e-3, case.parts
-    r = _rubbing((*parts, "viscous"), own, 20.0, 203.5, 0.15)._replace(viscous=203.5)
-    bending = Bending(
-        ripple=_spread(own, 2.0, 8.0) if "ripple" in parts else 0.0,
-        pitch=_spread(own, 0.008, 0.03),
-        phase=float(own.uniform(-3.0, 3.0)),
-        rider=_spread(own, 8.0, 25.0) if "rider" in parts else 0.0,
-        frequency=_spread(own, 8.0, 25.0),
-        ratio=_spread(own, 0.03, 0.15),
+    friction = _draw_friction((*parts, "viscous"), machine_random, 20.0, 203.5, 0.15)._replace(
+        viscous=203.5
+    )
+    elastic = ElasticTruth(
+        ripple=_spread(machine_random, 2.0, 8.0) if "ripple" in parts else 0.0,
+        pitch=_spread(machine_random, 0.008, 0.03),
+        phase=float(machine_random.uniform(-3.0, 3.0)),
+        rider=_spread(machine_random, 8.0, 25.0) if "rider" in parts else 0.0,
+        frequency=_spread(machine_random, 8.0, 25.0),
+        ratio=_spread(machine_random, 0.03, 0.15),
     )
     time = np.arange(10000) * period
-    slow, fast = test.uniform(0.5, 0.8), test.uniform(2.5, 4.0)
-    reference = 0.11 - 0.11 * np.cos(slow * time) + 0.012 * np.sin(fast * time)
-    by = Sensing(noise=2e-7)
-    noise = by.noise * test.standard_normal(len(time))
-    sag = _spread(own, 5e-4, 3e-3) if "sag" in parts else 0.0
+    slow_rate, fast_rate = test_random.uniform(0.5, 0.8), test_random.uniform(2.5, 4.0)
+    reference = 0.11 - 0.11 * np.cos(slow_rate * time) + 0.012 * np.sin(fast_rate * time)
+    sensor = SensorTruth(noise=2e-7)
+    noise = sensor.noise * test_random.standard_normal(len(time))
+    sag = _spread(machine_random, 5e-4, 3e-3) if "sag" in parts else 0.0
     bit = 2e-6 if "steps" in parts else 0.0
-    read, force = carriage(r, bending, 95.1, GAINS, reference, noise, sag, bit, period)
+    positions, force = control_carriage(
+        friction, elastic, 95.1, GAINS, reference, noise, sag, bit, period
+    )
     columns = {
         "/command": {
             "reference": reference,
             "pulse_voltage": np.zeros(len(time)),
             "force": force,
         },
-        "/sensor": {"position": read},
+        "/sensor": {"position": positions},
     }
-    return WildData(columns, period, _true_sizes(case, r))
+    return WildData(columns, period, _true_sizes(case, friction))
 
 
-def _record_arm(case: WildCase, own: np.random.Generator, test: np.random.Generator) -> WildData:
+def _record_arm(
+    case: WildCase, machine_random: np.random.Generator, test_random: np.random.Generator
+) -> WildData:
+    """Record a swinging arm, driven or free."""
     period, parts = 5e-3, case.parts
-    r = _rubbing(parts, own, 0.02, 0.008, 4.0)
-    bending = Bending(
-        rate=_spread(own, 0.05, 0.3) if "hardening" in parts else 0.0,
-        cubic=_spread(own, 0.1, 0.6) if "hardening" in parts else 0.0,
-        ripple=_spread(own, 0.02, 0.08) if "ripple" in parts else 0.0,
-        pitch=2.0 * math.pi / float(own.integers(6, 16)),
-        phase=float(own.uniform(-3.0, 3.0)),
+    friction = _draw_friction(parts, machine_random, 0.02, 0.008, 4.0)
+    elastic = ElasticTruth(
+        rate=_spread(machine_random, 0.05, 0.3) if "hardening" in parts else 0.0,
+        cubic=_spread(machine_random, 0.1, 0.6) if "hardening" in parts else 0.0,
+        ripple=_spread(machine_random, 0.02, 0.08) if "ripple" in parts else 0.0,
+        pitch=2.0 * math.pi / float(machine_random.integers(6, 16)),
+        phase=float(machine_random.uniform(-3.0, 3.0)),
     )
     ticks = 1600
-    # Arms come once a round, at the same place in it: every second round has a free swing.
+    # Every round draws one arm; in every second round it swings freely.
     free = not ({"sag", "ripple"} & set(parts)) and case.number // len(ROUND) % 2 == 0
-    torque, start = np.zeros(ticks), float(test.uniform(0.8, 1.5))
+    torque, start = np.zeros(ticks), float(test_random.uniform(0.8, 1.5))
     if not free:
-        torque, start = 0.4 * wander(test, ticks * period, period, 1.0, 0.2, 2.0), 0.0
-    sag = _spread(own, 0.3, 1.0) if "sag" in parts else 0.0
+        torque, start = 0.4 * wander(test_random, ticks * period, period, 1.0, 0.2, 2.0), 0.0
+    sag = _spread(machine_random, 0.3, 1.0) if "sag" in parts else 0.0
     inertia, arm = 0.5 * 0.15**2 + 0.002, 0.5 * 0.15 * 9.80665
-    angle = drive(r, bending, inertia, arm, start, torque, sag, period)
-    by = Sensing(
+    angle = drive_pendulum(friction, elastic, inertia, arm, start, torque, sag, period)
+    sensor = SensorTruth(
         noise=1e-4,
         bit=2.0 * math.pi / 4096.0 if "steps" in parts else 2.0 * math.pi / 65536.0,
-        eccentric=_spread(own, 0.01, 0.03) / (2.0 * math.pi) if "eccentric" in parts else 0.0,
+        eccentric=_spread(machine_random, 0.01, 0.03) / (2.0 * math.pi)
+        if "eccentric" in parts
+        else 0.0,
         pitch=2.0 * math.pi,
     )
     columns = {
         "/command": {"torque": torque},
-        "/sensor": {"position": sense(test, angle, by, period)},
+        "/sensor": {"position": read_sensor(test_random, angle, sensor, period)},
     }
-    return WildData(columns, period, _true_sizes(case, r))
+    return WildData(columns, period, _true_sizes(case, friction))
 
 
 RECORD: Mapping[str, Callable[[WildCase, np.random.Generator, np.random.Generator], WildData]] = {

@@ -1,9 +1,8 @@
-"""Machines whose physics have other forms than the library's: written from textbooks and from
-nothing of the twin.
+"""Machines whose physics differ from the library's, written from textbooks without the twin's code.
 
 Friction is a bristle (Canudas de Wit et al., A new model for control of systems with friction, IEEE
-TAC 40(3), 1995), stepped implicitly; or a tanh of speed. It may grow with the load and fall as the
-machine warms up.
+TAC 40(3), 1995), stepped implicitly, or a tanh of the speed. It may grow with the load and fall as
+the machine warms up.
 """
 
 from __future__ import annotations
@@ -18,34 +17,60 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 FINE = 10
-"""Steps a tick."""
+"""Integration steps per tick."""
 FASTEST, HALVINGS = 50.0, 60
-"""m/s, and how often they are halved, of what moves behind a spring."""
+"""Bound of the speed behind a spring, m/s, and the number of its bisections."""
 
 
-class Rubbing(NamedTuple):
-    """What resists a motion, in N, m and s, or Nm and rad. slip: kinetic friction; breakaway: times
-    that, of a stick; slow: speed at which it fades; bristle: deflection at which it slips; smooth:
-    speed over which a tanh changes sign, 0 of a bristle; by_load: friction for each N of load;
-    viscous: for each m/s; cooled: share of all of it that warming up takes away, within `warming`
-    s; worn: share of the viscous part that is gone after 1 s."""
+class FrictionTruth(NamedTuple):
+    """Friction, in N, m and s, or Nm, rad and s.
+
+    Attributes
+    ----------
+    slip, breakaway : float
+        Kinetic friction, N, and the ratio of breakaway to kinetic friction.
+    fade_speed : float
+        Speed at which the friction above `slip` fades, m/s.
+    bristle : float
+        Deflection at which the bristle slips, m.
+    tanh_speed : float
+        Speed over which a tanh changes its sign, m/s. 0 selects the bristle.
+    load_friction : float
+        Friction per load.
+    viscous : float
+        Viscous friction, Ns/m.
+    warming_loss, warming_time : float
+        Share of the friction lost by warming up, and its time constant, s.
+    wear_rate : float
+        Share of the viscous friction lost per second, 1/s.
+    """
 
     slip: float = 0.0
     breakaway: float = 1.0
-    slow: float = 0.01
+    fade_speed: float = 0.01
     bristle: float = 1e-6
-    smooth: float = 0.0
-    by_load: float = 0.0
+    tanh_speed: float = 0.0
+    load_friction: float = 0.0
     viscous: float = 0.0
-    cooled: float = 0.0
-    warming: float = 1.0
-    worn: float = 0.0
+    warming_loss: float = 0.0
+    warming_time: float = 1.0
+    wear_rate: float = 0.0
 
 
-class Bending(NamedTuple):
-    """Springs and waves. rate: N/m about 0; cubic: N/m³; ripple: N, along the way, and its pitch m
-    and phase; rider: a second mass kg on a spring of that frequency Hz and damping ratio; frame:
-    N/m of what the machine stands on, 0 if rigid."""
+class ElasticTruth(NamedTuple):
+    """Elastic forces and a second mass.
+
+    Attributes
+    ----------
+    rate, cubic : float
+        Linear stiffness, N/m, and cubic stiffness, N/m³, about 0.
+    ripple, pitch, phase : float
+        Periodic force: amplitude, N, pitch, m, and phase, rad.
+    rider, frequency, ratio : float
+        Second mass, kg, on a spring: its natural frequency, Hz, and damping ratio.
+    frame : float
+        Stiffness of the frame, N/m. 0 stands for a rigid one.
+    """
 
     rate: float = 0.0
     cubic: float = 0.0
@@ -59,9 +84,22 @@ class Bending(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Sensing:
-    """noise: rms of white noise; coloured: rms of noise below `corner` Hz; bit; eccentric: share by
-    which an encoder's reading waves along its pitch; late: s by which a channel is stamped."""
+class SensorTruth:
+    """Sensor and logger; units are those of the signal.
+
+    Attributes
+    ----------
+    noise : float
+        White noise, rms.
+    coloured, corner : float
+        Low-frequency noise, rms, and its corner frequency, Hz.
+    bit : float
+        Resolution.
+    eccentric, pitch : float
+        Amplitude of an encoder's periodic error as a share of its pitch, and the pitch.
+    delay : float
+        Delay of the channel, s.
+    """
 
     noise: float = 0.0
     coloured: float = 0.0
@@ -69,107 +107,130 @@ class Sensing:
     bit: float = 0.0
     eccentric: float = 0.0
     pitch: float = 0.1
-    late: float = 0.0
+    delay: float = 0.0
 
 
 @numba.njit
-def rub(r: Rubbing, z: float, v: float, load: float, time: float, h: float) -> tuple[float, float]:
-    """(friction, the bristle's deflection after the step)."""
-    warm = 1.0 - r.cooled * (1.0 - math.exp(-time / r.warming))
-    fade = math.exp(-((v / r.slow) ** 2))
-    size = warm * (r.slip * (1.0 + (r.breakaway - 1.0) * fade) + r.by_load * abs(load))
-    viscous = warm * r.viscous * max(1.0 - r.worn * time, 0.0) * v
-    if r.smooth > 0.0:
-        return size * math.tanh(v / r.smooth) + viscous, z
-    z = (z + v * h) / (1.0 + abs(v) * h / r.bristle)
-    return size * z / r.bristle + viscous, z
+def step_friction(
+    friction: FrictionTruth, bristle: float, speed: float, load: float, time: float, step: float
+) -> tuple[float, float]:
+    """Return the friction, N, and the deflection of the bristle after a step, m.
+
+    F(v) = F_c + (F_s − F_c) exp(−(v/v_s)²); ż = v − |v| z/z_0; friction = F z/z_0.
+    """
+    warm = 1.0 - friction.warming_loss * (1.0 - math.exp(-time / friction.warming_time))
+    fade = math.exp(-((speed / friction.fade_speed) ** 2))
+    size = warm * (
+        friction.slip * (1.0 + (friction.breakaway - 1.0) * fade)
+        + friction.load_friction * abs(load)
+    )
+    viscous = warm * friction.viscous * max(1.0 - friction.wear_rate * time, 0.0) * speed
+    if friction.tanh_speed > 0.0:
+        return size * math.tanh(speed / friction.tanh_speed) + viscous, bristle
+    # Implicit Euler: the bristle's time constant is much shorter than a step at high speed.
+    bristle = (bristle + speed * step) / (1.0 + abs(speed) * step / friction.bristle)
+    return size * bristle / friction.bristle + viscous, bristle
 
 
 @numba.njit
-def bend(b: Bending, x: float) -> float:
-    """The force that depends on the place alone."""
-    wave = b.ripple * math.sin(2.0 * math.pi * x / b.pitch + b.phase)
-    return b.rate * x + b.cubic * x**3 + wave
+def elastic_force(elastic: ElasticTruth, position: float) -> float:
+    """Return the force that depends on the position alone, N."""
+    wave = elastic.ripple * math.sin(2.0 * math.pi * position / elastic.pitch + elastic.phase)
+    return elastic.rate * position + elastic.cubic * position**3 + wave
 
 
 @numba.njit
-def _hold(r: Rubbing, b: Bending, x: Array, h: float, mass: float) -> Array:
-    """The force that moves a bench's end as prescribed, over the fine steps."""
+def _imposed_force(
+    friction: FrictionTruth, elastic: ElasticTruth, x: Array, h: float, mass: float
+) -> Array:
+    """Return the force that moves the end of a bench as prescribed, N, at every step."""
     force, z, inner = np.zeros(len(x)), 0.0, x[0]
     rider, speed = x[0], 0.0
-    w = 2.0 * math.pi * b.frequency
+    w = 2.0 * math.pi * elastic.frequency
     for n in range(1, len(x)):
         time, v = n * h, (x[n] - x[n - 1]) / h
-        if b.frame > 0.0:
-            # The end moves the damper through a spring: its speed by bisection, as what resists
-            # grows with it.
-            v_in, low, high = v, -FASTEST, FASTEST
+        if elastic.frame > 0.0:
+            # The end moves the damper through the spring of the frame. The resistance grows with
+            # the speed, so bisection finds the speed at which both forces are equal.
+            inner_speed, low, high = v, -FASTEST, FASTEST
             for _ in range(HALVINGS):
-                v_in = 0.5 * (low + high)
-                f, _z = rub(r, z, v_in, 0.0, time, h)
-                place = inner + v_in * h
-                if b.frame * (x[n] - place) - f - bend(b, place) > 0.0:
-                    low = v_in
+                inner_speed = 0.5 * (low + high)
+                resistance, _z = step_friction(friction, z, inner_speed, 0.0, time, h)
+                inner_position = inner + inner_speed * h
+                if (
+                    elastic.frame * (x[n] - inner_position)
+                    - resistance
+                    - elastic_force(elastic, inner_position)
+                    > 0.0
+                ):
+                    low = inner_speed
                 else:
-                    high = v_in
-            f, z = rub(r, z, v_in, 0.0, time, h)
-            inner += v_in * h
-            force[n] = b.frame * (x[n] - inner)
+                    high = inner_speed
+            resistance, z = step_friction(friction, z, inner_speed, 0.0, time, h)
+            inner += inner_speed * h
+            force[n] = elastic.frame * (x[n] - inner)
         else:
-            f, z = rub(r, z, v, 0.0, time, h)
-            force[n] = f + bend(b, x[n])
-        if b.rider > 0.0:
-            pull = b.rider * (w * w * (x[n] - rider) + 2.0 * b.ratio * w * (v - speed))
-            speed += h * pull / b.rider
+            resistance, z = step_friction(friction, z, v, 0.0, time, h)
+            force[n] = resistance + elastic_force(elastic, x[n])
+        if elastic.rider > 0.0:
+            rider_force = elastic.rider * (
+                w * w * (x[n] - rider) + 2.0 * elastic.ratio * w * (v - speed)
+            )
+            speed += h * rider_force / elastic.rider
             rider += h * speed
-            force[n] += pull
+            force[n] += rider_force
+        # Second difference of the prescribed motion: the inertia of the moved end.
         if n > 1:
             force[n] += mass * (x[n] - 2.0 * x[n - 1] + x[n - 2]) / (h * h)
     return force
 
 
-def hold(r: Rubbing, b: Bending, x: Array, period: float, mass: float = 0.0) -> Array:
-    """The force at every tick for a motion given at the fine steps."""
-    return _hold(r, b, x, period / FINE, mass)[::FINE]
+def imposed_force(
+    friction: FrictionTruth, elastic: ElasticTruth, x: Array, period: float, mass: float = 0.0
+) -> Array:
+    """Return the force at every tick, N, for a motion at every integration step, m; mass: kg."""
+    return _imposed_force(friction, elastic, x, period / FINE, mass)[::FINE]
 
 
 @numba.njit
-def _drive(
-    r: Rubbing,
-    b: Bending,
+def _drive_pendulum(
+    friction: FrictionTruth,
+    elastic: ElasticTruth,
     mass: float,
     arm: float,
     start: float,
     torque: Array,
     sag: float,
     h: float,
-    fine: int,
+    substeps: int,
 ) -> Array:
-    """Position at every tick under a recorded force; arm: weight times lever of a pendulum, Nm."""
+    """Return the angle at every tick, rad, under a torque; arm: weight times lever, Nm."""
     x, v, z, rider, speed = start, 0.0, 0.0, start, 0.0
-    w = 2.0 * math.pi * b.frequency
+    w = 2.0 * math.pi * elastic.frequency
     out = np.zeros(len(torque))
     for tick in range(len(torque)):
         out[tick] = x
         command = torque[tick]
-        push = command / (1.0 + sag * abs(command))
-        for k in range(fine):
+        drive_force = command / (1.0 + sag * abs(command))
+        for k in range(substeps):
             load = arm * math.cos(x) + mass * v * v
-            f, z = rub(r, z, v, load, (tick * fine + k) * h, h)
-            total = push - f - bend(b, x) - arm * math.sin(x)
-            if b.rider > 0.0:
-                pull = b.rider * (w * w * (x - rider) + 2.0 * b.ratio * w * (v - speed))
-                speed += h * pull / b.rider
+            resistance, z = step_friction(friction, z, v, load, (tick * substeps + k) * h, h)
+            total = drive_force - resistance - elastic_force(elastic, x) - arm * math.sin(x)
+            if elastic.rider > 0.0:
+                rider_force = elastic.rider * (
+                    w * w * (x - rider) + 2.0 * elastic.ratio * w * (v - speed)
+                )
+                speed += h * rider_force / elastic.rider
                 rider += h * speed
-                total -= pull
+                total -= rider_force
             v += h * total / mass
             x += h * v
     return out
 
 
-def drive(
-    r: Rubbing,
-    b: Bending,
+def drive_pendulum(
+    friction: FrictionTruth,
+    elastic: ElasticTruth,
     mass: float,
     arm: float,
     start: float,
@@ -177,17 +238,42 @@ def drive(
     sag: float,
     period: float,
 ) -> Array:
-    """The same; the bristle needs steps that are fine beside its own frequency."""
-    size = max(r.slip * r.breakaway + r.by_load * (arm + mass), 1e-9)
-    stiffness = size / r.bristle if r.smooth == 0.0 else size / r.smooth / period
-    fine = max(FINE, math.ceil(4.0 * period * math.sqrt(stiffness / mass)))
-    return _drive(r, b, mass, arm, start, torque, sag, period / fine, fine)
+    """Return the angle of a pendulum at every tick under a recorded torque, rad.
+
+    Parameters
+    ----------
+    friction, elastic
+        Friction and elastic torques.
+    mass : float
+        Moment of inertia, kg m².
+    arm : float
+        Weight times lever, Nm.
+    start : float
+        Initial angle, rad.
+    torque : ndarray
+        Torque at every tick, Nm, shape (ticks,).
+    sag : float
+        Loss of the drive under load, 1/Nm: torque/(1 + sag |torque|).
+    period : float
+        Sample period, s.
+    """
+    # The steps resolve the mass on its bristle: ω h ≤ 1/4.
+    size = max(friction.slip * friction.breakaway + friction.load_friction * (arm + mass), 1e-9)
+    stiffness = (
+        size / friction.bristle
+        if friction.tanh_speed == 0.0
+        else size / friction.tanh_speed / period
+    )
+    substeps = max(FINE, math.ceil(4.0 * period * math.sqrt(stiffness / mass)))
+    return _drive_pendulum(
+        friction, elastic, mass, arm, start, torque, sag, period / substeps, substeps
+    )
 
 
 @numba.njit
-def _carriage(
-    r: Rubbing,
-    b: Bending,
+def _control_carriage(
+    friction: FrictionTruth,
+    elastic: ElasticTruth,
     mass: float,
     gains: tuple[float, float, float],
     reference: Array,
@@ -195,41 +281,46 @@ def _carriage(
     sag: float,
     bit: float,
     period: float,
-    fine: int,
+    substeps: int,
 ) -> tuple[Array, Array]:
-    """(position read, force commanded) of a carriage under a cascade of position and velocity
-    control."""
+    """Return measured position, m, and commanded force, N, of a controlled carriage, per tick.
+
+    gains: force per controller output, K_p and K_v of a cascade of position and velocity control.
+    """
     to_force, kp, kv = gains
     x, v, z, rider, speed = reference[0], 0.0, 0.0, reference[0], 0.0
-    w, h = 2.0 * math.pi * b.frequency, period / fine
-    read, force = np.zeros(len(reference)), np.zeros(len(reference))
-    last, mean_before = reference[0], reference[0]
+    w, h = 2.0 * math.pi * elastic.frequency, period / substeps
+    positions, force = np.zeros(len(reference)), np.zeros(len(reference))
+    previous, previous_mean = reference[0], reference[0]
     for tick in range(len(reference)):
         sensed = x + noise[tick]
         if bit > 0.0:
             sensed = round(sensed / bit) * bit
-        mean = 0.5 * (sensed + last)
-        rate = 0.0 if tick == 0 else (mean - mean_before) / period
-        last, mean_before = sensed, mean
+        # The controller differentiates means of two samples.
+        mean = 0.5 * (sensed + previous)
+        rate = 0.0 if tick == 0 else (mean - previous_mean) / period
+        previous, previous_mean = sensed, mean
         command = to_force * (kp * kv * (reference[tick] - sensed) - kv * rate)
-        read[tick], force[tick] = sensed, command
-        push = command / (1.0 + sag * abs(command))
-        for k in range(fine):
-            f, z = rub(r, z, v, 0.0, (tick * fine + k) * h, h)
-            total = push - f - bend(b, x)
-            if b.rider > 0.0:
-                pull = b.rider * (w * w * (x - rider) + 2.0 * b.ratio * w * (v - speed))
-                speed += h * pull / b.rider
+        positions[tick], force[tick] = sensed, command
+        drive_force = command / (1.0 + sag * abs(command))
+        for k in range(substeps):
+            resistance, z = step_friction(friction, z, v, 0.0, (tick * substeps + k) * h, h)
+            total = drive_force - resistance - elastic_force(elastic, x)
+            if elastic.rider > 0.0:
+                rider_force = elastic.rider * (
+                    w * w * (x - rider) + 2.0 * elastic.ratio * w * (v - speed)
+                )
+                speed += h * rider_force / elastic.rider
                 rider += h * speed
-                total -= pull
+                total -= rider_force
             v += h * total / mass
             x += h * v
-    return read, force
+    return positions, force
 
 
-def carriage(
-    r: Rubbing,
-    b: Bending,
+def control_carriage(
+    friction: FrictionTruth,
+    elastic: ElasticTruth,
     mass: float,
     gains: tuple[float, float, float],
     reference: Array,
@@ -238,89 +329,117 @@ def carriage(
     bit: float,
     period: float,
 ) -> tuple[Array, Array]:
-    """The same with steps that are fine beside the bristle's own frequency."""
-    stiffness = r.slip * r.breakaway / r.bristle if r.smooth == 0.0 else 0.0
-    fine = max(FINE, math.ceil(4.0 * period * math.sqrt(stiffness / mass)))
-    return _carriage(r, b, mass, gains, reference, noise, sag, bit, period, fine)
+    """Return the results of `_control_carriage` with steps that resolve the mass on its bristle."""
+    stiffness = (
+        friction.slip * friction.breakaway / friction.bristle if friction.tanh_speed == 0.0 else 0.0
+    )
+    substeps = max(FINE, math.ceil(4.0 * period * math.sqrt(stiffness / mass)))
+    return _control_carriage(
+        friction, elastic, mass, gains, reference, noise, sag, bit, period, substeps
+    )
 
 
 @dataclass(frozen=True)
-class Following:
-    """A positioning actuator. lag: s; late: s; fastest: m/s that its speed nears softly, 0 for
-    none; loose: m of play; fades: share of its gain that is gone after 1 s; own: natural frequency
-    Hz and damping ratio of a load on a spring behind it, or none; curved: share by which its lag
-    grows with the error, per m."""
+class FollowerTruth:
+    """Positioning actuator.
+
+    Attributes
+    ----------
+    lag, delay : float
+        First-order lag and delay, s.
+    speed_limit : float
+        Speed that the actuator approaches smoothly, m/s. 0 stands for no limit.
+    play : float
+        Play, m.
+    gain_loss : float
+        Share of the gain lost per second, 1/s.
+    resonance : tuple of float, optional
+        Natural frequency, Hz, and damping ratio of a load on a spring. None for a rigid load.
+    lag_growth : float
+        Relative growth of the lag with the position error, 1/m.
+    """
 
     lag: float = 0.0
-    late: float = 0.0
-    fastest: float = 0.0
-    loose: float = 0.0
-    fades: float = 0.0
-    own: tuple[float, float] | None = None
-    curved: float = 0.0
+    delay: float = 0.0
+    speed_limit: float = 0.0
+    play: float = 0.0
+    gain_loss: float = 0.0
+    resonance: tuple[float, float] | None = None
+    lag_growth: float = 0.0
 
 
 @numba.njit
-def _follow(
+def _follow_command(
     command: Array,
     lag: float,
-    fastest: float,
-    loose: float,
-    own: tuple[float, float],
-    curved: float,
+    speed_limit: float,
+    play: float,
+    resonance: tuple[float, float],
+    lag_growth: float,
     h: float,
 ) -> Array:
-    place, carried, end, speed = command[0], command[0], command[0], 0.0
-    w = 2.0 * math.pi * own[0]
+    """Return the position of the actuator at every integration step, m; h: step, s."""
+    position, after_play, end, speed = command[0], command[0], command[0], 0.0
+    w = 2.0 * math.pi * resonance[0]
     out = np.zeros(len(command))
     for n in range(len(command)):
-        carried = min(max(carried, command[n] - loose), command[n] + loose)
-        error = carried - place
-        slow = lag * (1.0 + curved * abs(error))
-        rate = error * (1.0 - math.exp(-h / slow)) / h if lag > 0.0 else error / h
-        if fastest > 0.0:
-            rate = fastest * math.tanh(rate / fastest)
-        place += h * rate
+        after_play = min(max(after_play, command[n] - play), command[n] + play)
+        error = after_play - position
+        fade_speed = lag * (1.0 + lag_growth * abs(error))
+        # Exact step of the lag, so any lag is stable.
+        rate = error * (1.0 - math.exp(-h / fade_speed)) / h if lag > 0.0 else error / h
+        if speed_limit > 0.0:
+            rate = speed_limit * math.tanh(rate / speed_limit)
+        position += h * rate
         if w > 0.0:
-            speed += h * (w * w * (place - end) - 2.0 * own[1] * w * speed)
+            speed += h * (w * w * (position - end) - 2.0 * resonance[1] * w * speed)
             end += h * speed
             out[n] = end
         else:
-            out[n] = place
+            out[n] = position
     return out
 
 
-def follow(truth: Following, command: Array, period: float) -> Array:
-    """Where the actuator is at every tick, under a command held from tick to tick."""
+def follow_command(truth: FollowerTruth, command: Array, period: float) -> Array:
+    """Return the position of the actuator at every tick, m, with the command held over a tick."""
     h = period / FINE
     held = np.repeat(command, FINE)
-    held *= 1.0 - truth.fades * np.arange(len(held)) * h
-    behind = round(truth.late / h)
-    if behind:
-        held = np.concatenate([np.full(behind, held[0]), held[:-behind]])
-    own = truth.own or (0.0, 0.0)
-    moved = _follow(held, truth.lag, truth.fastest, 0.5 * truth.loose, own, truth.curved, h)
-    return np.concatenate([[held[0]], moved[FINE - 1 :: FINE][:-1]])
-
-
-def sense(random: np.random.Generator, signal: Array, by: Sensing, period: float) -> Array:
-    """What a sensor and its logger make of a signal."""
-    ticks = np.arange(len(signal))
-    read = np.interp(ticks - by.late / period, ticks, signal)
-    read = read + by.eccentric * by.pitch * np.sin(2.0 * math.pi * read / by.pitch)
-    read = (
-        read
-        + by.noise * random.standard_normal(len(signal))
-        + _colour(random, by, len(ticks), period)
+    # The gain falls linearly during the test.
+    held *= 1.0 - truth.gain_loss * np.arange(len(held)) * h
+    delay_steps = round(truth.delay / h)
+    if delay_steps:
+        held = np.concatenate([np.full(delay_steps, held[0]), held[:-delay_steps]])
+    resonance = truth.resonance or (0.0, 0.0)
+    positions = _follow_command(
+        held, truth.lag, truth.speed_limit, 0.5 * truth.play, resonance, truth.lag_growth, h
     )
-    return np.round(read / by.bit) * by.bit if by.bit > 0.0 else read
+    return np.concatenate([[held[0]], positions[FINE - 1 :: FINE][:-1]])
 
 
-def _colour(random: np.random.Generator, by: Sensing, count: int, period: float) -> Array:
-    """Noise below a corner frequency."""
-    if by.coloured == 0.0:
+def read_sensor(
+    random: np.random.Generator, signal: Array, sensor: SensorTruth, period: float
+) -> Array:
+    """Return the readings of a sensor and its logger, in the unit of the signal."""
+    ticks = np.arange(len(signal))
+    reading = np.interp(ticks - sensor.delay / period, ticks, signal)
+    reading = reading + sensor.eccentric * sensor.pitch * np.sin(
+        2.0 * math.pi * reading / sensor.pitch
+    )
+    reading = (
+        reading
+        + sensor.noise * random.standard_normal(len(signal))
+        + _coloured_noise(random, sensor, len(ticks), period)
+    )
+    return np.round(reading / sensor.bit) * sensor.bit if sensor.bit > 0.0 else reading
+
+
+def _coloured_noise(
+    random: np.random.Generator, sensor: SensorTruth, count: int, period: float
+) -> Array:
+    """Return noise below a corner frequency, in the unit of the sensor."""
+    if sensor.coloured == 0.0:
         return np.zeros(count)
     white = np.fft.rfft(random.standard_normal(count))
     frequency = np.fft.rfftfreq(count, period)
-    slow = np.fft.irfft(white / (1.0 + (frequency / by.corner) ** 2), count)
-    return by.coloured * slow / float(np.std(slow))
+    fade_speed = np.fft.irfft(white / (1.0 + (frequency / sensor.corner) ** 2), count)
+    return sensor.coloured * fade_speed / float(np.std(fade_speed))

@@ -1,4 +1,4 @@
-"""Machines whose defects are withheld from the diagnosis, and what it said of them."""
+"""Checks on machines whose defects are withheld from the diagnosis."""
 
 from __future__ import annotations
 
@@ -17,12 +17,22 @@ from rigtwin.studies.sweep import Store, Workers, run_jobs
 
 Case = TypeVar("Case")
 Question = tuple[str, list[WildData]]
-"""A machine by name, and its data: a test and one held out."""
+"""Machine by name, and its data: a test and a held-out one."""
 
 
 @dataclass(frozen=True)
 class Withheld(Generic[Case]):
-    """A check. answers: what the diagnosis said, a JSON document a case."""
+    """Result of a check.
+
+    Attributes
+    ----------
+    seed : int
+        Seed of the cases.
+    cases : tuple
+        Withheld cases.
+    answers : tuple of dict
+        The diagnoses' answers, one JSON document per case.
+    """
 
     seed: int
     cases: tuple[Case, ...]
@@ -37,20 +47,22 @@ def check_machines(
     workers: Workers,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Withheld[Case]:
-    """The whole check.
+    """Run a whole check.
 
     Parameters
     ----------
-    store
-        File where answers are kept, so that an interrupted check goes on.
-    cases, seed
-        What is withheld, and the seed that it was drawn with.
-    ask
-        What the diagnosis is shown of a case.
-    workers
-        Who diagnoses: they see recordings and a description, and draw nothing.
-    progress
-        Called with 1 for each answer.
+    store : Path
+        File of the stored answers. An interrupted check resumes from it.
+    cases : sequence
+        Withheld cases.
+    seed : int
+        Seed of the cases.
+    ask : callable
+        Function that returns the data of a case, which the diagnosis sees.
+    workers : Workers
+        Processes that diagnose. They get recordings and a description, and draw nothing.
+    progress : callable
+        Function called with 1 after every answer.
 
     Returns
     -------
@@ -70,8 +82,10 @@ def check_machines(
 
 
 def answer_question(question: Question) -> dict[str, Any]:
-    """One case's answer, of a recording and one held out. What is not answered at all is an answer
-    too."""
+    """Return the answer to one case, from a recording and a held-out one.
+
+    Refused data count as an answer with the verdict `unusable`.
+    """
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
     from rigtwin.recording import Recording
@@ -84,17 +98,17 @@ def answer_question(question: Question) -> dict[str, Any]:
         times = np.arange(ticks) * data.period
         return Recording(Path(label), machine.name, "", data.period, times, data.columns, {})
 
-    began = time.perf_counter()
+    start = time.perf_counter()
     fitted, held_out = (load(data, label) for data, label in zip(tests, "ab", strict=True))
     try:
         return diagnose(machine, [fitted], held_out=[held_out]).document()
     except RigtwinError as error:
-        seconds = time.perf_counter() - began
+        seconds = time.perf_counter() - start
         return {"verdict": "unusable", "effects": [], "sentence": str(error), "seconds": seconds}
 
 
 def seconds_row(answers: Sequence[dict[str, Any]]) -> Row:
-    """How long the answers took."""
+    """Return the row of the computing time."""
     seconds = [answer["seconds"] for answer in answers]
     return Row(
         "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
@@ -102,7 +116,7 @@ def seconds_row(answers: Sequence[dict[str, Any]]) -> Row:
 
 
 def score_lines(seed: int, machines: int, rows: Sequence[Row]) -> list[str]:
-    """The head of a score as text, and a line for each measure."""
+    """Return a score as text: a heading, and a line for each measure."""
     lines = [f"seed {seed}, {machines} machines", ""]
     for row in rows:
         interval = ""

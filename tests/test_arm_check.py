@@ -1,5 +1,4 @@
-"""The referee's arms: right by energy and by Lagrange's equations, drawn evenly, and scored by
-their table."""
+"""The referee's arms: checked by energy and Lagrange's equations, scored by their table."""
 
 from __future__ import annotations
 
@@ -18,10 +17,19 @@ from referee.arm_cases import (
     ArmCase,
     build_arm,
     draw_arm,
+    draw_travel,
     record_arm,
-    wave,
 )
-from referee.arm_truth import GRAVITY, Arm, Drag, Link, Travel, add_ball, drive, resist
+from referee.arm_truth import (
+    GRAVITY,
+    Arm,
+    Link,
+    Resistance,
+    Travel,
+    add_ball,
+    motor_forces,
+    resisting_force,
+)
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
 from rigtwin.recording import Recording
@@ -30,7 +38,7 @@ from tests.helpers import arm
 SMOOTH = np.random.default_rng(3)
 
 
-def test_two_links_take_what_lagrange_says():
+def test_two_links_obey_lagranges_equations():
     moved = arm.motion(2.0)
     links = tuple(
         Link(length, mass, centre, 0.0, inertia)
@@ -38,25 +46,25 @@ def test_two_links_take_what_lagrange_says():
             (arm.LENGTH, 0.3), arm.MASSES, arm.CENTRES, arm.INERTIAS, strict=True
         )
     )
-    drags = (Drag(rotor=arm.ROTORS[0]), Drag(rotor=arm.ROTORS[1], viscous=0.1))
-    found = drive(Arm(None, links, drags, Drag(rotor=arm.BELT)), Travel(*moved))
-    assert found == pytest.approx(arm.torques(*moved), abs=1e-9)
+    resistances = (Resistance(rotor=arm.ROTORS[0]), Resistance(rotor=arm.ROTORS[1], viscous=0.1))
+    forces = motor_forces(Arm(None, links, resistances, Resistance(rotor=arm.BELT)), Travel(*moved))
+    assert forces == pytest.approx(arm.torques(*moved), abs=1e-9)
 
 
-def test_a_cart_with_a_pendulum_takes_what_lagrange_says():
-    travel = wave("cart", SMOOTH)
+def test_a_cart_with_a_pendulum_obeys_lagranges_equations():
+    travel = draw_travel("cart", SMOOTH)
     link, cart = Link(0.5, 2.0, 0.4, 0.0, 0.02), 6.0
-    found = drive(Arm(cart, (link,), (Drag(), Drag())), travel)
+    forces = motor_forces(Arm(cart, (link,), (Resistance(), Resistance())), travel)
     (_, angle), (_, rate), (push, gain) = travel
     swung = link.mass * link.along
     force = (cart + link.mass) * push + swung * (gain * np.cos(angle) - rate**2 * np.sin(angle))
     torque = (link.inertia + link.mass * link.along**2) * gain
     torque = torque + swung * np.cos(angle) * push + swung * GRAVITY * np.sin(angle)
-    assert found == pytest.approx(np.stack([force, torque]), abs=1e-9)
+    assert forces == pytest.approx(np.stack([force, torque]), abs=1e-9)
 
 
 @pytest.mark.parametrize("machine", list(MACHINES))
-def test_motors_put_in_what_energy_and_friction_take(machine):
+def test_the_motors_work_equals_the_energy_lost_to_friction(machine):
     """Work of the motors over a whole period of a motion is what friction ate: energy comes back
     to where it was."""
     time = np.linspace(0.0, 4.0, 40001)
@@ -65,38 +73,40 @@ def test_motors_put_in_what_energy_and_friction_take(machine):
     rate = np.asarray(0.3 * w * np.cos(w * time), float)
     travel = Travel(position, rate, np.asarray(-0.3 * w**2 * np.sin(w * time), float))
     whole = NOMINAL[machine]
-    bare = whole._replace(drags=tuple(Drag() for _ in whole.drags), belt=Drag())
-    power = np.sum(drive(bare, travel) * travel.speed, axis=0)
+    bare = whole._replace(
+        resistances=tuple(Resistance() for _ in whole.resistances), belt=Resistance()
+    )
+    power = np.sum(motor_forces(bare, travel) * travel.speed, axis=0)
     swing = float(np.max(np.abs(power)))
     assert abs(np.trapezoid(power, time)) < 1e-6 * swing
     lost = sum(
-        resist(drag, *(each[n] for each in travel)) * travel.speed[n]
-        for n, drag in enumerate(whole.drags)
+        resisting_force(drag, *(each[n] for each in travel)) * travel.speed[n]
+        for n, drag in enumerate(whole.resistances)
     )
-    lost = lost + resist(whole.belt, *(each[-2:].sum(axis=0) for each in travel)) * np.sum(
+    lost = lost + resisting_force(whole.belt, *(each[-2:].sum(axis=0) for each in travel)) * np.sum(
         travel.speed[-2:], axis=0
     )
-    taken = np.trapezoid(np.sum(drive(whole, travel) * travel.speed, axis=0), time)
+    taken = np.trapezoid(np.sum(motor_forces(whole, travel) * travel.speed, axis=0), time)
     assert taken == pytest.approx(np.trapezoid(lost, time), rel=1e-6)
 
 
-def test_a_ball_on_a_link_is_what_it_weighs():
+def test_a_ball_adds_its_mass_and_inertia_to_a_link():
     link = add_ball(Link(0.4, 2.0, 0.1, 0.0, 0.02), 1.0, 0.4, 0.0, 0.0)
     assert (link.mass, link.along) == pytest.approx((3.0, 0.2))
     assert link.inertia == pytest.approx(0.02 + 2.0 * 0.1**2 + 1.0 * 0.2**2)
 
 
-def test_cases_are_drawn_anew_only_by_seed_and_number():
+def test_seed_and_number_determine_a_case():
     assert [draw_arm(n, 1).sort for n in range(len(ROUND))] == list(ROUND)
-    one, again = record_arm(draw_arm(3, 1)), record_arm(draw_arm(3, 1))
-    for topic, names in one.columns.items():
+    first, again = record_arm(draw_arm(3, 1)), record_arm(draw_arm(3, 1))
+    for topic, names in first.columns.items():
         for name, values in names.items():
             assert np.array_equal(values, again.columns[topic][name])
-    assert build_arm(draw_arm(3, 1)).magnitudes == one.magnitudes
+    assert build_arm(draw_arm(3, 1)).magnitudes == first.magnitudes
 
 
 @pytest.mark.parametrize("number", range(6))
-def test_recordings_are_usable_and_accepted_names_exist(tmp_path, number):
+def test_recordings_are_usable_and_acceptable_names_exist(tmp_path, number):
     case = draw_arm(number, 2)
     machine = find(MACHINES[case.machine])
     test = record_arm(case)

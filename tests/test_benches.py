@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from referee.bench_cases import ACTUATORS, DAMPERS, Case, draw_case
+from referee.bench_cases import ACTUATORS, DAMPERS, BenchCase, draw_case
 from referee.benches import (
     ActuatorTruth,
     DamperTruth,
@@ -30,21 +30,21 @@ SINGLE = {
     "lag": (ActuatorTruth(lags=(0.02,)), {"lag@actuator": 0.02}),
     "two lags": (ActuatorTruth(lags=(0.03, 0.009)), {"two_lags@actuator": 0.03}),
     "lag and delay": (
-        ActuatorTruth(lags=(0.025,), late=0.012),
+        ActuatorTruth(lags=(0.025,), delay=0.012),
         {"lag@actuator": 0.025, "delay@actuator": 0.012},
     ),
-    "resonance": (ActuatorTruth(own=(6.0, 0.4)), {"resonance@actuator": 6.0}),
+    "resonance": (ActuatorTruth(resonance=(6.0, 0.4)), {"resonance@actuator": 6.0}),
     "friction": (DamperTruth(slip=80.0), {"coulomb@damper": 80.0}),
     "spring": (
         DamperTruth(slip=80.0, spring=4e4),
         {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5},
     ),
     "play": (
-        DamperTruth(slip=80.0, lost=0.003),
+        DamperTruth(slip=80.0, play=0.003),
         {"coulomb@damper": 80.0, "backlash@damper": 0.003},
     ),
     "spring and play": (
-        DamperTruth(slip=80.0, spring=4e4, lost=0.003),
+        DamperTruth(slip=80.0, spring=4e4, play=0.003),
         {"coulomb@damper": 80.0, "compliance@damper": 2.5e-5, "backlash@damper": 0.003},
     ),
     "one way": (
@@ -58,7 +58,7 @@ SINGLE = {
 @cache
 def answered(truth: ActuatorTruth | DamperTruth) -> Diagnosis:
     machine = "actuator" if isinstance(truth, ActuatorTruth) else "damper"
-    recording = recording_of(Case(machine, frozenset(), truth, 1e-3, 5))
+    recording = recording_of(BenchCase(machine, frozenset(), truth, 1e-3, 5))
     return diagnose(find(recording.machine), [recording])
 
 
@@ -70,7 +70,7 @@ FAST = ("friction", "play")
     "name",
     [pytest.param(name, marks=() if name in FAST else pytest.mark.slow) for name in SINGLE],
 )
-def test_what_is_in_a_bench_is_named_with_its_size(name: str):
+def test_the_effects_of_a_bench_are_named_with_their_magnitude(name: str):
     truth, effects = SINGLE[name]
     found = answered(truth)
     assert {str(effect.name) for effect in found.effects} == set(effects)
@@ -88,7 +88,7 @@ def test_a_slow_logger_and_a_stepping_command():
     second order."""
     random, period = np.random.default_rng(4), 0.02
     command = np.repeat(random.uniform(-0.05, 0.05, 50), 60)
-    truth = ActuatorTruth(lags=(0.06,), late=0.08, fastest=0.15)
+    truth = ActuatorTruth(lags=(0.06,), delay=0.08, speed_limit=0.15)
     position = sample(random, actuator_position(truth, command, period), 1e-4, 5e-4)
     time = np.arange(len(command)) * period
     columns = {"/command": {"position": command}, "/sensor": {"position": position}}
@@ -103,7 +103,7 @@ def test_a_slow_logger_and_a_stepping_command():
 
 
 @pytest.mark.parametrize("truth", [ActuatorTruth(), DamperTruth()], ids=["actuator", "damper"])
-def test_a_bench_without_anything_has_no_gap(truth):
+def test_a_bench_without_effects_has_no_gap(truth):
     found = answered(truth)
     assert found.verdict == "no gap"
     assert not found.effects
@@ -143,7 +143,7 @@ def test_distance_since_a_reversal():
 
 def test_the_bench_actuator_has_its_frequency_response():
     time = np.arange(20_000) * 1e-3
-    truth = ActuatorTruth(lags=(0.02, 0.01), late=0.005)
+    truth = ActuatorTruth(lags=(0.02, 0.01), delay=0.005)
     w = 2 * np.pi * 3.0
     out = actuator_position(truth, np.sin(w * time), 1e-3)
     last = slice(10_000, 20_000)
@@ -158,7 +158,7 @@ def test_the_bench_damper_loses_what_its_friction_eats():
     time = np.arange(100_001) * 1e-5
     motion = 0.02 * np.cos(2 * np.pi * time)
     speed = np.gradient(motion, 1e-5)
-    truth = DamperTruth(slip=80.0, spring=4e4, lost=0.003, viscous=(200.0, 200.0))
+    truth = DamperTruth(slip=80.0, spring=4e4, play=0.003, viscous=(200.0, 200.0))
     force = damper_force(truth, np.concatenate([motion, motion]), np.concatenate([speed, speed]))[
         100_001:
     ]

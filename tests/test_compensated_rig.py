@@ -20,7 +20,7 @@ from controllers import (
 from controllers.closed_loop import ClosedLoop, transfer, with_lag
 from controllers.kalman_inverse import Actuator, sampled_actuator
 from controllers.linear_law import pass_through, response
-from controllers.plate import plate, told
+from controllers.plate import cylinder_model, plate
 from experiments import find
 from experiments.vehicles import VEHICLES, configuration
 from rigtwin.components import Computer, Cylinder
@@ -85,7 +85,7 @@ def test_what_a_controller_is_told_is_the_cylinder_as_it_is():
     plant = configuration(VEHICLES["truck"]).plant
     cylinder = plant.structure_cylinder._replace(gain=1.1, lag=0.002, delay=0.003, a3=170.0)
     plant = plant._replace(structure_cylinder=cylinder, computer=Computer(delay=0.002))
-    found = told(tell_plate(Configuration(plant=plant)).controller)
+    found = cylinder_model(tell_plate(Configuration(plant=plant)).controller)
     assert found == closed_loop(cylinder)._replace(delay=0.005)
 
 
@@ -216,14 +216,14 @@ def test_a_test_that_is_refused_leaves_the_recording_that_was_there(tmp_path):
     rigtwin.run("suspension-rig", "drop", settings=settings, path=path)
     before = path.read_bytes()
     for kind in ("kalman-inverse", "forward-prediction"):
-        told = {"plate_compensator": kind, "plate_a3": 0.0, "plate_b1": 1e8}
-        wrong = {**settings, "controller": told}
+        cylinder_model = {"plate_compensator": kind, "plate_a3": 0.0, "plate_b1": 1e8}
+        wrong = {**settings, "controller": cylinder_model}
         with pytest.raises(RigtwinError, match="plate_"):
             rigtwin.run("suspension-rig", "drop", settings=wrong, path=path)
         with pytest.raises(RigtwinError, match="plate_"):
             rigtwin.run_on_twin("drop", settings=wrong, path=path)
         with pytest.raises(RigtwinError, match="plate_"):
-            rigtwin.faults(each=1, processes=0, settings={"controller": told})
+            rigtwin.faults(each=1, processes=0, settings={"controller": cylinder_model})
     assert path.read_bytes() == before
 
 

@@ -170,7 +170,7 @@ MISTAKES = [
     (
         "[[replays]]",
         '[controller]\noutput = "force"\nformula = "kp *"\n[[replays]]',
-        "is no formula",
+        "is not a formula",
     ),
     (
         "[[replays]]",

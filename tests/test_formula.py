@@ -40,7 +40,7 @@ EXPECTED = {
     "derivative(x)": np.concatenate([[0.0], np.diff(SIGNAL) / PERIOD]),
     "integral(x)": np.cumsum(SIGNAL) * PERIOD,
     "low_pass(x, 0.02)": filtered(SIGNAL, 0.02),
-    "late(x, 3)": np.concatenate([np.full(3, SIGNAL[0]), SIGNAL[:-3]]),
+    "delay(x, 3)": np.concatenate([np.full(3, SIGNAL[0]), SIGNAL[:-3]]),
     "mean(x, 2)": 0.5 * (SIGNAL + np.concatenate([[SIGNAL[0]], SIGNAL[:-1]])),
     "x": SIGNAL,
     "1.5": np.full(TICKS, 1.5),
@@ -85,8 +85,8 @@ def test_settings_are_settings_and_all_other_names_inputs():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("kp *", "no formula"),
-        ("", "no formula"),
+        ("kp *", "not a formula"),
+        ("", "not a formula"),
         ("x ** 2", "not allowed"),
         ("x if x else 1", "not allowed"),
         ("__import__('os')", "unknown function"),
@@ -100,9 +100,10 @@ def test_settings_are_settings_and_all_other_names_inputs():
         ("low_pass(x, -0.1)", "a time constant above 0 s, not -0.1"),
         ("limit(x, 1, -2)", "a lower limit below the upper one, not 1 and -2"),
         ("mean(x, 2.5)", "whole number"),
-        ("late(x, y)", "whole number"),
+        ("delay(x, y)", "whole number"),
+        ("late(x, 3)", "write delay"),
         ("low_pass(x, tau=1)", "not allowed"),
-        ("(" * 300 + "x" + ")" * 300, "no formula"),
+        ("(" * 300 + "x" + ")" * 300, "not a formula"),
     ],
 )
 def test_a_mistake_is_said(text, said):

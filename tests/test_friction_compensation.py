@@ -14,11 +14,11 @@ from controllers.friction import (
     NO_ERRORS,
     NO_VELOCITIES,
     REST,
-    expected,
-    observed,
-    pushed,
-    risen,
-    stepped,
+    advance_motor_model,
+    error_has_risen,
+    expected_direction,
+    observe_friction,
+    step_compensator,
 )
 from rigtwin.signals.noise import rms
 
@@ -34,22 +34,22 @@ def slowing(rate: float, now: float) -> tuple[float, ...]:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_window_opens_before_a_crossing(side):
     # 10 mm/s slowing by 0.5 m/s² crosses zero in 20 ms; by 0.2 m/s² in 50 ms.
-    assert expected(THESIS, slowing(-0.5 * side, 0.01 * side), 0.0, PERIOD) == -side
-    assert expected(THESIS, slowing(-0.2 * side, 0.01 * side), 0.0, PERIOD) == 0.0
-    assert expected(THESIS, slowing(0.5 * side, 0.01 * side), 0.0, PERIOD) == 0.0
+    assert expected_direction(THESIS, slowing(-0.5 * side, 0.01 * side), 0.0, PERIOD) == -side
+    assert expected_direction(THESIS, slowing(-0.2 * side, 0.01 * side), 0.0, PERIOD) == 0.0
+    assert expected_direction(THESIS, slowing(0.5 * side, 0.01 * side), 0.0, PERIOD) == 0.0
     # The filtered acceleration opens it where the carried parabola does not.
-    assert expected(THESIS, slowing(0.0, 0.01 * side), -0.5 * side, PERIOD) == -side
+    assert expected_direction(THESIS, slowing(0.0, 0.01 * side), -0.5 * side, PERIOD) == -side
 
 
 def test_a_spike_must_have_risen_for_five_samples():
     rising = tuple(5.0 - 0.5 * number for number in range(ERRORS))
-    assert risen(THESIS, rising, 1.0, PERIOD)
-    assert not risen(THESIS, rising, -1.0, PERIOD)
-    assert risen(THESIS, tuple(-e for e in rising), -1.0, PERIOD)
+    assert error_has_risen(THESIS, rising, 1.0, PERIOD)
+    assert not error_has_risen(THESIS, rising, -1.0, PERIOD)
+    assert error_has_risen(THESIS, tuple(-e for e in rising), -1.0, PERIOD)
     dented = (5.0, 4.5, 4.45, 3.5, 3.0, 2.5)
-    assert not risen(THESIS, dented, 1.0, PERIOD)
+    assert not error_has_risen(THESIS, dented, 1.0, PERIOD)
     flat_at_first = (5.0, 4.5, 4.0, 3.5, 3.0, 3.0)
-    assert risen(THESIS, flat_at_first, 1.0, PERIOD)
+    assert error_has_risen(THESIS, flat_at_first, 1.0, PERIOD)
 
 
 def driven(settings: Settings, ticks: int, friction: float = 14.0):
@@ -60,7 +60,7 @@ def driven(settings: Settings, ticks: int, friction: float = 14.0):
         t = tick * PERIOD - 0.1
         travel = 0.25 * t**2
         error = 0.0 if t < 0 else 2 * friction * (1 - math.exp(-t / 0.004)) * math.exp(-t / 0.05)
-        state, velocities, errors = stepped(
+        state, velocities, errors = step_compensator(
             settings, state, velocities, errors, travel, error, PERIOD
         )
         added.append(state.added)
@@ -86,7 +86,9 @@ def test_the_buffer_keeps_steps_apart():
         # An error that swings every 15 ms: the direction of friction seems to change far more often
         # than steps may come.
         error = 10.0 if (tick // 15) % 2 else -10.0
-        state, velocities, errors = stepped(settings, state, velocities, errors, 0.0, error, PERIOD)
+        state, velocities, errors = step_compensator(
+            settings, state, velocities, errors, 0.0, error, PERIOD
+        )
         added.append(state.added)
     times = np.flatnonzero(np.diff(added)) * PERIOD
     assert len(times) > 4
@@ -101,12 +103,12 @@ def test_the_observer_finds_the_friction_and_its_reversal(mains):
     for tick in range(4000):
         friction = 14.0 if (tick // 700) % 2 else -14.0
         hum = mains * math.sin(2 * math.pi * 50.0 * tick * PERIOD)
-        state = observed(
+        state = observe_friction(
             settings, state, motor - friction + hum + 1.5 * random.standard_normal(), PERIOD
         )
         found.append((state.friction, friction))
         told = 200.0 + state.added
-        state = pushed(state, told, PERIOD)
+        state = advance_motor_model(state, told, PERIOD)
         stays = math.exp(-PERIOD / 1.26e-3)
         motor = stays * motor + (1 - stays) * told
     estimate, truth = np.array(found).T

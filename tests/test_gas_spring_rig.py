@@ -50,7 +50,7 @@ def test_at_rest_motor_and_gas_carry_the_body():
     assert np.mean(run.force[late]) + gas == pytest.approx(25 * 9.81, abs=3.0)
     assert gas > 100.0
     # It follows the ideal as the passive test without it does.
-    assert np.std(run.plate - run.should.structure) < 0.01
+    assert np.std(run.plate - run.ideal.structure) < 0.01
 
 
 def test_the_quick_replay_is_the_twin():

@@ -393,7 +393,7 @@ BAD_MAPS = [
     (MAP.replace('"/sensor.force"', '"force"'), 'expected "/command.NAME"'),
     (MAP.split("[channels]")[0], "[channels] is missing"),
     (MAP + '"/sensor.a" = { formula = "2 * y" }', "no column 'y'; there are t, x, f"),
-    (MAP + '"/sensor.a" = { formula = "2 *" }', "is no formula"),
+    (MAP + '"/sensor.a" = { formula = "2 *" }', "is not a formula"),
     (MAP + '"/sensor.a" = { formula = "3.0" }', "it names no column"),
     (MAP + '"/sensor.a" = { formula = "x", unit = "mm" }', "unit goes with a column"),
     (

@@ -16,7 +16,9 @@ from rigtwin.simulation.runner import record
 def test_table_3_5_within_a_factor_of_two():
     runs = [trial("single-mass", 0)]
     assert runs[0].configuration.timing == Timing(duration=45.0)
-    errors = [compute_tracking(run.should, run.ran.commands, run.plate, run.force) for run in runs]
+    errors = [
+        compute_tracking(run.ideal, run.simulation.commands, run.plate, run.force) for run in runs
+    ]
     for name in ("position_e1", "position_e2", "force_e1", "force_e2"):
         ratio = float(np.median([getattr(one, name) for one in errors])) / float(TABLE_3_5[name][0])
         assert 0.5 < ratio < 2.0, name
@@ -25,7 +27,7 @@ def test_table_3_5_within_a_factor_of_two():
 def test_table_6_3_force_limit_cycle_and_missing_wheel_hop():
     run = trial("drop", 0)
     assert compute_tracking(
-        run.should, run.ran.commands, run.plate, run.force
+        run.ideal, run.simulation.commands, run.plate, run.force
     ).force_total == pytest.approx(12.4, rel=0.2)
     assert np.ptp(run.force[run.time > 10]) > 2 * 14
     assert np.std(run.wheel[run.time > 3]) < 5e-6
@@ -37,5 +39,5 @@ def test_of_a_recording_as_of_the_run_in_memory(tmp_path):
     record(tmp_path / "drop.mcap", "drop", run.configuration, demands, 3)
     recorded = vars(tracking_of(load(tmp_path / "drop.mcap"), run.configuration))
     assert recorded == pytest.approx(
-        vars(compute_tracking(run.should, run.ran.commands, run.plate, run.force)), rel=1e-9
+        vars(compute_tracking(run.ideal, run.simulation.commands, run.plate, run.force)), rel=1e-9
     )

@@ -1,5 +1,4 @@
-"""The withheld-effect check: a referee that knows nothing of the twin, a key that cannot be
-changed, scores that are right."""
+"""The withheld-effect check: a referee independent of the twin, a committed key, correct scores."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ import numpy as np
 import pytest
 
 from referee.check import Result
-from referee.draw import MATERIAL, SENSORS, draw_tolerated, draw_unnamed, effect_size, library
+from referee.draw import MATERIAL, SENSORS, draw_tolerated, draw_unnamed, effect_size, named_defects
 from referee.referee import draw_case, operator, sorts, write
 from referee.reference_plant import Truth
 from referee.reference_rig import Law, run, run_quiet
@@ -29,14 +28,16 @@ KNOWN = {effect.name for effect in candidates(RigPlant())} | {"setting@controlle
 
 def test_the_referee_imports_nothing_of_the_twin():
     code = "import sys, referee.referee; print('\\n'.join(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = done.stdout.split()
+    finished = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    loaded = finished.stdout.split()
     twin = ("rigtwin", "controllers", "experiments", "mujoco", "models")
     assert "referee.referee" in loaded
     assert not [name for name in loaded if name.partition(".")[0] in twin]
 
 
-def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
+def test_the_referees_rig_equals_the_nominal_twin_within_noise(tmp_path):
     for test in ("imposed", "road1.6"):
         law, demands = draw_demands(test, np.random.default_rng(4))
         path = tmp_path / f"{test}.mcap"
@@ -47,7 +48,7 @@ def test_its_rig_is_the_nominal_one_to_within_noise(tmp_path):
         assert 0.85 < float(residual @ residual) / evidence.expected < 1.1
 
 
-def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
+def test_the_referees_controller_follows_the_recorded_settings(tmp_path):
     law, demands = draw_demands("road10", np.random.default_rng(4))
     path = tmp_path / "road.mcap"
     write(path, law, *run(Truth(), law, demands[:3000], np.random.default_rng(4)))
@@ -57,7 +58,7 @@ def test_its_controller_is_the_one_that_the_recording_says(tmp_path):
     assert ControllerReplay(RIG.control, recording, settings).deviation() is None
 
 
-def test_its_two_frictions_agree_where_they_should():
+def test_set_valued_and_bristle_friction_agree():
     law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:5000], np.random.default_rng(2))
     hard, bristle = run_quiet(Truth(), law, commands), run_quiet(Truth(bristle=1e9), law, commands)
@@ -66,18 +67,18 @@ def test_its_two_frictions_agree_where_they_should():
     assert difference[3] < 2.0
 
 
-def test_every_defect_inside_the_library_has_a_name_there_and_changes_the_rig():
+def test_every_named_defect_is_in_the_library_and_changes_the_rig():
     random = np.random.default_rng(3)
     law, demands = draw_demands("imposed", random)
     commands, _ = run(Truth(), law, demands[:4000], random)
-    for group in library(commands, random):
+    for group in named_defects(commands, random):
         for make in group:
             defect = make()
             assert f"{defect.kind.partition(':')[0]}@{defect.component}" in KNOWN
             assert defect.change(Truth(), law) != (Truth(), law)
 
 
-def test_defects_outside_the_library_have_no_name_there():
+def test_defects_outside_the_library_have_no_name_in_it():
     kinds = set()
     for seed in range(5):
         for make in draw_unnamed(np.random.default_rng(seed)):
@@ -87,7 +88,7 @@ def test_defects_outside_the_library_have_no_name_there():
     assert len(kinds) >= 5
 
 
-def test_tolerances_stay_within_what_is_declared():
+def test_drawn_tolerances_stay_within_the_declared_ones():
     for seed in range(20):
         rig = draw_tolerated(np.random.default_rng(seed))
         assert abs(rig.mass / 34.0 - 1.0) <= 0.005
@@ -109,17 +110,17 @@ def test_sorts_have_their_shares():
         pytest.param("outside", 1, marks=pytest.mark.slow),
     ],
 )
-def test_cases_have_their_effects(sort, count):
+def test_a_case_has_the_effects_of_its_sort(sort, count):
     entry, recordings, *_ = draw_case(sort, np.random.default_rng(8))
     assert len(entry["effects"]) == count
     assert len(recordings) == 2
     assert entry["test"] in TESTS
 
 
-def test_a_size_is_the_change_in_units_of_noise():
+def test_the_size_of_a_defect_is_its_change_in_units_of_noise():
     law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:4000], np.random.default_rng(2))
-    groups = library(commands, np.random.default_rng(2))
+    groups = named_defects(commands, np.random.default_rng(2))
     defect = next(
         d
         for group in groups
@@ -133,11 +134,11 @@ def test_a_size_is_the_change_in_units_of_noise():
     assert MATERIAL == 1.0
 
 
-def test_a_referees_key_is_committed_to_before_it_is_opened(tmp_path):
+def test_the_key_is_committed_to_before_it_is_opened(tmp_path):
     command = [sys.executable, "-m", "referee.referee", str(tmp_path), "1", "3"]
-    asked = "next 0 imposed-fast\nopen\n"
-    done = subprocess.run(command, input=asked, capture_output=True, text=True, check=True)
-    lines = done.stdout.splitlines()
+    requests = "next 0 imposed-fast\nopen\n"
+    finished = subprocess.run(command, input=requests, capture_output=True, text=True, check=True)
+    lines = finished.stdout.splitlines()
     assert lines[0] == "case 0"
     commitment, salt = lines[1].partition(" ")[2], lines[3].partition(" ")[2]
     assert lines[2] == "recorded 0"
@@ -150,15 +151,15 @@ def test_a_referees_key_is_committed_to_before_it_is_opened(tmp_path):
         assert word not in text
 
 
-def test_the_operators_settings_are_those_of_the_format():
+def test_recorded_settings_are_those_of_the_format():
     from controllers import Settings
 
     written = set(operator(Law()))
-    # This controller has settings of its own besides, after those of the format.
+    # The controller has further settings after those of the format.
     assert written == set(Settings._fields[: len(written)])
 
 
-def test_wilson_intervals_are_those_of_the_textbook():
+def test_wilson_intervals_equal_published_values():
     # Newcombe 1998, table I: 81 of 263, and the limits at 0 and all.
     low, high = wilson(81, 263)
     assert (low, high) == (pytest.approx(0.2553, abs=1e-4), pytest.approx(0.3662, abs=1e-4))
@@ -207,7 +208,7 @@ def said(verdict: str, *effects: tuple[str, str, float], where: str = "") -> dic
     }
 
 
-def test_scores_count_what_they_say():
+def test_every_measure_counts_the_right_cases():
     key = [
         entry("single", ("coulomb", "rail", 60.0, 50.0)),
         entry("single", ("viscous", "rail", 100.0, 0.0)),

@@ -12,7 +12,7 @@ from referee.reference_drive import drive
 from referee.reference_plant import Truth
 from referee.reference_rig import run
 from referee.test_signals import draw_demands
-from referee.tuning import Case, check, draw_rig, text
+from referee.tuning import TuningCase, check, draw_rig, text
 from rigtwin.cli import main
 from rigtwin.description.catalogue import find as find_machine
 from rigtwin.description.changes import override
@@ -28,7 +28,7 @@ from rigtwin.studies.tuning.study_file import parse_study
 
 
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
-def test_the_rigs_controller_does_what_the_referees_own_does(test):
+def test_the_rigs_controller_commands_what_the_referees_does(test):
     """Both laws have one description; on one plant with the same noise they command the same."""
     truth = Truth(missed=0.02)
     law, demands = draw_demands(test, np.random.default_rng(3))
@@ -40,7 +40,7 @@ def test_the_rigs_controller_does_what_the_referees_own_does(test):
     assert np.allclose(ran.measurements, sensors, rtol=0.0, atol=[1e-9, 1e-5, 1e-5, 0.2])
 
 
-def test_without_a_defect_it_is_the_twin_to_a_few_percent():
+def test_without_a_defect_the_force_error_equals_the_twins_to_5_percent():
     """Two plants, two codes: the force error of chapter 4's test."""
     experiment = find("friction-road")
     configuration = override(experiment.configuration, {"timing": {"duration": 8.0}})
@@ -55,14 +55,14 @@ def test_without_a_defect_it_is_the_twin_to_a_few_percent():
     )
 
 
-def test_a_limit_ends_a_test_on_it():
+def test_a_limit_ends_a_test_on_the_referees_plant():
     configuration = override(Configuration(), {"safety": {"force": 150.0}})
     ran = drive(Truth(), configuration, np.zeros((100, 3)), 0)
     assert ran.trip == Trip.FORCE
     assert len(ran.commands) == 1
 
 
-def test_rigs_are_drawn_from_their_seed_with_a_friction_each():
+def test_the_seed_determines_the_rigs_and_their_friction():
     kinds = [draw_rig(1, number)[1].kind for number in range(8)]
     assert set(kinds) == {"coulomb", "viscous", "stribeck", "asymmetry"}
     assert draw_rig(1, 3)[0] == draw_rig(1, 3)[0]
@@ -90,7 +90,7 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
 
     answer = ("more friction", "[motor]\ncoulomb = 28.0\n")
     monkeypatch.setattr(module, "diagnose_rig", lambda _: answer)
-    said: list[Case] = []
+    said: list[TuningCase] = []
     with Store(tmp_path / "s.sqlite") as store:
         study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
         found = check(Bench(study, store, Here()), 1, 4, show=said.append)
@@ -99,7 +99,7 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
         assert len(store) == made
     assert found == said == again
     (case,) = found
-    assert case.found == "more friction"
+    assert case.sentence == "more friction"
     assert case.against_nominal.runs == 6
     both = (case.against_nominal, case.against_before)
     assert len({each.of("force_error").after for each in both}) == 1
@@ -109,13 +109,13 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
 def test_what_is_better_is_counted_by_its_interval():
     study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
 
-    def case(number: int, after: list[float], trips: float = 0.0) -> Case:
+    def case(number: int, after: list[float], trips: float = 0.0) -> TuningCase:
         def rows(values: list[float]) -> list[dict[str, float]]:
             return [{"force_error": value, TRIP: trips, LIMITS: 0.5} for value in values]
 
         before, tuned = rows([10.0] * len(after)), rows(after)
         against = compare(study.goals.measures, "rig", ("before", before), ("tuned", tuned))
-        return Case(number, "coulomb@motor", "found", against, against)
+        return TuningCase(number, "coulomb@motor", "found", against, against)
 
     better, worse = [9.0 + 0.1 * n for n in range(8)], [11.0 + 0.1 * n for n in range(8)]
     mixed = [9.0, 11.0] * 4

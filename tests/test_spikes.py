@@ -10,7 +10,7 @@ import pytest
 from controllers import Compensator
 from controllers.friction import MOTOR_LAG
 from experiments import find
-from experiments.thesis.friction_tests import compensated, errors
+from experiments.thesis.friction_tests import errors, run_compensated
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
@@ -67,7 +67,7 @@ def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
         name: float(getattr(calibration.settings, name)) for name in (*BOUNDS, "friction_step")
     }
     none, thesis, own = (
-        errors(compensated(5, compensator=kind, **found))
+        errors(run_compensated(5, compensator=kind, **found))
         for kind in (Compensator.NONE, Compensator.TWO_STEP, Compensator.OBSERVER)
     )
     total = [one["tracking"] + one["numerical"] for one in (none, thesis, own)]

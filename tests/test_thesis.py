@@ -1,5 +1,4 @@
-"""How figures of the thesis are compared, which of them are covered, and that finished work is
-never lost or done twice."""
+"""Comparison and coverage of the thesis' results, and stored results of finished jobs."""
 
 from __future__ import annotations
 
@@ -10,12 +9,32 @@ import pytest
 from matplotlib.image import imread
 
 from experiments.thesis import quarter_car_tests, validation
-from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, STUDIES, TABLES, asked, matching
-from experiments.thesis.entry import band, digits, factor, last_digit, number, share, statement
-from experiments.thesis.identification import ELECTRIC, FITTED, electric, fitted, hydraulic
-from experiments.thesis.reproduction import Chapter, document, page, shares, text
+from experiments.thesis.catalogue import (
+    NOTHING_TO_COMPUTE,
+    STUDIES,
+    TABLES,
+    covers_figure,
+    select_studies,
+)
+from experiments.thesis.entry import (
+    band,
+    count_agreeing,
+    digits,
+    factor,
+    last_digit,
+    number,
+    statement,
+)
+from experiments.thesis.identification import (
+    ELECTRIC,
+    FITTED,
+    fit_transfer_function,
+    thesis_cylinder,
+    thesis_force_loop,
+)
+from experiments.thesis.reproduction import Chapter, agreement_by_table, document, page, text
 from experiments.thesis.study import Conclusion, Drawing, Study, sheet
-from experiments.thesis.work import done
+from experiments.thesis.work import run_studies
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep.workers import Here
@@ -38,7 +57,7 @@ def test_printed_digits(printed, value, agrees):
     assert digits("Table 1.1", "x", printed, value).agrees is agrees
 
 
-def test_what_a_printed_number_is():
+def test_a_printed_number_has_a_value_and_a_last_digit():
     assert number("−0.5") == -0.5
     assert last_digit("4.716e4") == pytest.approx(10.0)
     assert last_digit("0.00850") == pytest.approx(1e-5)
@@ -52,7 +71,9 @@ def test_factor_and_band():
     assert "in 5-95 %" in band("T", "x", "1.25", values, "m", 2.0).rule
     assert "outside 5-95 %" in band("T", "x", "1.40", values, "m", 2.0).rule
     assert (
-        share([statement("T", "x", "says", True, ""), statement("T", "x", "says", False, "")])
+        count_agreeing(
+            [statement("T", "x", "says", True, ""), statement("T", "x", "says", False, "")]
+        )
         == "1 of 2"
     )
 
@@ -65,26 +86,26 @@ def test_every_numbered_table_is_covered():
     assert len(TABLES) == 51
 
 
-def test_studies_can_be_asked_for():
-    assert len(asked(None).studies) == len(STUDIES)
-    assert [study.name for study in asked("skyhook").studies] == ["skyhook"]
-    assert [study.name for study in asked("chapter 7").studies] == ["skyhook", "beams"]
-    assert asked("B").studies == asked("7").studies
+def test_studies_are_selected_by_name_chapter_or_table():
+    assert len(select_studies(None).studies) == len(STUDIES)
+    assert [study.name for study in select_studies("skyhook").studies] == ["skyhook"]
+    assert [study.name for study in select_studies("chapter 7").studies] == ["skyhook", "beams"]
+    assert select_studies("B").studies == select_studies("7").studies
     for study in STUDIES.values():
         for place in study.covers:
-            found = asked(place.replace(" ", "-").lower())
+            found = select_studies(place.replace(" ", "-").lower())
             assert found.where == place
             assert study in found.studies or place in found.studies[0].covers
     with pytest.raises(RigtwinError, match=r"nothing to reproduce under 'table 9\.9'"):
-        asked("table 9.9")
+        select_studies("table 9.9")
 
 
-def test_which_drawing_is_of_a_figure():
-    assert matching("Figure 3.11 to 3.14", "Figure 3.12")
-    assert not matching("Figure 3.11 to 3.14", "Figure 3.15")
-    assert matching("Figure 7.7 to 7.9, B1.1 to B2.6", "Figure B1.1")
-    assert matching("Table 4.1 and 4.2", "Table 4.2")
-    assert not matching("Table 4.1 and 4.2", "Figure 4.2")
+def test_a_drawing_covers_the_figures_of_its_range():
+    assert covers_figure("Figure 3.11 to 3.14", "Figure 3.12")
+    assert not covers_figure("Figure 3.11 to 3.14", "Figure 3.15")
+    assert covers_figure("Figure 7.7 to 7.9, B1.1 to B2.6", "Figure B1.1")
+    assert covers_figure("Table 4.1 and 4.2", "Table 4.2")
+    assert not covers_figure("Table 4.1 and 4.2", "Figure 4.2")
 
 
 def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, list[str]]:
@@ -113,31 +134,35 @@ def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, l
     return study, ran
 
 
-def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
+def test_finished_jobs_are_not_run_again(tmp_path, monkeypatch):
     study, ran = counting(set(), monkeypatch)
     steps: list[tuple[int, int]] = []
-    first = done([study], 3, tmp_path, Here(), lambda count, total: steps.append((count, total)))
+    first = run_studies(
+        [study], 3, tmp_path, Here(), lambda count, total: steps.append((count, total))
+    )
     assert sorted(ran) == ["job/0", "job/1", "job/2"]
     assert steps[0] == (0, 3)
     assert steps[-1] == (3, 3)
-    again = done([study], 4, tmp_path, Here())
+    again = run_studies([study], 4, tmp_path, Here())
     assert sorted(ran) == ["job/0", "job/1", "job/2", "job/3"]
     assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
 
 
-def test_a_broken_run_goes_on_where_it_was(tmp_path, monkeypatch):
+def test_an_interrupted_run_resumes(tmp_path, monkeypatch):
     study, ran = counting({"job/2"}, monkeypatch)
     with pytest.raises(RigtwinError, match="job/2 failed"):
-        done([study], 3, tmp_path, Here())
+        run_studies([study], 3, tmp_path, Here())
     assert ran == ["job/0", "job/1", "job/2"]
     whole, ran = counting(set(), monkeypatch)
-    assert len(done([whole], 3, tmp_path, Here())["counted"]) == 3
+    assert len(run_studies([whole], 3, tmp_path, Here())["counted"]) == 3
     assert ran == ["job/2"]
 
 
-def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
+def test_text_document_and_page_agree(tmp_path, monkeypatch):
     study, _ = counting(set(), monkeypatch)
-    chapters = [Chapter(study, study.conclude(done([study], 3, tmp_path, Here())["counted"]))]
+    chapters = [
+        Chapter(study, study.conclude(run_studies([study], 3, tmp_path, Here())["counted"]))
+    ]
     plain = text(chapters, every=True)
     assert "1 of 1 entries agree" in plain
     assert "[1] a note" in plain
@@ -149,15 +174,19 @@ def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
     assert "a caption" in html
     assert "data:image/png;base64," in html
     assert "http" not in html.replace("http-equiv", "")
-    assert [one.agree for one in shares(chapters[0].conclusion.entries, every=False)] == ["1 of 1"]
+    assert [
+        one.agree for one in agreement_by_table(chapters[0].conclusion.entries, every=False)
+    ] == ["1 of 1"]
 
 
-def test_a_transfer_function_is_found_again():
+def test_a_fit_recovers_a_transfer_function():
     frequencies = np.arange(1.0, FITTED + 1.0)
-    above, below = fitted(frequencies, hydraulic(frequencies) * 6.243e5 / 6.281e5, 2, 4)
+    above, below = fit_transfer_function(
+        frequencies, thesis_cylinder(frequencies) * 6.243e5 / 6.281e5, 2, 4
+    )
     assert above == pytest.approx([1817, 7.719e4, 6.243e5], rel=1e-6)
     assert below == pytest.approx([1, 165.9, 6674, 8.598e4, 6.281e5], rel=1e-6)
-    above, below = fitted(frequencies, electric(frequencies), 2, 2)
+    above, below = fit_transfer_function(frequencies, thesis_force_loop(frequencies), 2, 2)
     assert above == pytest.approx([float(one) for one in ELECTRIC[0]], rel=1e-6)
 
 
@@ -185,7 +214,7 @@ def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_what_the_thesis_sees_in_the_drop():
+def test_the_twin_shows_the_statements_about_the_drop():
     """Statements of section 6.3 that the twin shows, of one run each."""
     results = {key: job() for key, job in quarter_car_tests.jobs(1).items()}
     entries = {

@@ -1,4 +1,4 @@
-"""The referee's machines of other physics: right by closed forms, and scored by its table."""
+"""The referee's machines of other physics: checked against closed forms, scored by their table."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from referee.wild import SURE, WildResult, judge_names, reliability, wild_rows, 
 from referee.wild_cases import ACCEPTED, MACHINES, ROUND, SORTS, WildCase, draw_wild, record_wild
 from referee.wild_truth import (
     FINE,
-    Bending,
-    Following,
-    Rubbing,
-    Sensing,
-    drive,
-    follow,
-    hold,
-    sense,
+    ElasticTruth,
+    FollowerTruth,
+    FrictionTruth,
+    SensorTruth,
+    drive_pendulum,
+    follow_command,
+    imposed_force,
+    read_sensor,
 )
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
@@ -36,38 +36,43 @@ def ramp(speed: float, seconds: float = 1.0) -> np.ndarray:
 
 
 def test_a_steady_motion_meets_kinetic_and_viscous_friction():
-    r = Rubbing(slip=50.0, breakaway=1.5, slow=0.01, bristle=1e-5, viscous=300.0)
-    force = hold(r, Bending(), ramp(0.1), PERIOD)
+    r = FrictionTruth(slip=50.0, breakaway=1.5, fade_speed=0.01, bristle=1e-5, viscous=300.0)
+    force = imposed_force(r, ElasticTruth(), ramp(0.1), PERIOD)
     assert force[-1] == pytest.approx(50.0 + 0.1 * 300.0, rel=1e-6)
-    slowly = hold(r, Bending(), ramp(1e-4), PERIOD)
+    slowly = imposed_force(r, ElasticTruth(), ramp(1e-4), PERIOD)
     assert slowly[-1] == pytest.approx(50.0 * 1.5 + 1e-4 * 300.0, rel=1e-3)
 
 
 def test_a_bristle_is_a_spring_before_it_slips():
-    r = Rubbing(slip=50.0, bristle=1e-3)
-    force = hold(r, Bending(), ramp(1e-4, 0.1), PERIOD)
+    r = FrictionTruth(slip=50.0, bristle=1e-3)
+    force = imposed_force(r, ElasticTruth(), ramp(1e-4, 0.1), PERIOD)
     assert force[-1] == pytest.approx(50.0 / 1e-3 * 1e-5, rel=0.02)
 
 
 def test_warming_up_takes_friction_away():
-    r = Rubbing(slip=50.0, cooled=0.4, warming=0.5)
-    force = hold(r, Bending(), ramp(0.1, 4.0), PERIOD)
+    r = FrictionTruth(slip=50.0, warming_loss=0.4, warming_time=0.5)
+    force = imposed_force(r, ElasticTruth(), ramp(0.1, 4.0), PERIOD)
     assert force[-1] == pytest.approx(50.0 * (1.0 - 0.4 * (1.0 - math.exp(-8.0))), rel=1e-3)
 
 
-def test_a_frame_that_yields_makes_a_maxwell_element_of_a_damper():
+def test_a_damper_on_a_compliant_frame_is_a_maxwell_element():
     c, k, speed = 500.0, 2e4, 0.05
-    force = hold(Rubbing(viscous=c), Bending(frame=k), ramp(speed, 0.2), PERIOD)
+    force = imposed_force(FrictionTruth(viscous=c), ElasticTruth(frame=k), ramp(speed, 0.2), PERIOD)
     time = np.arange(len(force)) * PERIOD
     expected = c * speed * (1.0 - np.exp(-time * k / c))
     assert np.max(np.abs(force - expected)[2:]) < 0.02 * c * speed
 
 
-def test_a_frame_is_a_spring_before_friction_slips_again():
+def test_after_a_reversal_the_frame_is_a_spring_until_friction_slips():
     """After a reversal the frame lets go over 2·F/k."""
     slip, k, speed = 50.0, 1e4, 0.02
-    there = ramp(speed, 1.0)
-    force = hold(Rubbing(slip=slip), Bending(frame=k), np.concatenate([there, there[::-1]]), PERIOD)
+    forward = ramp(speed, 1.0)
+    force = imposed_force(
+        FrictionTruth(slip=slip),
+        ElasticTruth(frame=k),
+        np.concatenate([forward, forward[::-1]]),
+        PERIOD,
+    )
     back = np.arange(len(force) // 2) * PERIOD * speed
     expected = np.maximum(slip - k * back, -slip)
     assert np.max(np.abs(force[len(force) // 2 :] - expected)) < 0.02 * slip
@@ -76,8 +81,8 @@ def test_a_frame_is_a_spring_before_friction_slips_again():
 def test_a_rider_adds_its_mass_slowly():
     time = np.arange(40000) * PERIOD / FINE
     x = 0.01 * np.sin(2.0 * math.pi * time)
-    bending = Bending(rider=2.0, frequency=20.0, ratio=0.5)
-    force = hold(Rubbing(), bending, x, PERIOD)
+    bending = ElasticTruth(rider=2.0, frequency=20.0, ratio=0.5)
+    force = imposed_force(FrictionTruth(), bending, x, PERIOD)
     expected = -2.0 * (2.0 * math.pi) ** 2 * x[::FINE]
     late = slice(2000, None)
     assert np.std((force - expected)[late]) < 0.1 * np.std(expected[late])
@@ -85,23 +90,25 @@ def test_a_rider_adds_its_mass_slowly():
 
 def test_a_pendulum_swings_with_its_own_period():
     inertia, arm = 0.02, 1.0
-    angle = drive(Rubbing(), Bending(), inertia, arm, 0.02, np.zeros(2000), 0.0, PERIOD)
+    angle = drive_pendulum(
+        FrictionTruth(), ElasticTruth(), inertia, arm, 0.02, np.zeros(2000), 0.0, PERIOD
+    )
     expected = 0.02 * np.cos(math.sqrt(arm / inertia) * np.arange(2000) * PERIOD)
     assert np.max(np.abs(angle - expected)) < 2e-4
 
 
 def test_a_lag_follows_a_step():
     command = np.concatenate([np.zeros(1), np.ones(200)])
-    moved = follow(Following(lag=0.02), command, PERIOD)
+    moved = follow_command(FollowerTruth(lag=0.02), command, PERIOD)
     time = np.arange(200) * PERIOD
     assert np.max(np.abs(moved[1:] - (1.0 - np.exp(-time / 0.02)))) < 1e-9
 
 
-def test_a_late_channel_is_late_and_bits_are_bits():
+def test_a_channel_is_delayed_and_quantised():
     random, signal = np.random.default_rng(1), np.sin(np.arange(1000) * 0.01)
-    late = sense(random, signal, Sensing(late=0.005), PERIOD)
+    late = read_sensor(random, signal, SensorTruth(delay=0.005), PERIOD)
     assert np.max(np.abs(late[5:] - signal[:-5])) < 1e-9
-    coarse = sense(random, signal, Sensing(bit=0.1), PERIOD)
+    coarse = read_sensor(random, signal, SensorTruth(bit=0.1), PERIOD)
     assert np.allclose(coarse / 0.1, np.round(coarse / 0.1))
 
 
@@ -120,7 +127,7 @@ def load(case: WildCase) -> Recording:
 
 
 @pytest.mark.parametrize("case", every_case(), ids=lambda c: f"{c.machine}-{'-'.join(c.parts)}")
-def test_every_sort_has_its_row_and_makes_data_that_can_be_diagnosed(case: WildCase):
+def test_every_case_has_accepted_names_and_usable_reproducible_data(case: WildCase):
     assert set(case.parts) <= set(ACCEPTED)
     machine, recording = find(MACHINES[case.machine]), load(case)
     configuration = machine.configuration_of(recording)
@@ -133,7 +140,7 @@ def test_every_sort_has_its_row_and_makes_data_that_can_be_diagnosed(case: WildC
             assert values.tobytes() == again.columns[topic][name].tobytes()
 
 
-def test_every_machine_is_drawn_and_something_of_it_can_be_named():
+def test_every_machine_is_drawn_and_has_an_acceptable_name():
     cases = every_case()
     assert {case.machine for case in cases} == set(MACHINES)
     for case in cases:
@@ -142,22 +149,22 @@ def test_every_machine_is_drawn_and_something_of_it_can_be_named():
 
 
 def answer(*effects: tuple[str, float, float]) -> dict[str, Any]:
-    found = []
+    named = []
     for name, confidence, value in effects:
         kind, _, component = name.partition("@")
-        own = {"value": value, "low": 0.9 * value, "high": 1.1 * value}
-        found.append(
+        interval = {"value": value, "low": 0.9 * value, "high": 1.1 * value}
+        named.append(
             {
                 "kind": kind,
                 "component": component,
                 "confidence": confidence,
-                "parameters": {kind: own},
+                "parameters": {kind: interval},
             }
         )
-    return {"verdict": "explained", "effects": found, "seconds": 1.0}
+    return {"verdict": "explained", "effects": named, "seconds": 1.0}
 
 
-def test_names_are_scored_by_what_a_person_would_accept():
+def test_names_are_scored_by_the_table_of_acceptable_answers():
     case = WildCase("damper", ("viscous", "lugre"), 0, 1)
     answers = (
         answer(("coulomb@damper", 0.9, 1.0), ("viscous@damper", 0.9, 1.0)),

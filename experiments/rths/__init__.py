@@ -1,1 +1,1 @@
-"""The benchmark of real-time hybrid simulation: a building whose first column is real."""
+"""The benchmark of real-time hybrid simulation: a simulated building with one real column."""

@@ -1,4 +1,4 @@
-"""The benchmark's nine criteria."""
+"""The nine evaluation criteria J1 to J9 of the benchmark."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ from experiments.rths.building import PERIOD
 from rigtwin.numerics.arrays import Array
 
 LONGEST = 0.1
-"""s, of the delays that are looked at."""
+"""Longest delay that J1 considers, s."""
 
 
 class Criteria(NamedTuple):
-    """J1 in ms, the others in %."""
+    """Criteria of one test: J1 in ms, J2 to J9 in %.
+
+    J1 is the delay of the actuator. J2 and J3 are the tracking error, rms and peak; J4 and J5 the
+    error of the first floor against the reference. J6 to J9 are the errors of the second and third
+    floor, rms and then peak.
+    """
 
     j1: float
     j2: float
@@ -29,16 +34,21 @@ class Criteria(NamedTuple):
 
 
 def judge(desired: Array, measured: Array, reference: Array) -> Criteria:
-    """The criteria of one test.
+    """Return the criteria of one test.
 
     Parameters
     ----------
-    desired
-        Of all floors, m, shape (n, 3), as the numerical part gives them.
-    measured
-        Of the first floor, m, shape (n,).
-    reference
-        Of all floors of the whole building, m, shape (n, 3).
+    desired : ndarray
+        Displacements of all floors that the numerical part computed, m, shape (n, 3).
+    measured : ndarray
+        Measured displacement of the first floor, m, shape (n,).
+    reference : ndarray
+        Displacements of all floors of the wholly simulated building, m, shape (n, 3).
+
+    Returns
+    -------
+    Criteria
+        J1 to J9.
     """
     first, true = desired[:, 0], reference[:, 0]
     return Criteria(
@@ -55,16 +65,22 @@ def judge(desired: Array, measured: Array, reference: Array) -> Criteria:
 
 
 def delay(commanded: Array, measured: Array) -> float:
-    """s by which measured comes later, in whole ticks: where the two correlate most."""
+    """Return the delay of `measured` behind `commanded`, s, in whole ticks.
+
+    The delay is the shift of the largest cross-correlation.
+    """
     most = round(LONGEST / PERIOD)
+    # The ends are cut off, so every shift correlates the same number of samples.
     inner = slice(most, len(commanded) - most)
-    at = correlate(measured, commanded[inner], mode="valid", method="fft")
-    return (int(np.argmax(at)) - most) * PERIOD
+    correlation = correlate(measured, commanded[inner], mode="valid", method="fft")
+    return (int(np.argmax(correlation)) - most) * PERIOD
 
 
-def _rms(error: Array, of: Array) -> float:
-    return 100.0 * float(np.std(error) / np.std(of))
+def _rms(error: Array, signal: Array) -> float:
+    """Return the rms of an error relative to the rms of a signal, %."""
+    return 100.0 * float(np.std(error) / np.std(signal))
 
 
-def _peak(error: Array, of: Array) -> float:
-    return 100.0 * float(np.max(np.abs(error)) / np.max(np.abs(of)))
+def _peak(error: Array, signal: Array) -> float:
+    """Return the peak of an error relative to the peak of a signal, %."""
+    return 100.0 * float(np.max(np.abs(error)) / np.max(np.abs(signal)))

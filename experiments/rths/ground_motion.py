@@ -1,7 +1,7 @@
-"""The three earthquakes of the benchmark, which come along with their licence.
+"""The three earthquakes of the benchmark.
 
-From github.com/FermandoisLab/maRTHS-bmk-RoDeAC (MIT, `earthquakes/LICENSE`): time s, acceleration
-m/s², not scaled; the benchmark takes 40 %.
+The records are from github.com/FermandoisLab/maRTHS-bmk-RoDeAC (MIT licence, in
+`earthquakes/LICENSE`): time, s, and unscaled acceleration, m/s². The benchmark uses 40 % of them.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 QUAKES = {"elcentro": "ElCentroAccel", "kobe": "KobeAccel", "morgan": "MorganAccel"}
-SHARE = 0.4
+SHARE = 0.4  # of the recorded acceleration, as the benchmark prescribes
 
 
 def ground_motion(quake: str) -> Array:
-    """Acceleration at every tick, m/s², straight lines between the recorded ones.
+    """Return the ground acceleration at every tick, m/s², shape (n,), linearly interpolated.
 
-    Raises RigtwinError with what there is.
+    Raises RigtwinError, listing the earthquakes, for an unknown one.
     """
     if quake not in QUAKES:
         raise RigtwinError(f"quake {quake}: expected {', '.join(QUAKES)}")
     name = QUAKES[quake]
     with as_file(files("experiments.rths") / "earthquakes" / f"{name}NoScaling.mat") as path:
         time, acceleration = loadmat(path)[name]
+    # The records have 50 to 200 samples a second, the benchmark 4096.
     ticks = np.arange(0.0, time[-1], PERIOD)
     return SHARE * np.interp(ticks, time, acceleration)

@@ -1,10 +1,11 @@
-"""One hybrid test of the benchmark: the building is computed, its first column is real, and the
-actuator moves it.
+"""One hybrid test of the benchmark.
 
-At a tick: the sensors are read, the compensator gives the command, the building goes on with the
-force of the tick before. Converters have the steps of 18 bit over ±3.8 V. Only the command is
-limited to that range: with a load cell that ends at 3.8 V, 4165 N, the published figures of case 3
-do not come out.
+The building is simulated; its first column is physical, and the actuator moves it. At every tick
+the sensors are read, the compensator computes the command, and the building advances with the
+force of the tick before.
+
+The converters have 18 bits over ±3.8 V. Only the command saturates at that range. A load cell that
+saturated at 3.8 V, 4165 N, would not reproduce the published figures of case 3.
 """
 
 from __future__ import annotations
@@ -17,44 +18,70 @@ from controllers.adaptive_law import AdaptiveLaw, adaptive_memory, adaptive_mode
 from controllers.compiled import compilable
 from controllers.linear_law import LinearLaw, pass_through, step_linear
 from experiments.rths.actuator import UNITS, Plant, sampled
-from experiments.rths.building import PERIOD, Case, Specimen, move, numerical_part, whole_building
+from experiments.rths.building import (
+    PERIOD,
+    BuildingCase,
+    Specimen,
+    move,
+    numerical_part,
+    whole_building,
+)
 from experiments.rths.criteria import Criteria, judge
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
 VOLTS, BITS = 3.8, 18
+"""Range, V, and resolution of the converters."""
 STEP = 2.0 * VOLTS / 2**BITS
+"""Quantisation step of a converter, V."""
 METRES, NEWTONS = 7.89e-3, 1096.0
-"""A volt."""
+"""Position, m, and force, N, that one volt stands for."""
 HELD = 2e-4
-"""s, that a value of the noise is held."""
+"""Time for which a value of the noise is held, s."""
 MOST_FORCE, MOST_MOTION, MOST_SPEED = 8900.0, 7e-3, 0.3
-"""N, m, m/s: the actuator's limits."""
+"""Limits of the actuator: force, N, displacement, m, and speed, m/s."""
 DIVERGED = 1.0
-"""m: beyond this a loop is not followed any further."""
+"""Displacement beyond which the loop counts as diverged and the test ends, m."""
 Law = LinearLaw | AdaptiveLaw
+"""Compensator: a linear law of constant coefficients, or an adaptive one."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """rms, V, of the position's and the force's converter."""
+    """White noise of the converters.
+
+    Attributes
+    ----------
+    position, force : float
+        Noise of the position and of the force channel, V rms.
+    """
 
     position: float
     force: float
 
 
 BENCHMARK = Noise(2e-3, 2e-3)
-"""As the benchmark's problem statement has it."""
+"""Noise of the benchmark's problem statement."""
 NONE = Noise(0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class HybridTest:
-    """What one test gave.
+    """Result of one hybrid test.
 
-    criteria: J1 to J9; force N, motion m, speed m/s: the largest; stable: whether the loop stayed
-    bounded; desired, measured: of the first floor, m; command: m.
+    Attributes
+    ----------
+    criteria : Criteria
+        J1 to J9; all infinite if the loop diverged.
+    force, motion, speed : float
+        Largest force, N, displacement, m, and speed, m/s, of the actuator.
+    stable : bool
+        Whether the loop stayed bounded.
+    desired, measured : ndarray
+        Desired and measured displacement of the first floor, m, shape (n,).
+    command : ndarray
+        Command of the actuator, m, shape (n,).
     """
 
     criteria: Criteria
@@ -68,49 +95,77 @@ class HybridTest:
 
     @property
     def within(self) -> bool:
-        """Whether the actuator's limits were kept."""
-        kept = self.force <= MOST_FORCE and self.motion <= MOST_MOTION and self.speed <= MOST_SPEED
-        return self.stable and kept
+        """Whether the test was stable and stayed within the limits of the actuator."""
+        small = self.force <= MOST_FORCE and self.motion <= MOST_MOTION
+        return self.stable and small and self.speed <= MOST_SPEED
 
 
 def run_test(
-    case: Case,
+    case: BuildingCase,
     ground: Array,
     law: Law,
     plant: Plant | None = None,
     noise: Noise = NONE,
     seed: int = 1,
 ) -> HybridTest:
-    """Runs one test.
+    """Run one hybrid test.
 
     Parameters
     ----------
-    case
-        The building.
-    ground
-        Acceleration at every tick, m/s², see `ground_motion`.
-    law
-        The compensator.
-    plant
-        The actuator and the specimen as they are; nominal by default.
-    noise
-        Of the converters.
-    seed
-        Of the noise.
+    case : BuildingCase
+        Building to simulate.
+    ground : ndarray
+        Ground acceleration at every tick, m/s², shape (n,); see `ground_motion`.
+    law : LinearLaw or AdaptiveLaw
+        Delay compensator.
+    plant : Plant, optional
+        True actuator and specimen. Defaults to the nominal ones.
+    noise : Noise
+        Noise of the converters. Defaults to none.
+    seed : int
+        Seed of the noise. Defaults to 1.
+
+    Returns
+    -------
+    HybridTest
+        Criteria, extremes and signals of the test.
 
     Raises
     ------
     RigtwinError
-        For a ground that is too short to be judged.
+        If the ground motion is shorter than one second.
     """
     if len(ground) < round(1.0 / PERIOD):
-        raise RigtwinError(f"a ground of {len(ground)} ticks: expected one second at least")
-    nominal, plant = Specimen(), plant or Plant()
-    building = numerical_part(case, nominal)
-    linear, adaptive = _both(law)
+        raise RigtwinError(
+            f"ground motion of {len(ground)} ticks: expected at least {round(1.0 / PERIOD)}, 1 s"
+        )
+    signals, last = _simulate(case, ground, law, plant or Plant(), noise, seed)
+    desired, measured = signals[:3].T[:last], signals[3][:last]
+    reference = move(whole_building(case), ground)[:last]
+    # Criteria of a truncated signal would flatter a loop that diverged.
+    stable = last == len(ground)
+    return HybridTest(
+        judge(desired, measured, reference) if stable else Criteria(*[np.inf] * 9),
+        float(np.max(np.abs(signals[5]))),
+        float(np.max(np.abs(signals[4]))),
+        float(np.max(np.abs(np.diff(signals[4][:last])))) / PERIOD,
+        stable,
+        desired[:, 0],
+        measured,
+        signals[6][:last],
+    )
+
+
+def _simulate(
+    case: BuildingCase, ground: Array, law: Law, plant: Plant, noise: Noise, seed: int
+) -> tuple[Array, int]:
+    """Return the signals of a test, shape (7, n), see `_loop`, and its length in ticks."""
+    # The simulated part knows the nominal specimen alone; the true one may differ.
+    building = numerical_part(case, Specimen())
+    linear, adaptive = _split_law(law)
     a, b = sampled(plant)
     signals = np.zeros((7, len(ground)))
-    last = _loop(
+    ticks = _loop(
         building.a,
         building.ground,
         building.force,
@@ -125,30 +180,21 @@ def run_test(
         isinstance(law, LinearLaw),
         signals,
     )
-    desired, measured = signals[:3].T[:last], signals[3][:last]
-    reference = move(whole_building(case), ground)[:last]
-    stable = last == len(ground)
-    return HybridTest(
-        judge(desired, measured, reference) if stable else Criteria(*[np.inf] * 9),
-        float(np.max(np.abs(signals[5]))),
-        float(np.max(np.abs(signals[4]))),
-        float(np.max(np.abs(np.diff(signals[4][:last])))) / PERIOD,
-        stable,
-        desired[:, 0],
-        measured,
-        signals[6][:last],
-    )
+    return signals, ticks
 
 
-def ideal_test(case: Case, ground: Array, piece: Specimen | None = None) -> Criteria:
-    """The criteria of a test whose actuator follows exactly; what is left is that the force comes a
-    tick late, and that the specimen is not the nominal one."""
-    building, piece = numerical_part(case, Specimen()), piece or Specimen()
+def ideal_test(case: BuildingCase, ground: Array, specimen: Specimen | None = None) -> Criteria:
+    """Return the criteria of a test with a perfect actuator.
+
+    Two errors remain: the force acts one tick late, and the specimen may differ from the nominal
+    one.
+    """
+    building, specimen = numerical_part(case, Specimen()), specimen or Specimen()
     desired = _ideal_loop(
         building.a,
         building.ground,
         building.force,
-        np.array([piece.stiffness, piece.damping, piece.mass]),
+        np.array([specimen.stiffness, specimen.damping, specimen.mass]),
         ground,
     )
     return judge(desired, desired[:, 0], move(whole_building(case), ground))
@@ -156,38 +202,42 @@ def ideal_test(case: Case, ground: Array, piece: Specimen | None = None) -> Crit
 
 @kernel
 def _ideal_loop(  # type: ignore[no-untyped-def]
-    building, by_ground, by_force, piece, ground
+    building, by_ground, by_force, specimen, ground
 ):
     state, force = np.zeros(6), 0.0
     desired = np.empty((len(ground), 3))
     for tick in range(len(ground)):
         desired[tick] = state[:3]
-        after = building @ state + by_ground * ground[tick] + by_force * force
+        next_state = building @ state + by_ground * ground[tick] + by_force * force
         # The actuator's acceleration is that of the floor over the next tick.
-        pushed = (after[3] - state[3]) / PERIOD
-        force = piece[0] * state[0] + piece[1] * state[3] + piece[2] * pushed
-        state = after
+        acceleration = (next_state[3] - state[3]) / PERIOD
+        force = specimen[0] * state[0] + specimen[1] * state[3] + specimen[2] * acceleration
+        state = next_state
     return desired
 
 
-def _both(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
-    """Compiled code takes one of each; the other is not stepped."""
+def _split_law(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
+    """Return a linear and an adaptive law, of which one is the law and one a stand-in.
+
+    Compiled code needs a fixed type for both arguments. The stand-in is never stepped.
+    """
     if isinstance(law, AdaptiveLaw):
         return pass_through(), law
     return law, adaptive_model([1.0, 0.0], PERIOD)
 
 
 def _draw(noise: Noise, ticks: int, seed: int) -> Array:
-    """V, shape (2, ticks), held over HELD."""
+    """Return the noise of position and force, V, shape (2, ticks), each value held for `HELD`."""
     random = np.random.default_rng([seed, 3])
-    place = (np.arange(ticks) * PERIOD / HELD).astype(int)
-    drawn = random.standard_normal((2, int(place[-1]) + 1))
-    return drawn[:, place] * np.array([[noise.position], [noise.force]])
+    # The noise of the real converters is band-limited: one value holds for `HELD`.
+    index = (np.arange(ticks) * PERIOD / HELD).astype(int)
+    drawn = random.standard_normal((2, int(index[-1]) + 1))
+    return drawn[:, index] * np.array([[noise.position], [noise.force]])
 
 
 @compilable
 def _rounded(volts: float) -> float:
-    """To the nearest step of a converter, V."""
+    """Return a voltage rounded to the nearest step of a converter, V."""
     return round(volts / STEP) * STEP
 
 
@@ -207,41 +257,47 @@ def _loop(  # type: ignore[no-untyped-def]
     is_linear,
     signals,
 ) -> int:
-    """Fills signals: three floors, position measured, true position, true force, command. Returns
-    the ticks until the end, or until it diverged."""
+    """Run the closed loop and return the number of ticks until its end or its divergence.
+
+    Fills `signals`, shape (7, ticks), with the displacements of the three floors, the measured and
+    the true position of the specimen, its true force, and the command.
+    """
     state, force = np.zeros(6), 0.0
-    real, after_real = np.zeros(5), np.zeros(5)
-    after = np.zeros(6)
-    memory, adapting = np.zeros(len(linear.a)), start.copy()
+    actuator, next_actuator = np.zeros(5), np.zeros(5)
+    next_state = np.zeros(6)
+    memory, adaptive_state = np.zeros(len(linear.a)), start.copy()
     for tick in range(len(ground)):
-        position = real[0] * units[0]
-        pushed = real[2] * units[2]
-        read = _rounded(position / METRES + noise[0, tick]) * METRES
-        felt = _rounded(pushed / NEWTONS + noise[1, tick]) * NEWTONS
+        position = actuator[0] * units[0]
+        true_force = actuator[2] * units[2]
+        measured = _rounded(position / METRES + noise[0, tick]) * METRES
+        measured_force = _rounded(true_force / NEWTONS + noise[1, tick]) * NEWTONS
         if is_linear:
-            wanted = step_linear(linear, memory, state[0], read)
+            wanted = step_linear(linear, memory, state[0], measured)
         else:
-            wanted = step_adaptive(adaptive, adapting, state[0], read)
+            wanted = step_adaptive(adaptive, adaptive_state, state[0], measured)
         command = _rounded(min(max(wanted / METRES, -VOLTS), VOLTS)) * METRES
         for floor in range(3):
             signals[floor, tick] = state[floor]
-        signals[3, tick] = read
+        signals[3, tick] = measured
         signals[4, tick] = position
-        signals[5, tick] = pushed
+        signals[5, tick] = true_force
         signals[6, tick] = command
+        # Written so that NaN ends the loop as well.
         if not abs(state[0]) < DIVERGED:
             return tick
+        # Written out: a matrix product of this size would allocate an array at every tick.
         for row in range(6):
             total = by_ground[row] * ground[tick] + by_force[row] * force
             for column in range(6):
                 total += building[row, column] * state[column]
-            after[row] = total
+            next_state[row] = total
         for row in range(5):
             total = b[row] * command
             for column in range(5):
-                total += a[row, column] * real[column]
-            after_real[row] = total
-        state[:] = after
-        real[:] = after_real
-        force = felt
+                total += a[row, column] * actuator[column]
+            next_actuator[row] = total
+        state[:] = next_state
+        actuator[:] = next_actuator
+        # The force measured now acts on the building in the next tick, as on the real computer.
+        force = measured_force
     return len(ground)

@@ -1,9 +1,9 @@
-"""Tunes a compensator of the benchmark on some plants, and judges it on others.
+"""Tuning of a compensator of the benchmark on some plants, and its validation on held-out ones.
 
-What a compensator is designed from, the nominal plant, stays; its weights, gains and rates are
-looked for. The criterion weighs what it does without noise on the worst plant and what it makes of
-noise on the nominal one; the search is Nelder's and Mead's simplex over the logarithms (The
-Computer Journal 7 (1965) 308).
+The compensator is always designed from the nominal plant; its weights, gains and rates are tuned.
+The criterion is the sum of J2 without noise on the worst plant, and J2 above its floor with noise
+on the nominal one. The search is the simplex of Nelder and Mead (The Computer Journal 7 (1965)
+308) over the logarithms of the parameters.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from controllers.inverse_model import inverse_model
 from controllers.kalman_inverse import kalman_inverse
 from controllers.smith_predictor import smith_predictor
 from experiments.rths.actuator import Plant, draw_plants
-from experiments.rths.building import PERIOD, Case, find_case
+from experiments.rths.building import PERIOD, BuildingCase, find_case
 from experiments.rths.compensators import KALMAN, SMITH, nominal_actuator, nominal_inverse
 from experiments.rths.ground_motion import ground_motion
 from experiments.rths.hybrid_test import BENCHMARK, METRES, Law, run_test
@@ -27,16 +27,26 @@ from rigtwin.errors import RigtwinError
 
 Array = np.ndarray
 REACH = 3.0
-"""Factor of the simplex' first steps."""
+"""Factor by which the first steps of the simplex change a parameter."""
 WORST = 1e3
-"""%, of a test that runs away or ends beyond a limit."""
+"""J2 assigned to a test that diverges, %."""
 TUNED_SECONDS = 25.0
-"""Of the earthquake while it is tuned: the strong part is over then."""
+"""Part of the earthquake used for tuning, s. The strong motion is over by then."""
 
 
 @dataclass(frozen=True)
 class Knob:
-    """A number that is looked for. start: by default; low, high: between which."""
+    """A parameter to tune.
+
+    Attributes
+    ----------
+    name : str
+        Name of the argument of `Tunable.make`.
+    start : float
+        Default value, at which the search starts.
+    low, high : float
+        Bounds of the search.
+    """
 
     name: str
     start: float
@@ -46,13 +56,33 @@ class Knob:
 
 @dataclass(frozen=True)
 class Tunable:
-    """A compensator as a function of its knobs."""
+    """A compensator as a function of its parameters.
+
+    Attributes
+    ----------
+    knobs : tuple of Knob
+        Parameters to tune.
+    make : callable
+        Function of the parameters, by name, that returns the law.
+    """
 
     knobs: tuple[Knob, ...]
     make: Callable[..., Law]
 
+    def start(self) -> np.ndarray:
+        """Return the logarithms of the default values, shape (knobs,)."""
+        return np.log([knob.start for knob in self.knobs])
+
+    def values(self, point: np.ndarray) -> dict[str, float]:
+        """Return the parameters at a point of logarithms, shape (knobs,), moved into the bounds."""
+        lows, highs = np.log([(knob.low, knob.high) for knob in self.knobs]).T
+        # The simplex knows no bounds: a point outside counts as its projection.
+        inside = np.exp(np.clip(point, lows, highs))
+        return {knob.name: float(value) for knob, value in zip(self.knobs, inside, strict=True)}
+
 
 def _weighed(**weights: float) -> Law:
+    """Return the Kalman inverse of the nominal plant with other weights."""
     return kalman_inverse(nominal_actuator(), PERIOD, KALMAN._replace(**weights))
 
 
@@ -87,27 +117,27 @@ TUNABLE: Mapping[str, Tunable] = {
         _weighed,
     ),
 }
-"""Compensators by name."""
+"""Tunable compensators by name."""
 
 
 @dataclass(frozen=True)
 class TunedCompensator:
-    """What came of it.
+    """Result of a tuning.
 
-    Parameters
+    Attributes
     ----------
     name : str
-        Of the compensator.
+        Name of the compensator.
     before, after : dict
-        Knob → value.
+        Values of the parameters by name.
     criterion : tuple of float
-        On the plants that it was tuned on, before and after.
+        Criterion on the plants of the tuning, %, before and after.
     judged : tuple of float
-        J2 in % without noise, the worst of the plants that it was not tuned on, before and after.
+        J2 without noise of the worst held-out plant, %, before and after.
     noisy : tuple of float
-        J2 in % with the benchmark's noise on the nominal plant, above its floor, before and after.
+        J2 with the benchmark's noise on the nominal plant above its floor, %, before and after.
     tests : int
-        That were run.
+        Number of hybrid tests run.
     """
 
     name: str
@@ -119,23 +149,24 @@ class TunedCompensator:
     tests: int
 
 
-class _Trial:
-    """One case and its plants."""
+class _TestSeries:
+    """Hybrid tests of one building and earthquake on a set of plants."""
 
-    def __init__(self, case: Case, ground: Array, plants: Sequence[Plant]) -> None:
+    def __init__(self, case: BuildingCase, ground: Array, plants: Sequence[Plant]) -> None:
         self._case, self._ground, self._plants, self.tests = case, ground, list(plants), 0
 
-    def follow(self, law: Law) -> float:
-        """J2 in %, the worst of the plants, without noise."""
+    def worst_tracking(self, law: Law) -> float:
+        """Return J2 of the worst plant without noise, %."""
         worst = 0.0
         for plant in self._plants:
             test = run_test(self._case, self._ground, law, plant)
             self.tests += 1
+            # The worst plant counts, not the mean: one unstable plant must not pass.
             worst = max(worst, test.criteria.j2 if test.stable else WORST)
         return worst
 
-    def stir(self, law: Law) -> float:
-        """J2 in % with noise on the nominal plant, above that of the noise alone."""
+    def noise_response(self, law: Law) -> float:
+        """Return J2 with noise on the nominal plant, above that of the noise alone, %."""
         test = run_test(self._case, self._ground, law, noise=BENCHMARK)
         self.tests += 1
         if not test.stable:
@@ -144,83 +175,103 @@ class _Trial:
         return max(test.criteria.j2 - floor, 0.0)
 
 
+def _find_tunable(name: str) -> Tunable:
+    """Return a tunable compensator. Raises RigtwinError, listing the names, for another one."""
+    if name not in TUNABLE:
+        raise RigtwinError(f"compensator {name}: expected one with knobs, {', '.join(TUNABLE)}")
+    return TUNABLE[name]
+
+
+def _check_counts(**counts: tuple[int, int]) -> None:
+    """Raise RigtwinError for a count outside its range; counts: name → (count, smallest)."""
+    for name, (count, least) in counts.items():
+        if not isinstance(count, int) or not least <= count <= 1000:
+            raise RigtwinError(f"{name} = {count!r:.40}: expected a whole number from {least}")
+
+
+def _descend(
+    objective: Callable[[np.ndarray], float], start: np.ndarray, evaluations: int
+) -> tuple[np.ndarray, float]:
+    """Return the point that the simplex of Nelder and Mead ends at, and its value."""
+    # The default simplex steps by 5 % of a coordinate, which is nothing for a logarithm near 0.
+    steps = np.log(REACH) * np.vstack([np.zeros(len(start)), np.eye(len(start))])
+    optimum = minimize(
+        objective,
+        start,
+        method="Nelder-Mead",
+        options={"maxfev": evaluations, "initial_simplex": start + steps, "fatol": 1e-3},
+    )
+    return optimum.x, float(optimum.fun)
+
+
 def tune_compensator(
     name: str,
     case: int = 4,
     *,
     quake: str = "elcentro",
     plants: int = 8,
-    others: int = 12,
+    held_out_plants: int = 12,
     evaluations: int = 60,
     seed: int = 1,
     progress: Callable[[int], object] = lambda _: None,
 ) -> TunedCompensator:
-    """Tunes a compensator.
+    """Tune a compensator and validate it on held-out plants.
 
     Parameters
     ----------
-    name
-        One of `TUNABLE`.
-    case
-        Of the building, 1 to 4.
-    quake
-        elcentro, kobe or morgan.
-    plants, others
-        On which it is tuned, the nominal one among them, and on which it is judged.
-    evaluations
-        Of the criterion, at most.
-    seed
-        Of the plants that are drawn.
-    progress
-        Called with 1 after each evaluation.
+    name : str
+        Compensator, one of `TUNABLE`.
+    case : int
+        Case of the building, 1 to 4. Defaults to 4.
+    quake : str
+        Earthquake: elcentro, kobe or morgan. Defaults to elcentro.
+    plants : int
+        Number of plants in the criterion, the nominal one included, 1 to 1000. Defaults to 8.
+    held_out_plants : int
+        Number of plants for the validation, 1 to 1000. Defaults to 12.
+    evaluations : int
+        Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
+    seed : int
+        Seed of the random plants. Defaults to 1.
+    progress : callable
+        Function called with 1 after every evaluation.
+
+    Returns
+    -------
+    TunedCompensator
+        Parameters and figures before and after.
 
     Raises
     ------
     RigtwinError
-        For any mistake in these.
+        If an argument is unknown or out of range.
     """
-    if name not in TUNABLE:
-        raise RigtwinError(f"compensator {name}: expected one with knobs, {', '.join(TUNABLE)}")
-    for told, count, least in (
-        ("plants", plants, 1),
-        ("others", others, 1),
-        ("evaluations", evaluations, 3),
-    ):
-        if not isinstance(count, int) or not least <= count <= 1000:
-            raise RigtwinError(f"{told} = {count!r:.40}: expected a whole number from {least}")
-    of, ground = TUNABLE[name], ground_motion(quake)
-    drawn, building = draw_plants(plants + others, seed), find_case(case)
-    tuning = _Trial(building, ground[: round(TUNED_SECONDS / PERIOD)], drawn[:plants])
-    judging = _Trial(building, ground, drawn[plants:])
-    knobs = of.knobs
-    lows, highs = (np.log([getattr(k, end) for k in knobs]) for end in ("low", "high"))
+    _check_counts(plants=(plants, 1), held_out_plants=(held_out_plants, 1))
+    _check_counts(evaluations=(evaluations, 3))
+    tunable, ground = _find_tunable(name), ground_motion(quake)
+    drawn, building = draw_plants(plants + held_out_plants, seed), find_case(case)
+    tuning = _TestSeries(building, ground[: round(TUNED_SECONDS / PERIOD)], drawn[:plants])
+    validation = _TestSeries(building, ground, drawn[plants:])
 
-    def values(place: Array) -> dict[str, float]:
-        inside = np.exp(np.clip(place, lows, highs))
-        return {knob.name: float(value) for knob, value in zip(knobs, inside, strict=True)}
-
-    def criterion(place: Array) -> float:
-        law = of.make(**values(place))
+    def objective(point: np.ndarray) -> float:
+        law = tunable.make(**tunable.values(point))
         progress(1)
-        return tuning.follow(law) + tuning.stir(law)
+        return tuning.worst_tracking(law) + tuning.noise_response(law)
 
-    start = np.log([knob.start for knob in knobs])
-    first = criterion(start)
-    steps = np.log(REACH) * np.vstack([np.zeros(len(knobs)), np.eye(len(knobs))])
-    found = minimize(
-        criterion,
-        start,
-        method="Nelder-Mead",
-        options={"maxfev": evaluations, "initial_simplex": start + steps, "fatol": 1e-3},
-    )
-    best = found.x if found.fun < first else start
-    before, after = of.make(**values(start)), of.make(**values(best))
+    # Gains and weights act by their order of magnitude: the search runs over logarithms.
+    start = tunable.start()
+    first_criterion = objective(start)
+    best, best_criterion = _descend(objective, start, evaluations)
+    if best_criterion >= first_criterion:
+        best, best_criterion = start, first_criterion
+    initial, tuned = tunable.values(start), tunable.values(best)
+    before, after = tunable.make(**initial), tunable.make(**tuned)
     return TunedCompensator(
         name=name,
-        before=values(start),
-        after=values(best),
-        criterion=(first, min(float(found.fun), first)),
-        judged=(judging.follow(before), judging.follow(after)),
-        noisy=(judging.stir(before), judging.stir(after)),
-        tests=tuning.tests + judging.tests,
+        before=initial,
+        after=tuned,
+        criterion=(first_criterion, best_criterion),
+        judged=(validation.worst_tracking(before), validation.worst_tracking(after)),
+        noisy=(validation.noise_response(before), validation.noise_response(after)),
+        tests=tuning.tests + validation.tests,
     )

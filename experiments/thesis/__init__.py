@@ -1,1 +1,1 @@
-"""Studies of the thesis: what it prints, beside what the twin or a closed form gives."""
+"""Studies of the thesis: its printed results compared with the twin or with a closed form."""

@@ -1,5 +1,7 @@
-"""Appendix A2 as data: vehicle structure MIL, every case of Tables A2.1 to A2.5, its figures and
-what is said of them."""
+"""Appendix A2 as data: vehicle structure MIL.
+
+Every case of Tables A2.1 to A2.5 stands here with its figures and the thesis' statements.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +17,12 @@ from experiments.thesis.appendix_a import (
     STIFF,
     TYRES,
     WHEELS,
-    case,
-    instead,
-    misprint,
-    says,
+    claim,
+    corrected_lag_suffix,
+    locus_case,
+    misprint_note,
 )
-from experiments.thesis.loci import Case, locus
+from experiments.thesis.loci import Claim, LocusCase, locus
 from rigtwin.studies.stability.locus import BODY, WHEEL
 
 A2_9 = (
@@ -30,19 +32,21 @@ A2_9 = (
 )
 
 
-def _a2_1() -> tuple[Case, ...]:
+def _a2_1() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A2.1: the lag is swept at two damping ratios."""
+    # Two filters, of position and velocity, add two real poles near −1/τ.
     cases = []
     for number, ratio, figure in ((1, 1.0, 1), (2, 0.5, 2)):
         name = f"A2.{figure}"
         claims = [
-            says(name, "smallest lag", "two real poles on the far left", shapes.far_left(2)),
-            says(
+            claim(name, "smallest lag", "two real poles on the far left", shapes.far_left(2)),
+            claim(
                 name,
                 "small lags",
                 "closely resembles the ideal system",
                 resemblance.resembles("start"),
             ),
-            says(
+            claim(
                 name,
                 "stability",
                 "only the body hop becomes unstable",
@@ -51,7 +55,7 @@ def _a2_1() -> tuple[Case, ...]:
         ]
         if number == 1:
             claims.append(
-                says(
+                claim(
                     name,
                     "breakaway",
                     "wheel hop from overdamped to underdamped",
@@ -59,7 +63,7 @@ def _a2_1() -> tuple[Case, ...]:
                 )
             )
         cases.append(
-            case(
+            locus_case(
                 "structure",
                 number,
                 f"ζ = {ratio:g}",
@@ -71,7 +75,8 @@ def _a2_1() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _a2_2() -> tuple[Case, ...]:
+def _a2_2() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A2.2: the sprung natural frequency is swept."""
     cases = []
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A2.{figure}", SLOW if lag == 0.2 else QUICK
@@ -82,17 +87,17 @@ def _a2_2() -> tuple[Case, ...]:
             else ""
         )
         claims = [
-            says(
+            claim(
                 name,
                 "stability",
                 "body hop unstable at high frequencies, wheel hop not",
                 judges.becomes_unstable(BODY),
                 note,
             ),
-            says(name, "resemblance", "at low frequencies", resemblance.closest_at("start")),
+            claim(name, "resemblance", "at low frequencies", resemblance.closest_at("start")),
         ]
         if ratio != 1.5:
-            claims.append(says(name, "wheel hop", "moves left, not right", shapes.wheel_goes_left))
+            claims.append(claim(name, "wheel hop", "moves left, not right", shapes.wheel_goes_left))
         if lag == 0.2 and ratio >= 1.0:
             on_curve = resemblance.body_on_ideal_trajectory(beside, "suspension MIL")
             note = (
@@ -100,7 +105,7 @@ def _a2_2() -> tuple[Case, ...]:
                 "is; it stays nearer than with suspension MIL"
             )
             claims.append(
-                says(
+                claim(
                     name,
                     "body hop",
                     "stays on the ideal trajectory, unlike suspension MIL",
@@ -108,32 +113,14 @@ def _a2_2() -> tuple[Case, ...]:
                     note,
                 )
             )
-        if lag == 0.2 and ratio == 1.0:
-            claims.append(
-                says(
-                    name,
-                    "breakaway",
-                    "wheel hop breaks away from the real axis",
-                    shapes.breaks_away,
-                )
-            )
-        if ratio == 1.5:
-            claims.append(
-                says(
-                    name,
-                    "breakaway",
-                    "wheel hop forms a loop and breaks in again",
-                    shapes.breaks_in,
-                )
-            )
+        claims += _breakaway(name, ratio, lag)
         if lag == 0.2 and ratio == 0.5:
             closer = resemblance.wheel_closer_than(beside, "suspension MIL")
-            claims.append(says(name, "wheel hop", "diverges less than with suspension MIL", closer))
-        if lag == 0.01 and ratio >= 1.0:
-            left = shapes.breaks_away_left_of(locus("structure", SLOW[ratio]), "τ = 0.2 s")
-            claims.append(says(name, "breakaway", "further left with less lag", left))
+            claims.append(
+                claim(name, "wheel hop", "diverges less than with suspension MIL", closer)
+            )
         cases.append(
-            case(
+            locus_case(
                 "structure",
                 number,
                 f"ζ = {ratio:g}, τ = {lag:g} s",
@@ -145,152 +132,177 @@ def _a2_2() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _a2_3() -> tuple[Case, ...]:
-    low, never = judges.unstable_at_end(BODY), judges.never(WHEEL)
+def _breakaway(name: str, ratio: float, lag: float) -> list[Claim]:
+    """Return the statements of §A2.2 about poles that leave the real axis or return to it."""
+    claims = []
+    if lag == 0.2 and ratio == 1.0:
+        words = "wheel hop breaks away from the real axis"
+        claims.append(claim(name, "breakaway", words, shapes.breaks_away))
+    if ratio == 1.5:
+        words = "wheel hop forms a loop and breaks in again"
+        claims.append(claim(name, "breakaway", words, shapes.breaks_in))
+    if lag == 0.01 and ratio >= 1.0:
+        further_left = shapes.breaks_away_left_of(locus("structure", SLOW[ratio]), "τ = 0.2 s")
+        claims.append(claim(name, "breakaway", "further left with less lag", further_left))
+    return claims
+
+
+def _a2_3_quick() -> LocusCase:
+    """Return case 3 of Table A2.3, with a lag of 1 ms."""
+    low_ratio, never = judges.unstable_at_end(BODY), judges.never(WHEEL)
+    return locus_case(
+        "structure",
+        3,
+        "τ = 0.001 s",
+        RATIOS[0.001],
+        {"A2.12": (-10.0, 1.0, 50.0)},
+        claim(
+            "A2.12",
+            "low ratios",
+            "body hop unstable, wheel hop always stable",
+            judges.all_hold(low_ratio, never),
+        ),
+        claim("A2.12", "high ratios", "no asymptote of the wheel hop", shapes.pairs_at_start(1, 1)),
+        claim(
+            "A2.12",
+            "low ratios",
+            "wheel hop matches the ideal",
+            resemblance.wheel_resembles("end"),
+        ),
+    )
+
+
+def _a2_3() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A2.3: the damping ratio falls from 50 to 0.0005."""
+    # The sweep starts at the high ratio, so `start` of a judge means strong damping.
+    low_ratio, never = judges.unstable_at_end(BODY), judges.never(WHEEL)
     quick = shapes.asymptote_left_of(locus("structure", RATIOS[0.2]), "τ = 0.2 s")
     return (
-        case(
+        locus_case(
             "structure",
             1,
             "τ = 0.2 s",
             RATIOS[0.2],
             {"A2.9": None, "A2.10": (-1.0, 0.2, 4.0)},
-            says(
+            claim(
                 "A2.9",
                 "low ratios",
                 "body hop unstable, wheel hop always stable",
-                judges.both(low, never),
+                judges.all_hold(low_ratio, never),
             ),
-            says("A2.9", "high ratios", "asymptote of the wheel hop", shapes.asymptote("start")),
-            says(
+            claim("A2.9", "high ratios", "asymptote of the wheel hop", shapes.asymptote("start")),
+            claim(
                 "A2.9",
                 "low ratios",
                 "wheel hop approaches the ideal",
                 resemblance.wheel_resembles("end"),
             ),
-            says(
+            claim(
                 "A2.9", "resemblance", "not at any damping ratio", resemblance.never_resembles, A2_9
             ),
-            says(
+            claim(
                 "A2.10", "high ratios", "body hop unstable as well", judges.unstable_at_start(BODY)
             ),
         ),
-        case(
+        locus_case(
             "structure",
             2,
             "τ = 0.01 s",
             RATIOS[0.01],
             {"A2.11": None},
-            says(
+            claim(
                 "A2.11",
                 "low ratios",
                 "body hop unstable, wheel hop always stable",
-                judges.both(low, never),
+                judges.all_hold(low_ratio, never),
             ),
-            says("A2.11", "high ratios", "asymptote further left, frequency higher", quick),
-            says(
+            claim("A2.11", "high ratios", "asymptote further left, frequency higher", quick),
+            claim(
                 "A2.11",
                 "low ratios",
                 "wheel hop resembles the ideal closely",
                 resemblance.wheel_resembles("end"),
             ),
         ),
-        case(
-            "structure",
-            3,
-            "τ = 0.001 s",
-            RATIOS[0.001],
-            {"A2.12": (-10.0, 1.0, 50.0)},
-            says(
-                "A2.12",
-                "low ratios",
-                "body hop unstable, wheel hop always stable",
-                judges.both(low, never),
-            ),
-            says(
-                "A2.12", "high ratios", "no asymptote of the wheel hop", shapes.pairs_at_start(1, 1)
-            ),
-            says(
-                "A2.12",
-                "low ratios",
-                "wheel hop matches the ideal",
-                resemblance.wheel_resembles("end"),
-            ),
-        ),
+        _a2_3_quick(),
     )
 
 
-def _a2_4() -> tuple[Case, ...]:
+def _a2_4() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A2.4: the stiffness of the tyre is swept."""
+    # Case 1 is judged with the printed lag and with the meant one, see REMARKS of `root_loci`.
     cases = []
     for number, lag, figures in ((1, 0.333, (13, 14)), (1, 0.0333, (13, 14)), (2, 0.01, (15,))):
         name, last = f"A2.{figures[0]}", f"A2.{figures[-1]}"
         views = {
-            f"A2.{figure}" + instead(lag): view
+            f"A2.{figure}" + corrected_lag_suffix(lag): view
             for figure, view in zip(figures, (STIFF, (-0.3, 0.1, 3.0)), strict=False)
         }
-        note = misprint(lag) or (
+        note = misprint_note(lag) or (
             "the caption of Figure A2.15 says 0.001 s, Table A2.4 0.01 s" if number == 2 else ""
         )
-        soft = judges.both(judges.unstable_at_start(BODY), judges.unstable_at_end())
+        soft = judges.all_hold(judges.unstable_at_start(BODY), judges.unstable_at_end())
         claims = [
-            says(
+            claim(
                 last,
                 "soft tyre",
                 "body hop unstable at low tyre stiffness, stable at high",
                 soft,
                 note,
             ),
-            says(
+            claim(
                 name,
                 "soft tyre",
                 "the error is greatest for the wheel hop",
                 resemblance.worst(WHEEL, "start"),
             ),
-            says(
+            claim(
                 name,
                 "stiff tyre",
                 "the error is greatest for the body hop",
                 resemblance.worst(BODY, "end"),
             ),
-            says(
+            claim(
                 name,
                 "stiff tyre",
                 "no asymptote at zero, unlike suspension MIL",
                 shapes.no_asymptote_at_zero,
             ),
         ]
-        cases.append(case("structure", number, f"τ = {lag:g} s", TYRES[lag], views, *claims))
+        cases.append(locus_case("structure", number, f"τ = {lag:g} s", TYRES[lag], views, *claims))
     return tuple(cases)
 
 
-def _a2_5() -> tuple[Case, ...]:
+def _a2_5() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A2.5: the mass of the wheel is swept."""
+    # Case 1 is judged with the printed lag and with the meant one, see REMARKS of `root_loci`.
     cases = []
     for number, lag, figures in ((1, 0.333, (16, 17)), (1, 0.0333, (16, 17)), (2, 0.01, (18,))):
         name, last = f"A2.{figures[0]}", f"A2.{figures[-1]}"
         zoomed = (-40.0, 5.0, 12.0)
         views = {
-            f"A2.{figure}" + instead(lag): view
+            f"A2.{figure}" + corrected_lag_suffix(lag): view
             for figure, view in zip(figures, (zoomed, (-0.3, 0.1, 3.0)), strict=False)
         }
         claims = [
-            says(
+            claim(
                 last,
                 "stability",
                 "unstable at high wheel mass only",
                 judges.becomes_unstable(BODY),
-                misprint(lag),
+                misprint_note(lag),
             ),
-            says(
+            claim(
                 name,
                 "resemblance",
                 "close where the wheel mass is 0.01 kg",
                 resemblance.resembles("start"),
-                misprint(lag),
+                misprint_note(lag),
             ),
         ]
         if number == 1:
             claims.append(
-                says(
+                claim(
                     name,
                     "breakaway",
                     "wheel hop leaves the real axis and stays off it",
@@ -299,22 +311,22 @@ def _a2_5() -> tuple[Case, ...]:
             )
         else:
             claims.append(
-                says(
+                claim(
                     name,
                     "breakaway",
                     "wheel hop leaves the real axis and breaks in again",
                     shapes.breaks_in,
                 )
             )
-        cases.append(case("structure", number, f"τ = {lag:g} s", WHEELS[lag], views, *claims))
+        cases.append(locus_case("structure", number, f"τ = {lag:g} s", WHEELS[lag], views, *claims))
     return tuple(cases)
 
 
-CASES: Mapping[str, Callable[[], tuple[Case, ...]]] = {
+CASES: Mapping[str, Callable[[], tuple[LocusCase, ...]]] = {
     "A2.1": _a2_1,
     "A2.2": _a2_2,
     "A2.3": _a2_3,
     "A2.4": _a2_4,
     "A2.5": _a2_5,
 }
-"""Table → its cases."""
+"""Functions that return the cases of a table, by its name."""

@@ -1,5 +1,7 @@
-"""Appendix A3 as data: both MIL loops, every case of Tables A3.1 to A3.5, its figures and what the
-thesis says of them."""
+"""Appendix A3 as data: suspension and vehicle structure MIL combined.
+
+Every case of Tables A3.1 to A3.5 stands here with its figures and the thesis' statements.
+"""
 
 from __future__ import annotations
 
@@ -16,26 +18,28 @@ from experiments.thesis.appendix_a import (
     STIFF,
     TYRES,
     WHEELS,
-    case,
-    instead,
-    misprint,
-    says,
+    claim,
+    corrected_lag_suffix,
+    locus_case,
+    misprint_note,
 )
-from experiments.thesis.loci import Case, locus
+from experiments.thesis.loci import LocusCase, locus
 from rigtwin.studies.stability.locus import BODY, WHEEL
 
 
-def _a3_1() -> tuple[Case, ...]:
+def _a3_1() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A3.1: the lag is swept at two damping ratios."""
+    # Three filters, of force, position and velocity, add three real poles near −1/τ.
     cases = []
     for number, ratio, figure in ((1, 1.0, 1), (2, 0.5, 2)):
         name = f"A3.{figure}"
         claims = [
-            says(name, "smallest lag", "three poles on the far left", shapes.far_left(3)),
-            says(name, "stability", "body hop unstable before the wheel hop", judges.body_first),
+            claim(name, "smallest lag", "three poles on the far left", shapes.far_left(3)),
+            claim(name, "stability", "body hop unstable before the wheel hop", judges.body_first),
         ]
         if number == 2:
             claims.append(
-                says(
+                claim(
                     name,
                     "large lags",
                     "a conjugate pair breaks off from the real axis",
@@ -43,7 +47,7 @@ def _a3_1() -> tuple[Case, ...]:
                 )
             )
         cases.append(
-            case(
+            locus_case(
                 "combined",
                 number,
                 f"ζ = {ratio:g}",
@@ -55,7 +59,9 @@ def _a3_1() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _a3_2() -> tuple[Case, ...]:
+def _a3_2() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A3.2: the sprung natural frequency is swept."""
+    # Every locus is compared with that of suspension MIL alone over the same sweep.
     cases = []
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A3.{figure}", SLOW if lag == 0.2 else QUICK
@@ -66,14 +72,14 @@ def _a3_2() -> tuple[Case, ...]:
         )
         earlier = judges.earlier_than(locus("suspension", variations[ratio]), "suspension MIL")
         claims = [
-            says(
+            claim(
                 name, "stability", "body hop unstable before the wheel hop", judges.body_first, note
             ),
-            says(name, "stability", "less stable than suspension MIL alone", earlier),
+            claim(name, "stability", "less stable than suspension MIL alone", earlier),
         ]
         if lag == 0.2:
             claims.append(
-                says(
+                claim(
                     name,
                     "further poles",
                     "leave the real axis and come back to it",
@@ -81,7 +87,7 @@ def _a3_2() -> tuple[Case, ...]:
                 )
             )
         cases.append(
-            case(
+            locus_case(
                 "combined",
                 number,
                 f"ζ = {ratio:g}, τ = {lag:g} s",
@@ -93,59 +99,63 @@ def _a3_2() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _a3_3() -> tuple[Case, ...]:
-    ends = judges.both(judges.unstable_at_start(BODY, WHEEL), judges.unstable_at_end(BODY, WHEEL))
+def _a3_3() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A3.3: the damping ratio falls from 50 to 0.0005."""
+    # The sweep starts at the high ratio, so `start` of a judge means strong damping.
+    ends = judges.all_hold(
+        judges.unstable_at_start(BODY, WHEEL), judges.unstable_at_end(BODY, WHEEL)
+    )
     return (
-        case(
+        locus_case(
             "combined",
             1,
             "τ = 0.2 s",
             RATIOS[0.2],
             {"A3.9": None, "A3.10": (-6.0, 5.0, 16.0), "A3.11": (-0.6, 0.2, 4.0)},
-            says(
+            claim(
                 "A3.9",
                 "resemblance",
                 "body hop as in the other two loops: unstable at low ratios",
                 judges.body_first,
             ),
-            says("A3.10", "wheel hop", "unstable at high and at low damping ratios", ends),
-            says("A3.11", "body hop", "unstable at low and at high damping ratios", ends),
+            claim("A3.10", "wheel hop", "unstable at high and at low damping ratios", ends),
+            claim("A3.11", "body hop", "unstable at low and at high damping ratios", ends),
         ),
-        case(
+        locus_case(
             "combined",
             2,
             "τ = 0.01 s",
             RATIOS[0.01],
             {"A3.12": None},
-            says(
+            claim(
                 "A3.12",
                 "low ratios",
                 "both modes move towards instability",
                 judges.becomes_unstable(BODY, WHEEL),
             ),
-            says(
+            claim(
                 "A3.12",
                 "high ratios",
                 "instability could occur as well",
                 judges.unstable_before_start(WHEEL),
             ),
-            says(
+            claim(
                 "A3.12", "low ratios", "body hop unstable before the wheel hop", judges.body_first
             ),
         ),
-        case(
+        locus_case(
             "combined",
             3,
             "τ = 0.001 s",
             RATIOS[0.001],
             {"A3.13": (-10.0, 1.0, 50.0)},
-            says(
+            claim(
                 "A3.13",
                 "high ratios",
                 "no further dynamics of the filter poles",
                 shapes.pairs_at_start(1, 1),
             ),
-            says(
+            claim(
                 "A3.13",
                 "low ratios",
                 "both modes move towards instability",
@@ -155,43 +165,49 @@ def _a3_3() -> tuple[Case, ...]:
     )
 
 
-def _a3_4() -> tuple[Case, ...]:
+def _a3_4() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A3.4: the stiffness of the tyre is swept."""
+    # Case 1 is judged with the printed lag and with the meant one, see REMARKS of `root_loci`.
     cases = []
     for number, lag, figure in ((1, 0.333, 14), (1, 0.0333, 14), (2, 0.01, 15)):
-        name, shown = f"A3.{figure}", f"A3.{figure}" + instead(lag)
-        soft = judges.both(judges.unstable_at_start(BODY), judges.unstable_at_end())
+        name, shown = f"A3.{figure}", f"A3.{figure}" + corrected_lag_suffix(lag)
+        soft = judges.all_hold(judges.unstable_at_start(BODY), judges.unstable_at_end())
         claims = [
-            says(
+            claim(
                 name,
                 "soft tyre",
                 "body hop unstable at low tyre stiffness, stable at high",
                 soft,
-                misprint(lag),
+                misprint_note(lag),
             ),
-            says(
+            claim(
                 name,
                 "stiff tyre",
                 "wheel hop approaches zero real part",
                 shapes.asymptote_at_zero,
-                misprint(lag),
+                misprint_note(lag),
             ),
         ]
         cases.append(
-            case("combined", number, f"τ = {lag:g} s", TYRES[lag], {shown: STIFF}, *claims)
+            locus_case("combined", number, f"τ = {lag:g} s", TYRES[lag], {shown: STIFF}, *claims)
         )
     return tuple(cases)
 
 
-def _a3_5() -> tuple[Case, ...]:
+def _a3_5() -> tuple[LocusCase, ...]:
+    """Return the cases of Table A3.5: the mass of the wheel is swept."""
+    # Case 1 is judged with the printed lag and with the meant one, see REMARKS of `root_loci`.
     cases = []
     for number, lag, figure in ((1, 0.333, 16), (1, 0.0333, 16), (2, 0.01, 17)):
-        name, shown = f"A3.{figure}", f"A3.{figure}" + instead(lag)
-        note = misprint(lag) or (
+        name, shown = f"A3.{figure}", f"A3.{figure}" + corrected_lag_suffix(lag)
+        note = misprint_note(lag) or (
             "the caption of Figure A3.17 says 0.001 s, Table A3.5 0.01 s" if number == 2 else ""
         )
         claims = [
-            says(name, "light wheel", "stable vertical asymptote", shapes.asymptote("start"), note),
-            says(
+            claim(
+                name, "light wheel", "stable vertical asymptote", shapes.asymptote("start"), note
+            ),
+            claim(
                 name,
                 "heavy wheel",
                 "body hop unstable at high wheel mass only",
@@ -200,16 +216,16 @@ def _a3_5() -> tuple[Case, ...]:
             ),
         ]
         cases.append(
-            case("combined", number, f"τ = {lag:g} s", WHEELS[lag], {shown: LIGHT}, *claims)
+            locus_case("combined", number, f"τ = {lag:g} s", WHEELS[lag], {shown: LIGHT}, *claims)
         )
     return tuple(cases)
 
 
-CASES: Mapping[str, Callable[[], tuple[Case, ...]]] = {
+CASES: Mapping[str, Callable[[], tuple[LocusCase, ...]]] = {
     "A3.1": _a3_1,
     "A3.2": _a3_2,
     "A3.3": _a3_3,
     "A3.4": _a3_4,
     "A3.5": _a3_5,
 }
-"""Table → its cases."""
+"""Functions that return the cases of a table, by its name."""

@@ -1,5 +1,4 @@
-"""§7.2 and appendix B3 to B5: the cross of elastic beams as the vehicle's body in the loop: Tables
-7.4 and 7.5."""
+"""§7.2 and appendices B3 to B5 (Tables 7.4 and 7.5): a cross of elastic beams as the body."""
 
 from __future__ import annotations
 
@@ -25,10 +24,12 @@ from rigtwin.simulation.ideal import simulate_ideal
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 
-WITHIN = 1.5
+WITHIN = 1.5  # factor within which a computed value agrees with a printed one
 TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}
-"""rms sprung mass acceleration, m/s². The passive rig with straight beams runs away on the twin,
-see RUNS_AWAY."""
+"""Acceleration of the sprung mass, m/s² rms.
+
+The passive test with straight beams diverges on the twin, see `RUNS_AWAY`.
+"""
 RUNS_AWAY = (
     "with beams that start straight, as in Fig. 7.15, the centre's first "
     "swing asks 0.72 m/s of a cylinder that gives 0.3, and "
@@ -36,32 +37,36 @@ RUNS_AWAY = (
     "bent by the preload, whose drop is smaller"
 )
 ON_A_SPRING = 1000.0
+"""Stiffness of the spring under the centre, N/m, that shifts the modes in Figure 7.16."""
 
 
 def _bent(configuration: Configuration) -> Configuration:
+    """Return a configuration whose beams start bent by the preload."""
     return configuration._replace(controller=configuration.controller._replace(beam_sag=1.0))
 
 
 def _run(name: str, seed: int) -> Result:
+    """Return the measures of one test, or of its divergence for `straight passive`."""
     if name == "bent passive":
-        return ride.kept(trial("beam-passive", seed, _bent), seed)
+        return ride.job_result(trial("beam-passive", seed, _bent), seed)
     if name in ("semi-active", "active"):
-        return ride.kept(trial(f"beam-{name}", seed), seed)
+        return ride.job_result(trial(f"beam-{name}", seed), seed)
     experiment = find("beam-passive")
     demands = experiment.demands(experiment.configuration, seed)
-    ran = simulate(experiment.configuration, demands, seed)
-    should = simulate_ideal(experiment.configuration, demands[:, 0])
+    simulated = simulate(experiment.configuration, demands, seed)
+    ideal = simulate_ideal(experiment.configuration, demands[:, 0])
     return {
-        "tripped": float(ran.trip != Trip.NONE),
-        "lasted": len(ran.commands) * experiment.configuration.timing.period,
-        "asked speed": float(np.max(np.abs(should.velocity))),
+        "tripped": float(simulated.trip != Trip.NONE),
+        "lasted": len(simulated.commands) * experiment.configuration.timing.period,
+        "asked speed": float(np.max(np.abs(ideal.velocity))),
         "ideal everything": float(
-            np.std(should.acceleration(experiment.configuration.timing.period))
+            np.std(ideal.acceleration(experiment.configuration.timing.period))
         ),
     }
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
+    """Return the jobs of the study."""
     return seeded(
         {
             name: lambda seed, name=name: _run(name, seed)
@@ -72,30 +77,40 @@ def jobs(seeds: int) -> Mapping[str, Job]:
 
 
 def _on_spring(settings: Settings) -> np.ndarray:
-    """Frequencies (Hz) of the modes that move the centre, on a spring."""
+    """Return the frequencies of the modes that move the centre on a spring, Hz."""
     mass, stiffness = assembled(settings)
     stiffness[HEAVE, HEAVE] += ON_A_SPRING
     squares, shapes = eigh(stiffness, mass)
     return np.sqrt(np.abs(squares[np.abs(shapes[HEAVE]) > 1e-3])) / (2 * math.pi)
 
 
+def _reduction_error(settings: Settings) -> float:
+    """Return the largest relative error of the centre's compliance by modal reduction, to 5 Hz."""
+    # Compliance of mode i at the centre: φ_i² / (s² + β ω_i² s + ω_i²), stiffness-proportional
+    # damping β.
+    model = modes(settings, 1e-3)
+    reduced_angular = 2 * math.pi * model.frequencies
+    angular, shapes = all_modes(settings)
+    beta, worst = settings.beam_damping, 0.0
+    for frequency in np.linspace(0.05, 5.0, 200):
+        s = 2j * math.pi * frequency
+        whole = np.sum(shapes[HEAVE] ** 2 / (s**2 + beta * angular**2 * s + angular**2))
+        reduced = np.sum(
+            model.centre**2 / (s**2 + beta * reduced_angular**2 * s + reduced_angular**2)
+        )
+        worst = max(worst, abs(reduced - whole) / abs(whole))
+    return worst
+
+
 def _structure(settings: Settings) -> list[Entry]:
+    """Return the entries of the beams' parameters and modes (Table 7.4, §7.2.1)."""
     mass, _ = assembled(settings)
+    # A unit heave of all nodes: uᵀ M u is the mass that a rigid motion feels.
     upward = np.zeros(FREEDOMS)
     upward[HEAVE::6] = 1.0
     weight = float(upward @ mass @ upward)
-    model, sprung = modes(settings, 1e-3), _on_spring(settings)
-    worst = 0.0
-    angular, shapes = all_modes(settings)
-    for frequency in np.linspace(0.05, 5.0, 200):
-        s = 2j * math.pi * frequency
-        whole = np.sum(
-            shapes[HEAVE] ** 2 / (s**2 + settings.beam_damping * angular**2 * s + angular**2)
-        )
-        kept = 2 * math.pi * model.frequencies
-        reduced = np.sum(model.centre**2 / (s**2 + settings.beam_damping * kept**2 * s + kept**2))
-        worst = max(worst, abs(reduced - whole) / abs(whole))
-    entries = [
+    sprung, worst = _on_spring(settings), _reduction_error(settings)
+    return [
         digits("Table 7.4", "total weight", "25", weight, "kg"),
         digits("Table 7.4", "beams", "12", float(ARMS * BEAMS)),
         digits("Table 7.4", "Young's modulus", "1200000", settings.beam_modulus, "N/m²"),
@@ -124,10 +139,10 @@ def _structure(settings: Settings) -> list[Entry]:
             f"{math.sqrt(ON_A_SPRING / weight) / (2 * math.pi):.3f} Hz",
         ),
     ]
-    return entries
 
 
 def _entries(results: dict[str, Result]) -> list[Entry]:
+    """Return all entries of §7.2 and of appendices B3 to B5."""
     entries = _structure(find("beam-passive").configuration.controller)
     for name, text in TABLE_7_5.items():
         note = RUNS_AWAY if name == "bent passive" else MEASURED
@@ -146,13 +161,23 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     note = "of the ideal system with straight beams, everything counted"
     entries.append(band("Table 7.5", "passive, ideal system", "0.679", exact, "m/s²", WITHIN, note))
     entries += [
-        ride.reduced("§7.2.2", results, "semi-active", "bent passive", "62.3", WITHIN, RUNS_AWAY),
-        ride.reduced("§7.2.3", results, "active", "bent passive", "66.6", WITHIN, RUNS_AWAY),
+        ride.reduction_entry(
+            "§7.2.2", results, "semi-active", "bent passive", "62.3", WITHIN, RUNS_AWAY
+        ),
+        ride.reduction_entry(
+            "§7.2.3", results, "active", "bent passive", "66.6", WITHIN, RUNS_AWAY
+        ),
         digits("§7.2.2", "62.3 % from Table 7.5 itself", "62.3", 100 * (1 - 0.256 / 0.679), "%"),
         digits("§7.2.3", "66.6 % from Table 7.5 itself", "66.6", 100 * (1 - 0.227 / 0.679), "%"),
-        *ride.tracking("Table B3.1", results, "bent passive", ("13.2", "156", "0.0603", "59"), 1.5),
-        *ride.tracking("Table B4.1", results, "semi-active", ("10.1", "154", "0.0593", "58"), 1.5),
-        *ride.tracking("Table B5.1", results, "active", ("10.4", "159", "0.0593", "58"), 1.5),
+        *ride.tracking_entries(
+            "Table B3.1", results, "bent passive", ("13.2", "156", "0.0603", "59"), 1.5
+        ),
+        *ride.tracking_entries(
+            "Table B4.1", results, "semi-active", ("10.1", "154", "0.0593", "58"), 1.5
+        ),
+        *ride.tracking_entries(
+            "Table B5.1", results, "active", ("10.4", "159", "0.0593", "58"), 1.5
+        ),
     ]
     tripped = over_seeds(results, "straight passive", "tripped")
     speed = float(np.median(over_seeds(results, "straight passive", "asked speed")))
@@ -173,11 +198,14 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
 
 
 def _statements(results: dict[str, Result]) -> list[Entry]:
+    """Return the entries of what §7.2 says about its figures."""
     entries = []
     result = results[f"semi-active/{SHOWN_SEED}"]
     heights = np.asarray(result["wing"])
+    # Curves are stored every 20 ms: the first 100 samples are the drop.
     swings = np.ptp(heights[: round(2.0 / 0.02)], axis=0)
     text = " < ".join(f"{swing:.0f} mm" for swing in swings[1:])
+    # Points of one mode move in phase: every pair correlates.
     correlation = np.corrcoef(heights[10:100, 1:].T).min()
     entries += [
         statement(
@@ -195,43 +223,49 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
             f"correlation {correlation:.3f} or more",
         ),
     ]
-    better = [
+    travels = [
         over_seeds(results, name, "travel rms")
         for name in ("bent passive", "semi-active", "active")
     ]
-    alike = np.median(np.abs(better[1] / better[2] - 1))
+    difference = np.median(np.abs(travels[1] / travels[2] - 1))
     entries.append(
         statement(
             "Figure 7.26",
             "travel, semi-active and active",
             "nearly identical",
-            bool(alike < 0.15),
-            f"rms differs by {100 * alike:.0f} %",
+            bool(difference < 0.15),
+            f"rms differs by {100 * difference:.0f} %",
         )
     )
-    less = bool(np.all(better[1] < better[0]) and np.all(better[2] < better[0]))
+    smaller = bool(np.all(travels[1] < travels[0]) and np.all(travels[2] < travels[0]))
     text = (
-        ", ".join(f"{1e3 * np.median(one):.1f}" for one in better)
+        ", ".join(f"{1e3 * np.median(one):.1f}" for one in travels)
         + " mm rms: passive, semi-active, active"
     )
     entries.append(
         statement(
-            "Figure 7.26", "travel", "less than passive", less, text, "" if less else RUNS_AWAY
+            "Figure 7.26",
+            "travel",
+            "less than passive",
+            smaller,
+            text,
+            "" if smaller else RUNS_AWAY,
         )
     )
     return entries
 
 
 def _modes_drawing(settings: Settings) -> Drawing:
+    """Draw the lowest mode shapes, and the compliance with all and with few modes."""
     figure, axes = sheet(1, 2, height=3.0)
     model = modes(settings, 1e-3)
     distance = settings.beam_length * np.arange(BEAMS + 1)
     for number in range(4):
         shape = model.wing[number] / np.abs(model.wing[number]).max()
         label = f"{model.frequencies[number]:.2f} Hz"
-        both = np.concatenate([shape[::-1], shape[1:]])
+        both_arms = np.concatenate([shape[::-1], shape[1:]])
         axes[0][0].plot(
-            np.concatenate([-distance[::-1], distance[1:]]), both, marker=".", label=label
+            np.concatenate([-distance[::-1], distance[1:]]), both_arms, marker=".", label=label
         )
     axes[0][0].set(
         xlabel="m from the centre",
@@ -241,16 +275,16 @@ def _modes_drawing(settings: Settings) -> Drawing:
     axes[0][0].legend(fontsize=8)
     frequencies = np.geomspace(0.2, 20.0, 500)
     s = 2j * math.pi * frequencies
-    for label, kept, colour in (
+    for label, count, colour in (
         ("78 degrees of freedom", None, COLOURS["other"]),
         ("six modes", 6, SENSED),
         ("two modes", 2, "#2f9e44"),
     ):
-        if kept is None:
+        if count is None:
             angular, shapes = all_modes(settings)
             centre = shapes[HEAVE]
         else:
-            angular, centre = 2 * math.pi * model.frequencies[:kept], model.centre[:kept]
+            angular, centre = 2 * math.pi * model.frequencies[:count], model.centre[:count]
         parts = centre[:, None] ** 2 / (
             s**2 + settings.beam_damping * angular[:, None] ** 2 * s + angular[:, None] ** 2
         )
@@ -259,7 +293,7 @@ def _modes_drawing(settings: Settings) -> Drawing:
             np.abs(np.sum(parts, axis=0)),
             color=colour,
             label=label,
-            linestyle="--" if kept == 6 else "-",
+            linestyle="--" if count == 6 else "-",
         )
     axes[0][1].set(xlabel="Hz", ylabel="m/N", title="compliance at the centre")
     axes[0][1].legend(fontsize=8)
@@ -269,6 +303,7 @@ def _modes_drawing(settings: Settings) -> Drawing:
 
 
 def _wing_drawing(results: dict[str, Result]) -> Drawing:
+    """Draw the heights of the points along an arm."""
     figure, axes = sheet(3, 1, height=2.3)
     for row, (name, label) in zip(
         axes,
@@ -304,6 +339,7 @@ def _wing_drawing(results: dict[str, Result]) -> Drawing:
 
 
 def _spectrum(results: dict[str, Result]) -> Drawing:
+    """Draw the spectrum of the sprung mass with its second resonance (Fig. 7.16)."""
     figure, axes = sheet(1, 1, width=7.5, height=3.2)
     axis = axes[0][0]
     for name, colour in (("semi-active", SENSED), ("bent passive", COLOURS["other"])):
@@ -329,9 +365,10 @@ def _spectrum(results: dict[str, Result]) -> Drawing:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    found = dict(results)
+    """Return the entries, drawings and remarks of §7.2."""
+    by_key = dict(results)
     shown = {
-        "passive, bent start" if name == "bent passive" else name: found[f"{name}/{SHOWN_SEED}"]
+        "passive, bent start" if name == "bent passive" else name: by_key[f"{name}/{SHOWN_SEED}"]
         for name in TABLE_7_5
     }
     covers = "Figure 7.12 to 7.14, 7.17 to 7.19, 7.21 to 7.23, 7.25 to 7.27, B3.1 to B5.6"
@@ -343,11 +380,11 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
             "The beams under passive, semi-active and active suspension.",
             shown,
         ),
-        _wing_drawing(found),
-        _spectrum(found),
+        _wing_drawing(by_key),
+        _spectrum(by_key),
     ]
-    remarks = [ride.remark(found, name) for name in TABLE_7_5]
-    return Conclusion(_entries(found), drawings, remarks)
+    remarks = [ride.remark(by_key, name) for name in TABLE_7_5]
+    return Conclusion(_entries(by_key), drawings, remarks)
 
 
 STUDY = Study(

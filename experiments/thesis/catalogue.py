@@ -1,4 +1,4 @@
-"""The thesis' studies and tables, by name."""
+"""Catalogue of the studies and tables of the thesis."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ STUDIES: dict[str, Study] = {
     )
 }
 BENCHMARKS: dict[str, Study] = {rths.STUDY.name: rths.STUDY}
-"""Studies of what others published beside the thesis; each only where it is asked for by name."""
+"""Studies of benchmarks other than the thesis. They run only if requested by name."""
 TABLES = (
     *("Table 2.1",),
     *span("Table", "3.", 1, 5),
@@ -50,41 +50,52 @@ TABLES = (
     *(f"Table B{part}.1" for part in range(1, 6)),
 )
 """Every numbered table of the thesis."""
+# A test holds the studies to this list: every table is covered, or named below.
 NOTHING_TO_COMPUTE = {
     "Table 2.1": "compares fluids of dampers from the literature; nothing of it is of the rig"
 }
+"""Tables without a computable result, with the reason."""
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What of the thesis to reproduce. where: the tables or figures asked for alone, or None for
-    all of the studies."""
+class Selection:
+    """Part of the thesis to reproduce.
+
+    Attributes
+    ----------
+    studies : tuple of Study
+        Studies that cover it.
+    where : str or None
+        Table, figure or equation to restrict the studies to. None keeps all of them.
+    """
 
     studies: tuple[Study, ...]
     where: str | None
 
 
-def asked(name: str | None) -> Asked:
-    """Of a study's name, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`, `figure
-    6.26`), or None for all.
+def select_studies(name: str | None) -> Selection:
+    """Return the studies of a name.
 
-    Raises RigtwinError listing what there is.
+    The name is a study, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`,
+    `figure 6.26`), or None for the whole thesis. Raises RigtwinError, listing the chapters and
+    studies, for an unknown name.
     """
     if name is None:
-        return Asked(tuple(STUDIES.values()), None)
+        return Selection(tuple(STUDIES.values()), None)
     if name in STUDIES:
-        return Asked((STUDIES[name],), None)
+        return Selection((STUDIES[name],), None)
     if name in BENCHMARKS:
-        return Asked((BENCHMARKS[name],), None)
+        return Selection((BENCHMARKS[name],), None)
+    # Accept `5`, `chapter 5`, `Chapter-5` and `appendix A` alike.
     plain = name.strip().lower().removeprefix("chapter").removeprefix("appendix").strip(" -")
     chapter = tuple(study for study in STUDIES.values() if plain in study.chapter.lower().split())
     if chapter:
-        return Asked(chapter, None)
+        return Selection(chapter, None)
     wanted = " ".join(name.replace("-", " ").split()).lower()
     for study in STUDIES.values():
         for covered in study.covers:
             if covered.lower() == wanted:
-                return Asked((study,), covered)
+                return Selection((study,), covered)
     for table, reason in NOTHING_TO_COMPUTE.items():
         if table.lower() == wanted:
             raise RigtwinError(f"{table} {reason}")
@@ -96,21 +107,27 @@ def asked(name: str | None) -> Asked:
     )
 
 
-def matching(drawn: str, where: str) -> bool:
-    """Whether a drawing that covers `Figure 3.11 to 3.14, B1.1` is of `Figure 3.12`."""
+def covers_figure(covers: str, where: str) -> bool:
+    """Return whether a drawing covers a figure.
+
+    A drawing that covers `Figure 3.11 to 3.14, B1.1` covers `Figure 3.12` and `Figure B1.1`.
+    """
     kind, _, number = where.partition(" ")
-    of = ""
-    for part in drawn.replace(" and ", ", ").split(", "):
-        named, _, rest = part.partition(" ")
-        # A part without a kind is of the kind named last.
-        of, places = (named, rest) if named in ("Figure", "Table") else (of, part)
+    kind_of_part = ""
+    for part in covers.replace(" and ", ", ").split(", "):
+        first_word, _, rest = part.partition(" ")
+        # `Figure 7.7, B1.1`: a part without a kind has the kind of the part before it.
+        kind_of_part, places = (
+            (first_word, rest) if first_word in ("Figure", "Table") else (kind_of_part, part)
+        )
         first, _, last = places.partition(" to ")
-        if of == kind and (number == first or (last and _between(number, first, last))):
+        if kind_of_part == kind and (number == first or (last and _between(number, first, last))):
             return True
     return False
 
 
 def _between(number: str, first: str, last: str) -> bool:
+    """Return whether `3.12` lies between `3.11` and `3.14`."""
     (group, _, place), (start_group, _, start), (_, _, end) = (
         text.rpartition(".") for text in (number, first, last)
     )

@@ -1,5 +1,4 @@
-"""The figures of chapter 4: timing of the step, spikes, a stretch of the test, two-step
-compensation."""
+"""Figures of chapter 4: step timing, spikes, a section of the test, two-step compensation."""
 
 from __future__ import annotations
 
@@ -14,16 +13,17 @@ from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IN_TIME, LATE = 0.9e-3, 15e-3
-"""s from the first step to the second: when the error has gone, and when the loop has turned it
-round."""
+"""Time from the first step to the second, s: when the error has vanished, and well after it."""
 
 
 def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, Array]:
-    """rms errors of a row over the seeds, and the spike; row: `one-step 4`, or `calibrated
-    one-step`."""
+    """Return the rms errors of a row and its spike, N, all of shape (seeds,).
+
+    row: `one-step 4` for the thesis' parameters, or `calibrated one-step`.
+    """
     kind, _, name = row.partition("calibrated ")
     if name:
-        found = {
+        errors = {
             key: np.asarray(results[f"calibrated-{loop}"][f"{name}/{key}"])
             for key in ("tracking", "numerical", "spike")
         }
@@ -32,14 +32,15 @@ def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, A
             (key for key in results if key.startswith(f"{loop}/")),
             key=lambda key: int(key.partition("/")[2]),
         )
-        found = {
+        errors = {
             key: np.array([float(results[seed][f"{kind}/{key}"]) for seed in seeds])
             for key in ("tracking", "numerical", "spike")
         }
-    return {**found, "total": found["tracking"] + found["numerical"]}
+    return {**errors, "total": errors["tracking"] + errors["numerical"]}
 
 
 def drawings(results: Mapping[str, Result]) -> list[Drawing]:
+    """Return all drawings of chapter 4."""
     return [
         _timing_drawing(results),
         _envelope_drawing(results),
@@ -50,6 +51,7 @@ def drawings(results: Mapping[str, Result]) -> list[Drawing]:
 
 
 def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
+    """Draw the force error with steps before, at and after the reversal."""
     figure, axes = sheet(1, 3, height=3.0)
     none = results["timing/None"]
     for axis, offsets in zip(axes[0], ((0.0, 0.005), (-0.015, -0.005), (0.015,)), strict=True):
@@ -57,10 +59,10 @@ def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
             none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step"
         )
         for offset, colour in zip(offsets, (SENSED, ASKED), strict=False):
-            one = results[f"timing/{offset}"]
+            timed = results[f"timing/{offset}"]
             axis.plot(
-                one["time"],
-                one["error"],
+                timed["time"],
+                timed["error"],
                 color=colour,
                 linewidth=0.8,
                 label=f"step {1e3 * offset:+.0f} ms from reversal",
@@ -76,20 +78,21 @@ def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
 
 
 def _envelope_drawing(results: Mapping[str, Result]) -> Drawing:
+    """Draw the mean spike with its threshold, and the error against the velocity."""
     figure, axes = sheet(1, 2, height=3.0)
     for loop, colour in (("nominal", SENSED), ("fitted", ASKED)):
-        found = results[f"calibrated-{loop}"]
-        envelope = np.asarray(found["envelope"])
+        calibrated = results[f"calibrated-{loop}"]
+        envelope = np.asarray(calibrated["envelope"])
         axes[0][0].plot(
             np.arange(len(envelope)), envelope, color=colour, marker=".", label=f"{loop} force loop"
         )
         axes[0][0].axhline(
-            float(found["setting spike_threshold"]), color=colour, linestyle=":", linewidth=1
+            float(calibrated["setting spike_threshold"]), color=colour, linestyle=":", linewidth=1
         )
     axes[0][0].set(
         xlabel="ms after the reversal",
         ylabel="force error, N",
-        title="mean spike and the threshold found (dotted)",
+        title="mean spike and the calibrated threshold (dotted)",
     )
     axes[0][0].legend(fontsize=8)
     section = results["calibrated-nominal"]
@@ -103,12 +106,13 @@ def _envelope_drawing(results: Mapping[str, Result]) -> Drawing:
     return Drawing(
         "figure-4.7",
         "Figure 4.4, 4.7 and 4.17",
-        "Left: what the calibration reads off a recording.",
+        "Left: the mean spike of a recording, from which the threshold is calibrated.",
         figure,
     )
 
 
 def _section_drawing(results: Mapping[str, Result]) -> Drawing:
+    """Draw a section of the test without and with compensation."""
     figure, axes = sheet(3, 1, height=2.3)
     section = results["calibrated-nominal"]
     time = np.asarray(section["time"])
@@ -132,25 +136,29 @@ def _section_drawing(results: Mapping[str, Result]) -> Drawing:
 
 
 def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
-    """Time (s), force error and motor force (N) after friction turns at 0, with an integral force
-    loop alone (Fig. 4.14): step one of `first` times the jump at 4 ms, step two back to the jump
-    `wait` s later, or never."""
+    """Simulate a two-step compensation with an integral force loop alone (Fig. 4.14).
+
+    Friction reverses at t = 0. The first step, `first` times the jump, comes at 4 ms. The second
+    one, back to the jump, follows `wait` seconds later, or never if None.
+
+    Returns time, s, force error, N, and motor force, N, all of shape (900,).
+    """
     period, gain, jump = 1e-4, 40.0, 28.0
     motor, integral = 0.0, 0.0
     time = (np.arange(900) - 50) * period
     error, force = np.empty(900), np.empty(900)
     for tick, now in enumerate(time):
-        felt = motor - (jump if now >= 0 else 0.0)
-        error[tick], force[tick] = -felt, motor
-        added = (
-            0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
-        )
-        integral -= gain * felt * period
-        motor += (integral + added - motor) * period / MOTOR_LAG
+        force_at_mass = motor - (jump if now >= 0 else 0.0)
+        error[tick], force[tick] = -force_at_mass, motor
+        step = 0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
+        # Explicit Euler with 0.1 ms: the motor's lag and the loop are far slower.
+        integral -= gain * force_at_mass * period
+        motor += (integral + step - motor) * period / MOTOR_LAG
     return time, error, force
 
 
 def _two_step_drawing() -> Drawing:
+    """Draw the effect of the second step's time and of the first step's size."""
     figure, axes = sheet(1, 3, height=3.0)
     cases = (
         ("step two after 1 ms", 2.0, IN_TIME, SENSED),
@@ -177,6 +185,7 @@ def _two_step_drawing() -> Drawing:
 
 
 def _bars(results: Mapping[str, Result]) -> Drawing:
+    """Draw the errors of the compensators as bars, for both force loops."""
     figure, axes = sheet(1, 2, height=3.4)
     names = (
         "none",
@@ -188,9 +197,9 @@ def _bars(results: Mapping[str, Result]) -> Drawing:
     )
     for axis, loop in zip(axes[0], ("nominal", "fitted"), strict=True):
         for number, name in enumerate(names):
-            found = errors_of(results, loop, name)
+            errors = errors_of(results, loop, name)
             tracking, numerical = (
-                float(np.median(found[key])) for key in ("tracking", "numerical")
+                float(np.median(errors[key])) for key in ("tracking", "numerical")
             )
             axis.barh(number, tracking, color=SENSED, label="tracking e2" if number == 0 else None)
             axis.barh(

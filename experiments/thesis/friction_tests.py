@@ -1,5 +1,4 @@
-"""The tests of chapter 4 on the twin: what a compensator leaves of the force errors, and steps made
-at known times."""
+"""Tests of chapter 4 on the twin: force errors with a compensator, and steps at known times."""
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ from controllers import (
 from controllers.force import MOTOR_CONSTANT
 from experiments import find
 from experiments.experiment import time_of
-from experiments.thesis.identification import hydraulic
+from experiments.thesis.identification import thesis_cylinder
 from experiments.thesis.study import Result
 from experiments.thesis.trial import Trial, trial
 from rigtwin.description.configuration import Configuration
@@ -47,60 +46,72 @@ LOOPS: dict[str, dict[str, float]] = {
     "fitted": {"kp": 1.0, "ki": 190.0},
     "nominal": {"kp": 0.3, "ki": 10.0},
 }
-"""Gains of the force loop. The thesis gives none: `nominal` are those with which the twin shows
-Table 3.5, `fitted` those with which it shows the first row of Table 4.1; the rows below are then
-predictions."""
+"""Gains of the force loop, K_p and K_i (1/s). The thesis gives none.
+
+With `nominal` the twin reproduces Table 3.5. With `fitted` it reproduces the first row of Table
+4.1, so the rows below that one are predictions.
+"""
 CALIBRATION_SEED = 1000
-"""Of the recording that the compensator is calibrated on; no other test uses it."""
+"""Seed of the recording for the calibration. No other test uses it."""
 AFTER = 0.04
-"""s after a reversal within which a spike's peak is looked for."""
+"""Time after a reversal within which the peak of a spike is searched, s."""
 
 
-def compensated(seed: int, **settings: object) -> Trial:
-    """The road test of chapter 4 with some controller settings changed."""
+def run_compensated(seed: int, **settings: object) -> Trial:
+    """Run the road test of chapter 4 with some controller settings changed."""
     return trial(
         "friction-road", seed, lambda c: c._replace(controller=c.controller._replace(**settings))
     )
 
 
 def errors(test: Trial) -> dict[str, float]:
-    """rms tracking and numerical error (N) of the force that is felt, and the mean size of the
-    friction spikes (N) in the force as the controller sees it, through its filter."""
-    asked = test.ran.commands[:, 2]
+    """Return the force errors of a test, N.
+
+    `tracking` is the rms of demanded minus true force, `numerical` that of ideal minus demanded
+    force. `spike` is the mean size of the friction spikes in the filtered force that the
+    controller sees.
+    """
+    asked = test.simulation.commands[:, 2]
     return {
         "tracking": rms(asked - test.force),
-        "numerical": rms(test.should.force - asked),
+        "numerical": rms(test.ideal.force - asked),
         "spike": float(np.mean(spikes(test))),
     }
 
 
 def spikes(test: Trial) -> Array:
-    """How far the filtered force error shoots at every reversal that stands alone, N: its peak
-    after it, towards the new direction, less what it was before."""
+    """Return the size of the friction spike at every isolated reversal, N, shape (reversals,).
+
+    A spike is the peak of the filtered force error in the new direction, minus the mean before the
+    reversal.
+    """
     settings, period = test.configuration.controller, test.configuration.timing.period
+    # The true travel, lightly smoothed: quantisation would add reversals.
     velocity = np.gradient(gaussian_filter1d(test.travel, 2), period)
-    turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
-    wide = round(AFTER / period)
-    turns = turns[
-        (np.diff(turns, prepend=-wide) > wide)
-        & (np.diff(turns, append=len(velocity) + wide) > wide)
+    reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    window = round(AFTER / period)
+    reversals = reversals[
+        (np.diff(reversals, prepend=-window) > window)
+        & (np.diff(reversals, append=len(velocity) + window) > window)
     ]
-    turns = turns[(turns > 1000) & (turns < len(velocity) - wide)]
-    felt = filter_lag(np.ascontiguousarray(test.force), settings.filter_force, period)
-    error = test.ran.commands[:, 2] - felt
-    directions = np.sign(velocity[turns + 3])
-    before = np.array([np.mean(error[turn - 15 : turn - 3]) for turn in turns])
+    # The first second and the end have no complete surroundings.
+    reversals = reversals[(reversals > 1000) & (reversals < len(velocity) - window)]
+    filtered = filter_lag(np.ascontiguousarray(test.force), settings.filter_force, period)
+    error = test.simulation.commands[:, 2] - filtered
+    # Three ticks later the sign is safe: at the reversal itself the velocity is zero.
+    directions = np.sign(velocity[reversals + 3])
+    before = np.array([np.mean(error[reversal - 15 : reversal - 3]) for reversal in reversals])
     peaks = np.array(
         [
-            np.max(way * error[turn - 3 : turn + wide])
-            for turn, way in zip(turns, directions, strict=True)
+            np.max(direction * error[reversal - 3 : reversal + window])
+            for reversal, direction in zip(reversals, directions, strict=True)
         ]
     )
     return peaks - directions * before
 
 
-def calibration(loop: str) -> tuple[Calibration, dict[str, float]]:
-    """The compensator calibrated on a recording without compensation, and its settings by name."""
+def calibrate(loop: str) -> tuple[Calibration, dict[str, float]]:
+    """Return the compensator calibrated on a recording without compensation, and its settings."""
     experiment = find("friction-road")
     configuration = experiment.configuration
     configuration = configuration._replace(
@@ -110,28 +121,32 @@ def calibration(loop: str) -> tuple[Calibration, dict[str, float]]:
         path = Path(folder) / "friction-road.mcap"
         demands = experiment.demands(configuration, CALIBRATION_SEED)
         record(path, "friction-road", configuration, demands, CALIBRATION_SEED)
-        found = find_compensator(load(path), configuration.controller)
-    return found, {
-        name: float(getattr(found.settings, name)) for name in (*BOUNDS, "friction_step")
+        calibration = find_compensator(load(path), configuration.controller)
+    return calibration, {
+        name: float(getattr(calibration.settings, name)) for name in (*BOUNDS, "friction_step")
     }
 
 
-def rows(loop: str, variants: Mapping[str, Mapping[str, object]], seed: int) -> dict[str, float]:
-    """Errors of every variant of the settings, `variant/error`."""
-    found: dict[str, float] = {}
+def variant_errors(
+    loop: str, variants: Mapping[str, Mapping[str, object]], seed: int
+) -> dict[str, float]:
+    """Return the errors of every variant of the settings, N, by `variant/error`."""
+    table: dict[str, float] = {}
     for name, settings in variants.items():
-        found |= {
+        table |= {
             f"{name}/{key}": value
-            for key, value in errors(compensated(seed, **LOOPS[loop], **settings)).items()
+            for key, value in errors(run_compensated(seed, **LOOPS[loop], **settings)).items()
         }
-    return found
+    return table
 
 
-def calibrated_rows(
-    loop: str, found: Calibration, settings: Mapping[str, float], seeds: int
+def calibrated_errors(
+    loop: str, calibration: Calibration, settings: Mapping[str, float], seeds: int
 ) -> Result:
-    """What the calibration found, and the errors with it for every seed: arrays of shape
-    (seeds,)."""
+    """Return the results of a calibration, and the errors with it for every seed.
+
+    The errors are arrays of shape (seeds,), in N; the other values are numbers.
+    """
     variants = {
         kind.label: {"compensator": kind, **settings}
         for kind in (
@@ -141,79 +156,98 @@ def calibrated_rows(
             Compensator.FORCE_THRESHOLD,
         )
     }
-    table = [rows(loop, variants, seed) for seed in range(seeds)]
+    table = [variant_errors(loop, variants, seed) for seed in range(seeds)]
     result: dict[str, Array | float] = {
         name: np.array([row[name] for row in table]) for name in table[0]
     }
     result |= {f"setting {name}": value for name, value in settings.items()}
     result |= {
-        "envelope": found.envelope,
-        "friction": found.friction,
-        "reversals": float(found.reversals),
+        "envelope": calibration.envelope,
+        "friction": calibration.friction,
+        "reversals": float(calibration.reversals),
     }
     return result | {
-        "detected": float(found.detected),
-        "false": float(found.false),
-        "delay": found.delay,
+        "detected": float(calibration.detected),
+        "false": float(calibration.false),
+        "delay": calibration.delay,
     }
 
 
 def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Configuration, Array]:
-    """Constant force while the plate moves by a sine (Hz, m of the plate itself): configuration and
-    demands."""
+    """Return configuration and demands of a constant force on a sine motion of the plate.
+
+    frequency: Hz; amplitude: of the plate itself, m; seconds: length of the test.
+    """
     settings = Settings(
         mode=Mode.IMPOSED, filter_force=0.004, filter_velocity=0.0064, filter_position=0.004
     )._replace(**LOOPS["fitted"])
     configuration = Configuration(controller=settings, timing=Timing(duration=seconds))
     time = time_of(configuration)
-    command = amplitude / abs(hydraulic(np.array([frequency]))[0])
-    # It swings about where it starts, gently set going.
-    moved = settings.start + command * fade_in(time) * np.sin(2 * math.pi * frequency * time)
-    return configuration, np.column_stack([np.zeros_like(time), moved, np.full_like(time, 220.0)])
+    # The cylinder attenuates: the command is larger by 1/|H| of thesis Eq. 6.2.
+    command = amplitude / abs(thesis_cylinder(np.array([frequency]))[0])
+    # The motion is about the starting position and fades in, so it excites no transient.
+    position = settings.start + command * fade_in(time) * np.sin(2 * math.pi * frequency * time)
+    return configuration, np.column_stack(
+        [np.zeros_like(time), position, np.full_like(time, 220.0)]
+    )
 
 
-def detected(
+def detect_reversals(
     frequency: float, amplitude: float, seconds: float, seed: int, **settings: float
 ) -> Result:
-    """How many reversals of a sine motion the detector sees, no step being made (Fig. 4.8, 4.9)."""
+    """Return how well the detector finds the reversals of a sine motion (Fig. 4.8, 4.9).
+
+    No compensating step is made. `reversals`, `seen` and `false` are counts, `delay` the median
+    delay of a detection, s, or NaN if there is none.
+    """
     configuration, demands = sine_test(frequency, amplitude, seconds)
     ran = simulate(configuration, demands, seed)
     period = configuration.timing.period
+    # The detector runs over the recorded signals, so its steps do not change the motion.
     tuned = configuration.controller._replace(compensator=Compensator.ONE_STEP, **settings)
     steps = detections(
         tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period
     )
     velocity = np.gradient(gaussian_filter1d(ran.truth[:, 2], 2), period)
-    turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
-    turns = turns[turns > 1000]
-    directions = np.sign(velocity[turns + 3])
-    made = np.flatnonzero(steps)
+    reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    reversals = reversals[reversals > 1000]
+    directions = np.sign(velocity[reversals + 3])
+    detection_ticks = np.flatnonzero(steps)
     seen = [
-        bool(np.any(steps[t - 2 : t + 40] == way)) for t, way in zip(turns, directions, strict=True)
+        bool(np.any(steps[turn - 2 : turn + 40] == direction))
+        for turn, direction in zip(reversals, directions, strict=True)
     ]
     delays = [
-        np.flatnonzero(steps[t - 2 : t + 40] == way)[0] - 2
-        for t, way, s in zip(turns, directions, seen, strict=True)
+        np.flatnonzero(steps[turn - 2 : turn + 40] == direction)[0] - 2
+        for turn, direction, s in zip(reversals, directions, seen, strict=True)
         if s
     ]
-    near = np.array(
-        [np.min(np.abs(turns - tick)) if len(turns) else 10**9 for tick in made[made > 1000]]
+    # A detection further than 40 ticks from every reversal is false.
+    distances = np.array(
+        [
+            np.min(np.abs(reversals - tick)) if len(reversals) else 10**9
+            for tick in detection_ticks[detection_ticks > 1000]
+        ]
     )
     return {
-        "reversals": float(len(turns)),
+        "reversals": float(len(reversals)),
         "seen": float(np.sum(seen)),
-        "false": float(np.sum(near > 40)),
+        "false": float(np.sum(distances > 40)),
         "delay": float(np.median(delays)) * period if delays else math.nan,
     }
 
 
-def timed(offset: float | None, seed: int = 0) -> Result:
-    """Constant force on a 1 Hz motion with a step of twice the Coulomb force `offset` s after every
-    reversal, known in advance; None for no step (Fig. 4.6)."""
+def run_timed_steps(offset: float | None, seed: int = 0) -> Result:
+    """Run a constant force on a 1 Hz motion, with friction steps at known times (Fig. 4.6).
+
+    The step of twice the Coulomb force is made `offset` seconds after every reversal. None makes
+    no step.
+    """
     configuration, demands = sine_test(1.0, 0.02, 4.0)
     period = configuration.timing.period
-    free = simulate(configuration, demands, seed)
-    velocity = np.gradient(gaussian_filter1d(free.truth[:, 2], 2), period)
+    # A first run without steps gives the times of the reversals in advance.
+    uncompensated = simulate(configuration, demands, seed)
+    velocity = np.gradient(gaussian_filter1d(uncompensated.truth[:, 2], 2), period)
     levels = np.sign(velocity)
     if offset is not None:
         shift = round(offset / period)
@@ -228,6 +262,7 @@ def timed(offset: float | None, seed: int = 0) -> Result:
     for tick, demand in enumerate(demands):
         state, commands = update(controlling, state, twin.read(), Demand(*demand.tolist()))
         error[tick] = commands.force - twin.truth.load_cell
+        # ± 14 N, the Coulomb friction of the motor, is a step of twice that force at a reversal.
         added = 0.0 if offset is None else 14.0 * levels[tick]
         twin.write(
             Commands(
@@ -237,6 +272,7 @@ def timed(offset: float | None, seed: int = 0) -> Result:
                 commands.voltage + added / MOTOR_CONSTANT,
             )
         )
+    # The fade-in of the motion is over after 1.5 s.
     late = slice(1500, None)
     return {
         "time": np.arange(len(error))[late] * period,

@@ -1,4 +1,4 @@
-"""An aircraft's quarter on a gas spring that touches down: thesis Eq. 3.4 and 3.5."""
+"""Touch-down of a quarter aircraft on a gas spring: thesis Eq. 3.4 and 3.5."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ _LIFT = "the wings carry the aircraft at touch-down and let go within a second, 
 
 
 class Landing(NamedTuple):
-    """A quarter car with a gas spring that touches down: thesis Eq. 3.4 and 3.5, with the exponent
-    that they lack, a tyre that stands on the ground and only pushes, the wheel's weight, and a stop
-    where the strut is fully extended."""
+    """Parameters of a quarter aircraft that touches down: thesis Eq. 3.4 and 3.5, corrected.
+
+    The equations lack the exponent γ of the gas and the weight of the wheel. Here the tyre stands
+    on the ground and only pushes, and a stop limits the extension of the strut. Units and sources
+    stand in the types.
+    """
 
     sprung_mass: Annotated[float, Quantity("kg", 1.0, 1e6, _TABLE)] = 68_210.0
     unsprung_mass: Annotated[float, Quantity("kg", 0.1, 1e5, _TABLE)] = 1140.0
@@ -44,23 +47,39 @@ class Landing(NamedTuple):
 
     @property
     def spring(self) -> GasSpring:
+        """Gas spring of the strut."""
         return GasSpring(self.gas_force, self.gas_length, self.exponent)
 
 
 def touch_down(landing: Landing, instants: Array) -> Array:
-    """Compression of the strut, m, velocity of the sprung mass, m/s, force of gas and damper, N;
-    shape (3, instants)."""
+    """Simulate a touch-down.
+
+    Parameters
+    ----------
+    landing : Landing
+        Parameters of the aircraft.
+    instants : ndarray
+        Times after the touch-down, s, shape (n,), ascending from 0.
+
+    Returns
+    -------
+    ndarray
+        Compression of the strut, m, velocity of the sprung mass, m/s, and force of gas spring and
+        damper, N, shape (3, n).
+    """
     spring, weight = landing.spring, landing.sprung_mass + landing.unsprung_mass
 
-    def between(travel: float, speed: float) -> float:
+    def strut_force(travel: float, speed: float) -> float:
         return spring_force(spring, travel) + landing.damping * speed
 
-    def change(time: float, state: Array) -> list[float]:
+    def derivative(time: float, state: Array) -> list[float]:
+        # Heights above the ground at touch-down, m; both masses start with the sinking speed.
         body, wheel, body_velocity, wheel_velocity = state.tolist()
-        strut = between(
+        strut = strut_force(
             wheel - body, wheel_velocity - body_velocity
         ) + landing.stop_stiffness * min(wheel - body, 0.0)
         lift = landing.lift * weight * landing.gravity * math.exp(-time / landing.lift_time)
+        # The tyre lifts off the ground instead of pulling on it.
         tyre = max(-landing.tyre_stiffness * wheel, 0.0)
         return [
             body_velocity,
@@ -69,19 +88,20 @@ def touch_down(landing: Landing, instants: Array) -> Array:
             (tyre - strut) / landing.unsprung_mass - landing.gravity,
         ]
 
-    # In flight the gas presses the wheel, and its weight pulls it, against the stop.
+    # In flight the gas force and the weight of the wheel hold the strut against its stop.
     hanging = (landing.gas_force + landing.unsprung_mass * landing.gravity) / (
         landing.stop_stiffness + stiffness(spring, 0.0)
     )
     start = [hanging, 0.0, -landing.velocity, -landing.velocity]
     span = (float(instants[0]), float(instants[-1]))
-    run = solve_ivp(
-        change, span, start, "DOP853", instants, rtol=1e-9, atol=1e-11, max_step=span[1] / 100.0
+    # The stop and the tyre make the forces non-smooth; the step limit keeps them from being missed.
+    solution = solve_ivp(
+        derivative, span, start, "DOP853", instants, rtol=1e-9, atol=1e-11, max_step=span[1] / 100.0
     )
-    body, wheel, body_velocity, wheel_velocity = run.y
+    body, wheel, body_velocity, wheel_velocity = solution.y
     travel = wheel - body
-    pushed = [
-        between(x, v)
+    forces = [
+        strut_force(x, v)
         for x, v in zip(travel.tolist(), (wheel_velocity - body_velocity).tolist(), strict=True)
     ]
-    return np.array([travel, body_velocity, pushed])
+    return np.array([travel, body_velocity, forces])

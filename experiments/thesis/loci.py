@@ -1,5 +1,4 @@
-"""The sweeps of the thesis' root loci (§5.2, appendix A), what it says of them, and how they are
-drawn."""
+"""Root loci of the thesis (§5.2, appendix A): the sweeps, the claims about them, the drawings."""
 
 from __future__ import annotations
 
@@ -18,15 +17,24 @@ from rigtwin.studies.stability.locus import Locus, Setting
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 ARBITRARY = QuarterCar(500.0, 0.0, 50.0, 500.0, 100.0, 50.0)
-"""The values that the thesis keeps while others are varied, `chosen arbitrarily` (Tables 5.3, 5.7,
-A1.1 to A3.5)."""
+"""Constant parameters of the sweeps, `chosen arbitrarily` (Tables 5.3, 5.7, A1.1 to A3.5)."""
 POINTS = 500
+"""Number of values in a sweep."""
 
 
 @dataclass(frozen=True)
 class Variation:
-    """One parameter swept from start to end. symbol, unit: of it, for labels; at: what each of its
-    values means."""
+    """A parameter swept from start to end.
+
+    Attributes
+    ----------
+    symbol, unit : str
+        Symbol and unit for labels.
+    start, end : float
+        First and last value of the sweep.
+    at : callable
+        Function of a value that returns the vehicle and the lag.
+    """
 
     symbol: str
     unit: str
@@ -36,13 +44,16 @@ class Variation:
 
 
 def of_lag(ratio: float) -> Variation:
-    """τ from 1 ms to 1 s at a damping ratio of the sprung mass."""
+    """Return a sweep of the lag τ from 1 ms to 1 s at a damping ratio of the sprung mass."""
     car = ARBITRARY._replace(suspension_damping=damping(ratio, ARBITRARY.suspension_stiffness))
     return Variation("τ", "s", 1e-3, 1.0, lambda lag: Setting(car, lag))
 
 
 def of_natural_frequency(ratio: float, lag: float, end: float) -> Variation:
-    """The suspension's stiffness from 1 N/m, mass and damping ratio kept."""
+    """Return a sweep of the suspension stiffness from 1 N/m to `end`.
+
+    Mass and damping ratio stay constant, so the natural frequency √(k_s/m_s) varies alone.
+    """
 
     def at(stiffness: float) -> Setting:
         car = ARBITRARY._replace(
@@ -54,8 +65,10 @@ def of_natural_frequency(ratio: float, lag: float, end: float) -> Variation:
 
 
 def of_damping_ratio(lag: float) -> Variation:
-    """Stiffness N/m and mass kg of the suspension from 1 to 100 000 together: the damping ratio
-    falls from 50 to 0.0005."""
+    """Return a sweep of k_s = m_s from 1 to 100 000 (N/m, kg).
+
+    The natural frequency stays at 1 rad/s while the damping ratio falls from 50 to 0.0005.
+    """
     return Variation(
         "k_s = m_s",
         "N/m, kg",
@@ -66,6 +79,7 @@ def of_damping_ratio(lag: float) -> Variation:
 
 
 def of_tyre_stiffness(lag: float) -> Variation:
+    """Return a sweep of the tyre stiffness from 0.01 to 100 000 N/m at a lag, s."""
     return Variation(
         "k_t",
         "N/m",
@@ -76,41 +90,75 @@ def of_tyre_stiffness(lag: float) -> Variation:
 
 
 def of_wheel_mass(lag: float) -> Variation:
+    """Return a sweep of the wheel's mass from 0.01 to 100 000 kg at a lag, s."""
     return Variation(
         "m_u", "kg", 0.01, 1e5, lambda mass: Setting(ARBITRARY._replace(unsprung_mass=mass), lag)
     )
 
 
 def damping(ratio: float, stiffness: float) -> float:
-    """Ns/m, of the sprung mass's damping ratio (Eq. 5.34)."""
+    """Return the suspension damping b = 2 ζ √(k m), Ns/m (Eq. 5.34)."""
     return 2.0 * ratio * math.sqrt(stiffness * ARBITRARY.sprung_mass)
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the thesis says of a locus. where: `Figure A1.3`; says: its words, shortened; judge: of
-    the locus, whether it holds and what was found; note: which of two contradicting passages is
-    right."""
+    """A statement of the thesis about a locus.
+
+    Attributes
+    ----------
+    where : str
+        Figure that the statement is about, such as `Figure A1.3`.
+    topic : str
+        Subject of the statement.
+    words : str
+        Statement, shortened.
+    judge : callable
+        Judge of the locus, see `experiments.thesis.judges`.
+    note : str
+        Correct one of two contradictory passages.
+    """
 
     where: str
-    what: str
-    says: str
+    topic: str
+    words: str
     judge: Callable[[Locus], tuple[bool, str]]
     note: str = ""
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure of the thesis. name: `A1.3`; view: the part of the plane shown, 1/s and rad/s, as
-    (left, right, height)."""
+    """A figure of the thesis.
+
+    Attributes
+    ----------
+    name : str
+        Number of the figure, such as `A1.3`.
+    view : tuple of float, optional
+        Shown part of the plane: left and right, 1/s, and height, rad/s. Defaults to all poles.
+    """
 
     name: str
     view: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
-class Case:
-    """A sweep of a model, the figures that show it, and what is said of it."""
+class LocusCase:
+    """A sweep of a model, with the figures and statements of the thesis.
+
+    Attributes
+    ----------
+    model : str
+        Model, such as `suspension`.
+    title : str
+        Case and its values.
+    variation : Variation
+        Swept parameter.
+    panels : tuple of Panel
+        Figures that show the sweep.
+    claims : tuple of Claim
+        Statements about it.
+    """
 
     model: str
     title: str
@@ -120,31 +168,39 @@ class Case:
 
     @property
     def locus(self) -> Locus:
+        """Root locus of the model over the sweep."""
         return locus(self.model, self.variation)
 
     def entries(self) -> list[Entry]:
-        """Each claim beside what was found."""
-        found = []
+        """Return an entry for each claim, with the finding of its judge."""
+        entries = []
         for claim in self.claims:
             holds, words = claim.judge(self.locus)
-            found.append(
+            entries.append(
                 statement(
-                    claim.where, f"{claim.what}, {self.title}", claim.says, holds, words, claim.note
+                    claim.where,
+                    f"{claim.topic}, {self.title}",
+                    claim.words,
+                    holds,
+                    words,
+                    claim.note,
                 )
             )
-        return found
+        return entries
 
 
 @cache
 def locus(model: str, variation: Variation) -> Locus:
-    """The root locus of a model over a variation, in equal ratios. Kept, since others are compared
-    with it."""
+    """Return the root locus of a model over a variation, in steps of equal ratio.
+
+    Loci are cached, because several judges compare a locus with others.
+    """
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), POINTS)
     return Locus(model, values, variation.at)
 
 
-def drawing(name: str, covers: str, caption: str, cases: Sequence[Case]) -> Drawing:
-    """All panels of the cases on one sheet."""
+def drawing(name: str, covers: str, caption: str, cases: Sequence[LocusCase]) -> Drawing:
+    """Return a drawing with all panels of some cases."""
     panels = [(case, panel) for case in cases for panel in case.panels]
     columns = 2 if len(panels) in (2, 4) else 3
     figure, axes = sheet(math.ceil(len(panels) / columns), columns, width=4.0 * columns, height=3.6)
@@ -157,32 +213,49 @@ def drawing(name: str, covers: str, caption: str, cases: Sequence[Case]) -> Draw
     return Drawing(name, covers, caption, figure)
 
 
-def _draw(axis: Axes, case: Case, panel: Panel) -> None:
-    found, variation = case.locus, case.variation
-    share = np.linspace(0.0, 1.0, len(found.values))
+def _draw(axis: Axes, case: LocusCase, panel: Panel) -> None:
+    """Draw one panel of a case."""
     axis.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     axis.axvline(0.0, color="0.3", linewidth=0.8, zorder=0)
-    ideal = found.ideal
-    # A lag does not move the ideal poles: there they are points among the others, and are drawn as
-    # such.
+    _draw_ideal_poles(axis, case.locus)
+    _draw_poles(axis, case.locus)
+    if panel.view is not None:
+        lowest, highest, height = panel.view
+        axis.set_xlim(lowest, highest)
+        axis.set_ylim(-height, height)
+    axis.set_title(f"Figure {panel.name}: {case.title}", fontsize=8)
+    _annotate(axis, case)
+    axis.set_xlabel("real part, 1/s", fontsize=8)
+    axis.set_ylabel("imaginary part, rad/s", fontsize=8)
+
+
+def _draw_ideal_poles(axis: Axes, locus: Locus) -> None:
+    """Draw the poles of the ideal system, grey."""
+    ideal = locus.ideal
+    # A sweep of the lag does not move the ideal poles: they are drawn as single points.
     if np.allclose(ideal, ideal[0]):
         axis.plot(
             ideal[0].real, ideal[0].imag, "+", color="0.35", markersize=10, label="ideal", zorder=5
         )
-    else:
-        axis.plot(
-            ideal.real.ravel(),
-            ideal.imag.ravel(),
-            ".",
-            color="0.65",
-            markersize=4,
-            label="ideal",
-            zorder=1,
-        )
-    colours = np.repeat(share, found.poles.shape[1])
+        return
+    axis.plot(
+        ideal.real.ravel(),
+        ideal.imag.ravel(),
+        ".",
+        color="0.65",
+        markersize=4,
+        label="ideal",
+        zorder=1,
+    )
+
+
+def _draw_poles(axis: Axes, locus: Locus) -> None:
+    """Draw the poles along the sweep, its ends, and the crossings of the imaginary axis."""
+    # Dark at the start, light at the end; vmax leaves out the palest colours of the map.
+    colours = np.repeat(np.linspace(0.0, 1.0, len(locus.values)), locus.poles.shape[1])
     axis.scatter(
-        found.poles.real.ravel(),
-        found.poles.imag.ravel(),
+        locus.poles.real.ravel(),
+        locus.poles.imag.ravel(),
         s=2.0,
         c=colours,
         cmap="viridis",
@@ -192,8 +265,8 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
     )
     for row, marker, label in ((0, "o", "start of the sweep"), (-1, "s", "its end")):
         axis.plot(
-            found.poles[row].real,
-            found.poles[row].imag,
+            locus.poles[row].real,
+            locus.poles[row].imag,
             marker,
             color="black",
             markerfacecolor="none",
@@ -202,7 +275,8 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
             label=label,
             zorder=3,
         )
-    heights = [sign * crossing.frequency for crossing in found.crossings for sign in (1.0, -1.0)]
+    # Poles come in conjugate pairs, so both crossings of a pair are marked.
+    heights = [sign * crossing.frequency for crossing in locus.crossings for sign in (1.0, -1.0)]
     axis.plot(
         [0.0] * len(heights),
         heights,
@@ -212,12 +286,12 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
         label="crossing",
         zorder=4,
     )
-    if panel.view is not None:
-        left, right, height = panel.view
-        axis.set_xlim(left, right)
-        axis.set_ylim(-height, height)
-    axis.set_title(f"Figure {panel.name}: {case.title}", fontsize=8)
-    values = ", ".join(dict.fromkeys(f"{crossing.value:.4g}" for crossing in found.crossings))
+
+
+def _annotate(axis: Axes, case: LocusCase) -> None:
+    """Write the range of the sweep and the values of the crossings into a panel."""
+    variation = case.variation
+    values = ", ".join(dict.fromkeys(f"{crossing.value:.4g}" for crossing in case.locus.crossings))
     sweep = f"{variation.symbol} {variation.start:g} to {variation.end:g} {variation.unit}"
     crossing = f"\ncrossing at {values}" if values else "\nno crossing"
     box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 1.5}
@@ -231,11 +305,10 @@ def _draw(axis: Axes, case: Case, panel: Panel) -> None:
         zorder=6,
         bbox=box,
     )
-    axis.set_xlabel("real part, 1/s", fontsize=8)
-    axis.set_ylabel("imaginary part, rad/s", fontsize=8)
 
 
 def _legend(figure: Figure, axis: Axes) -> None:
+    """Draw one legend for all panels below the figure."""
     handles, labels = axis.get_legend_handles_labels()
     figure.legend(
         handles,

@@ -1,5 +1,4 @@
-"""§5.3 to §5.7: the stability of the quarter car with suspension MIL, vehicle structure MIL and
-both."""
+"""§5.3 to §5.7: stability of the quarter car with suspension MIL, structure MIL, and both."""
 
 from __future__ import annotations
 
@@ -28,12 +27,22 @@ from rigtwin.studies.stability.models import MODELS, poles
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 STRUCTURE_LAG = 0.06895
-"""s, of Tables 5.7 to 5.12: critical for the first column of each."""
+"""Lag of Tables 5.7 to 5.12, s. It is the critical lag of the first column of each table."""
 
 
 class Column(NamedTuple):
-    """A column of a table: what it changes, and the real parts printed, 1/s. Where the table prints
-    0, the digits of its other columns are written."""
+    """A column of a table.
+
+    Attributes
+    ----------
+    changes : mapping
+        Parameters that differ from `ARBITRARY`.
+    body, wheel : str
+        Printed real parts of body hop and wheel hop, 1/s. A printed 0 is written with the digits
+        of the other columns.
+    note : str
+        Reason for a difference.
+    """
 
     changes: Mapping[str, float]
     body: str
@@ -87,8 +96,11 @@ TABLE_5_13 = {
     "structure": "arrrra",
     "combined": "arrrra",
 }
-"""Model → stable (a) or unstable (r) at low and high sprung natural frequency, damping ratio,
-unsprung natural frequency."""
+"""Model → printed stability at the ends of three sweeps: `a` stable, `r` unstable, `-` no value.
+
+The letters stand for low and high sprung natural frequency, damping ratio and unsprung natural
+frequency, in this order.
+"""
 COLUMNS_5_13 = tuple(
     f"{end} {what}"
     for what in ("sprung natural frequency", "damping ratio", "unsprung natural frequency")
@@ -96,13 +108,14 @@ COLUMNS_5_13 = tuple(
 )
 
 
-def _real_part(model: str, car: QuarterCar, lag: float, wanted: str) -> float:
-    """Of the slowest oscillating pole of that mode, 1/s."""
-    found = poles(MODELS[model](car, lag)).tolist()
-    return max(pole.real for pole in found if pole.imag > 0.0 and mode(car, pole) == wanted)
+def _real_part(model: str, car: QuarterCar, lag: float, mode_name: str) -> float:
+    """Return the largest real part of the oscillating poles of a mode, 1/s."""
+    car_poles = poles(MODELS[model](car, lag)).tolist()
+    return max(pole.real for pole in car_poles if pole.imag > 0.0 and mode(car, pole) == mode_name)
 
 
 def _tables() -> list[Entry]:
+    """Return the entries of Tables 5.6 to 5.12: real parts at the critical lag."""
     entries = []
     for number, column in enumerate(TABLE_5_6, 1):
         car = ARBITRARY._replace(**column.changes)
@@ -123,7 +136,7 @@ def _tables() -> list[Entry]:
             ours = _real_part(
                 "structure", ARBITRARY._replace(**column.changes), STRUCTURE_LAG, BODY
             )
-            what = (
+            changes = (
                 ", ".join(
                     f"{name.replace('_', ' ')} {value:g}" for name, value in column.changes.items()
                 )
@@ -131,7 +144,11 @@ def _tables() -> list[Entry]:
             )
             entries.append(
                 digits(
-                    table, f"column {number}, {what}, body hop, real part", column.body, ours, "1/s"
+                    table,
+                    f"column {number}, {changes}, body hop, real part",
+                    column.body,
+                    ours,
+                    "1/s",
                 )
             )
     critical = structure_lag()
@@ -142,16 +159,16 @@ def _tables() -> list[Entry]:
 
 
 def _table_5_13() -> list[Entry]:
-    """Ticks and crosses, each at an end of a sweep; of the unsprung frequency by the tyre and by
-    the wheel's mass."""
+    """Return the entries of Table 5.13: stability at the ends of the sweeps."""
     entries = []
     for model, printed in TABLE_5_13.items():
         for column, name, cell in zip(range(6), COLUMNS_5_13, printed, strict=True):
             if cell == "-":
                 continue
-            found = [not each.unstable_modes(value) for each, value in _ends(model, column)]
+            # Tyre stiffness and wheel mass both sweep the unsprung frequency, and must agree.
+            stabilities = [not each.unstable_modes(value) for each, value in _ends(model, column)]
             words = " and ".join(
-                "stable" if stable else "unstable" for stable in dict.fromkeys(found)
+                "stable" if stable else "unstable" for stable in dict.fromkeys(stabilities)
             )
             says = "stable" if cell == "a" else "unstable"
             entries.append(
@@ -159,7 +176,7 @@ def _table_5_13() -> list[Entry]:
                     "Table 5.13",
                     f"{model} MIL, {name}",
                     says,
-                    all(each == (cell == "a") for each in found),
+                    all(each == (cell == "a") for each in stabilities),
                     words,
                 )
             )
@@ -167,14 +184,14 @@ def _table_5_13() -> list[Entry]:
 
 
 def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
-    """The sweeps that a column of Table 5.13 sums up, and the end of each that it speaks of."""
+    """Return the sweeps that a column of Table 5.13 summarises, with the value at its end."""
     frequency, ratio = (
         of_natural_frequency(1.0, SUSPENSION_LAG, 1e5),
         of_damping_ratio(SUSPENSION_LAG),
     )
     tyre, wheel = of_tyre_stiffness(SMALL_LAG), of_wheel_mass(SMALL_LAG)
-    # The damping ratio falls, and the unsprung frequency falls with the wheel's mass, as the swept
-    # value rises.
+    # True selects the end of a sweep. The damping ratio falls as its swept value rises, and so does
+    # the unsprung frequency with the mass of the wheel.
     chosen: tuple[tuple[tuple[Variation, bool], ...], ...] = (
         ((frequency, False),),
         ((frequency, True),),
@@ -190,7 +207,7 @@ def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    """Tables 5.6 to 5.13 and the text around them."""
+    """Return the entries of Tables 5.6 to 5.13 and of the text around them."""
     return Conclusion([*_tables(), *_table_5_13(), *statements()], (), REMARKS)
 
 

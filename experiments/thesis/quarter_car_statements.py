@@ -1,5 +1,4 @@
-"""§5.3 to §5.6: what the text says of the quarter car's critical lag and of the mode that crosses
-first."""
+"""Statements of §5.3 to §5.6: critical lag of the quarter car, and the mode that crosses first."""
 
 from __future__ import annotations
 
@@ -15,26 +14,31 @@ from rigtwin.studies.stability.loop import LOOPS
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 SUSPENSION_LAG = 0.2
-"""s, critical for suspension MIL (Table 5.6)."""
+"""Critical lag of suspension MIL, s (Table 5.6)."""
 SMALL_LAG = 0.0333
-"""s, at which the wheel's part in stability is judged: below b/k, where the suspension alone is
-stable."""
+"""Lag at which the influence of the wheel on stability is judged, s.
+
+It is below b/k, so the suspension alone is stable.
+"""
 RANDOM_CARS = 60
+"""Number of random vehicles that test a general statement."""
 BEYOND = np.logspace(0.01, 3.0, 12)
-"""Of the critical lag, where it is asked what else becomes unstable."""
+"""Multiples of the critical lag at which further unstable modes are searched."""
 AROUND = np.array(ARBITRARY._replace(tyre_damping=10.0))
-"""What vehicles drawn at random are spread about."""
+"""Median of the random vehicles' parameters."""
 
 
 def statements() -> list[Entry]:
-    """What the text of §5.3 to §5.6 says."""
+    """Return the entries of the statements of §5.3 to §5.6."""
     random = np.random.default_rng(0)
+    # Log-normal factors with σ = 1: most parameters stay within a factor of 7 of the median.
     cars = [
         QuarterCar(*map(float, np.exp(random.normal(0.0, 1.0, 6)) * AROUND))
         for _ in range(RANDOM_CARS)
     ]
+    # Eq. 5.57, τ_c = b/k, is derived without tyre damping.
     undamped = [car._replace(tyre_damping=0.0) for car in cars]
-    off = max(
+    deviation = max(
         abs(
             _time(critical_lag(LOOPS["suspension"](car)))
             * car.suspension_stiffness
@@ -44,16 +48,26 @@ def statements() -> list[Entry]:
         for car in undamped
     )
     damped = _time(critical_lag(LOOPS["suspension"](ARBITRARY._replace(tyre_damping=10.0))))
-    at = f"of {RANDOM_CARS} vehicles drawn at random"
-    where, what, says = "Equation 5.57", "critical lag of suspension MIL", "b/k whatever the tyre"
+    sample = f"of {RANDOM_CARS} vehicles drawn at random"
+    where, quantity, claim = (
+        "Equation 5.57",
+        "critical lag of suspension MIL",
+        "b/k whatever the tyre",
+    )
     note = "as Table 5.6, case 4: it holds without tyre damping alone"
     words = f"{damped:.4f} s, b/k = {SUSPENSION_LAG:g} s"
     entries = [
-        statement(where, what, says, off < 1e-9, f"within {off:.1g} {at}, no tyre damping"),
         statement(
             where,
-            f"{what}, tyre damping 10",
-            says,
+            quantity,
+            claim,
+            deviation < 1e-9,
+            f"within {deviation:.1g} {sample}, no tyre damping",
+        ),
+        statement(
+            where,
+            f"{quantity}, tyre damping 10",
+            claim,
             abs(damped - SUSPENSION_LAG) < 1e-6,
             words,
             note,
@@ -63,15 +77,15 @@ def statements() -> list[Entry]:
         for model, where in (("structure", "§5.3.6"), ("combined", "§5.6")):
             count = sum(_first_mode(model, car) == WHEEL for car in drawn)
             note = "it holds without tyre damping alone" if count else ""
-            words = f"the wheel hop first in {count} {at}"
-            says = "the body hop becomes unstable first"
-            entries.append(statement(where, f"{model} MIL, {name}", says, count == 0, words, note))
+            words = f"the wheel hop first in {count} {sample}"
+            claim = "the body hop becomes unstable first"
+            entries.append(statement(where, f"{model} MIL, {name}", claim, count == 0, words, note))
         entries.append(_only_body(name, drawn))
     return [*entries, *_tendencies(), *_contradictions()]
 
 
 def _only_body(name: str, drawn: Sequence[QuarterCar]) -> Entry:
-    """§5.3.6: `only the body hop poles can become unstable regardless of system parameters`."""
+    """Judge `only the body hop poles can become unstable regardless of system parameters`."""
     unstable = [_wheel_too(car) for car in drawn]
     ratios = np.array(
         [car.unsprung.natural_frequency / car.sprung.natural_frequency for car in drawn]
@@ -96,7 +110,7 @@ def _only_body(name: str, drawn: Sequence[QuarterCar]) -> Entry:
 
 
 def _tendencies() -> list[Entry]:
-    """§5.3.6, from the tables: which way each parameter moves the critical lag of the structure."""
+    """Return entries of §5.3.6: how every parameter moves the critical lag of structure MIL."""
     words = {
         "suspension_stiffness": ("high: unstable", False),
         "sprung_mass": ("low: unstable", True),
@@ -104,43 +118,46 @@ def _tendencies() -> list[Entry]:
         "unsprung_mass": ("low: stable", False),
     }
     entries = []
-    for name, (says, rises) in words.items():
+    for name, (claim, rises) in words.items():
+        # A fifth up and a sixth down are the same factor of 1.2, as in the tables.
         less, more = (
             structure_lag(**{name: factor * getattr(ARBITRARY, name)})
             for factor in (1.0 / 1.2, 1.2)
         )
-        found = (
+        finding = (
             f"critical lag {1e3 * less:.2f} ms with a sixth less of "
             f"it, {1e3 * more:.2f} ms with a fifth more"
         )
-        what = f"structure MIL, {name.replace('_', ' ')}"
-        entries.append(statement("§5.3.6", what, says, (less < more) == rises, found))
-    low, own, high = (
+        quantity = f"structure MIL, {name.replace('_', ' ')}"
+        entries.append(statement("§5.3.6", quantity, claim, (less < more) == rises, finding))
+    low, middle, high = (
         structure_lag(suspension_damping=damping) for damping in (50.0, 200.0, 1000.0)
     )
-    found = (
-        f"critical lag {1e3 * low:.2f}, {1e3 * own:.2f}, "
+    finding = (
+        f"critical lag {1e3 * low:.2f}, {1e3 * middle:.2f}, "
         f"{1e3 * high:.2f} ms at 50, 200 and 1000 Ns/m"
     )
-    bad = "unstable if too low or too high"
+    claim = "unstable if too low or too high"
     entries.append(
-        statement("§5.3.6", "structure MIL, suspension damping", bad, own > max(low, high), found)
+        statement(
+            "§5.3.6", "structure MIL, suspension damping", claim, middle > max(low, high), finding
+        )
     )
-    none, some = (structure_lag(tyre_damping=damping) for damping in (0.0, 10.0))
-    found = f"critical lag {1e3 * none:.2f} and {1e3 * some:.2f} ms at 0 and 10 Ns/m"
+    undamped, damped = (structure_lag(tyre_damping=damping) for damping in (0.0, 10.0))
+    finding = f"critical lag {1e3 * undamped:.2f} and {1e3 * damped:.2f} ms at 0 and 10 Ns/m"
     entries.append(
-        statement("§5.3.6", "structure MIL, tyre damping", "stabilises", some > none, found)
+        statement("§5.3.6", "structure MIL, tyre damping", "stabilises", damped > undamped, finding)
     )
     return entries
 
 
 def structure_lag(**changes: float) -> float:
-    """Critical, s, of the structure MIL with other values of the vehicle."""
+    """Return the critical lag of structure MIL, s, with some parameters of the vehicle changed."""
     return _time(critical_lag(LOOPS["structure"](ARBITRARY._replace(**changes))))
 
 
 def _contradictions() -> list[Entry]:
-    """Sentences that the tables and appendix A contradict."""
+    """Return entries of sentences that the tables and appendix A contradict."""
     soft = locus("structure", of_tyre_stiffness(SMALL_LAG))
     ratio = locus("suspension", of_damping_ratio(SUSPENSION_LAG))
     both = locus("combined", of_damping_ratio(SUSPENSION_LAG))
@@ -172,23 +189,24 @@ def _contradictions() -> list[Entry]:
     ]
 
 
-def _modes(found: Locus, end: int) -> str:
-    """The unstable ones at the first or the last value of a sweep."""
-    return " and ".join(found.unstable_modes(float(found.values[end]))) or "none"
+def _modes(sweep: Locus, end: int) -> str:
+    """Return the unstable modes at the first or the last value of a sweep, as text."""
+    return " and ".join(sweep.unstable_modes(float(sweep.values[end]))) or "none"
 
 
 def _first_mode(model: str, car: QuarterCar) -> str | None:
-    """Which mode crosses first as the lag grows."""
-    found = critical_lag(LOOPS[model](car))
-    return mode(car, 1j * found.frequency) if found else None
+    """Return the mode that crosses first as the lag grows; None if the system stays stable."""
+    critical = critical_lag(LOOPS[model](car))
+    return mode(car, 1j * critical.frequency) if critical else None
 
 
 def _wheel_too(car: QuarterCar) -> bool:
-    """Whether the structure's lag can make the wheel hop unstable, alone or beside the body hop."""
+    """Return whether a lag of the structure can make the wheel hop unstable, alone or not."""
     critical = _time(critical_lag(LOOPS["structure"](car)))
-    found = Locus("structure", critical * BEYOND, lambda lag: Setting(car, lag))
-    return any(WHEEL in found.unstable_modes(float(lag)) for lag in found.values)
+    sweep = Locus("structure", critical * BEYOND, lambda lag: Setting(car, lag))
+    return any(WHEEL in sweep.unstable_modes(float(lag)) for lag in sweep.values)
 
 
-def _time(found: Critical | None) -> float:
-    return found.time if found else float("inf")
+def _time(critical: Critical | None) -> float:
+    """Return a critical lag, s; infinite if the system is stable at every lag."""
+    return critical.time if critical else float("inf")

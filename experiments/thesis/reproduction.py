@@ -1,5 +1,4 @@
-"""What came out of reproducing the thesis, as text, JSON, one HTML file, or a gallery page with its
-pictures."""
+"""Reports of the reproduced thesis: text, JSON, one HTML file, or a gallery with pictures."""
 
 from __future__ import annotations
 
@@ -11,8 +10,8 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, Asked, matching
-from experiments.thesis.entry import Entry, share
+from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, Selection, covers_figure
+from experiments.thesis.entry import Entry, count_agreeing
 from experiments.thesis.study import Conclusion, Drawing, Study
 from rigtwin import __version__
 from rigtwin.console import table
@@ -21,22 +20,34 @@ from rigtwin.errors import RigtwinError
 
 @dataclass(frozen=True)
 class Chapter:
-    """One study and what it found, cut down to what was asked for."""
+    """One study and its conclusion, restricted to the requested part."""
 
     study: Study
     conclusion: Conclusion
 
     def groups(self) -> dict[str, list[Entry]]:
-        """Entries by where they stand in the thesis, in its order."""
-        found: dict[str, list[Entry]] = {}
+        """Return the entries by their place in the thesis, in the order of the study."""
+        groups: dict[str, list[Entry]] = {}
         for entry in self.conclusion.entries:
-            found.setdefault(entry.where, []).append(entry)
-        return found
+            groups.setdefault(entry.where, []).append(entry)
+        return groups
 
 
 @dataclass(frozen=True)
-class Share:
-    """Of one table: how many of its entries agree; why: of those that do not, each reason once."""
+class TableAgreement:
+    """Agreement of one table.
+
+    Attributes
+    ----------
+    table : str
+        Name of the table.
+    agree : str
+        Number of entries that agree, such as `7 of 8`.
+    whole : bool
+        Whether all entries agree.
+    why : str
+        Distinct reasons of the entries that do not agree.
+    """
 
     table: str
     agree: str
@@ -44,45 +55,55 @@ class Share:
     why: str
 
 
-def cut(study: Study, conclusion: Conclusion, wanted: Asked) -> Chapter:
-    """A study's conclusion with only the entries and drawings asked for."""
+def restrict(study: Study, conclusion: Conclusion, wanted: Selection) -> Chapter:
+    """Return a study with only the requested entries and drawings."""
     if wanted.where is None:
         return Chapter(study, conclusion)
     where = wanted.where
     entries = [entry for entry in conclusion.entries if entry.where == where]
-    drawings = [drawing for drawing in conclusion.drawings if matching(drawing.covers, where)]
+    drawings = [drawing for drawing in conclusion.drawings if covers_figure(drawing.covers, where)]
     return Chapter(study, Conclusion(entries, drawings, conclusion.remarks))
 
 
-def shares(entries: Sequence[Entry], every: bool) -> list[Share]:
-    """For each table with entries, and with `every` for each table of the thesis, how many of its
-    entries agree."""
-    found = []
+def agreement_by_table(entries: Sequence[Entry], every: bool) -> list[TableAgreement]:
+    """Return the agreement of each table that has entries.
+
+    With `every`, tables of the thesis without entries are listed too.
+    """
+    tables = []
     for name in TABLES:
-        own = [entry for entry in entries if entry.where == name]
-        if own:
-            reasons = dict.fromkeys(entry.note or entry.what for entry in own if not entry.agrees)
-            found.append(
-                Share(name, share(own), all(entry.agrees for entry in own), "; ".join(reasons))
+        entries_of_table = [entry for entry in entries if entry.where == name]
+        if entries_of_table:
+            reasons = dict.fromkeys(
+                entry.note or entry.what for entry in entries_of_table if not entry.agrees
+            )
+            tables.append(
+                TableAgreement(
+                    name,
+                    count_agreeing(entries_of_table),
+                    all(entry.agrees for entry in entries_of_table),
+                    "; ".join(reasons),
+                )
             )
         elif every:
-            found.append(
-                Share(
+            tables.append(
+                TableAgreement(
                     name, "-", name in NOTHING_TO_COMPUTE, NOTHING_TO_COMPUTE.get(name, "no entry")
                 )
             )
-    return found
+    return tables
 
 
 def text(chapters: Sequence[Chapter], every: bool) -> str:
-    """Everything as plain text."""
+    """Return all chapters as plain text."""
     blocks = []
     for chapter in chapters:
         blocks.append(f"{chapter.study.title} (chapter {chapter.study.chapter})")
         for where, entries in chapter.groups().items():
             rows: list[tuple[str, ...]] = [
-                (where, "thesis", "ours", "difference", "unit", share(entries), "by")
+                (where, "thesis", "ours", "difference", "unit", count_agreeing(entries), "by")
             ]
+            # Equal notes share a number, so a table prints each of them once.
             notes: dict[str, int] = {}
             for entry in entries:
                 mark = "agrees" if entry.agrees else "differs"
@@ -110,7 +131,7 @@ def text(chapters: Sequence[Chapter], every: bool) -> str:
     rows = [("table", "agree", "why not")]
     rows += [
         (one.table, one.agree, "" if one.whole and not one.why else one.why)
-        for one in shares(entries, every)
+        for one in agreement_by_table(entries, every)
     ]
     if len(rows) > 1:
         blocks.append(
@@ -122,16 +143,16 @@ def text(chapters: Sequence[Chapter], every: bool) -> str:
             )
         )
     if entries:
-        blocks.append(f"in all {share(entries)} entries agree")
+        blocks.append(f"in all {count_agreeing(entries)} entries agree")
     return "\n\n".join(blocks)
 
 
 def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
-    """Everything for other programs."""
+    """Return all chapters as a JSON document."""
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     return {
         "version": __version__,
-        "tables": [asdict(one) for one in shares(entries, every)],
+        "tables": [asdict(one) for one in agreement_by_table(entries, every)],
         "studies": [
             {
                 "name": chapter.study.name,
@@ -150,21 +171,24 @@ def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
 
 
 def _png(drawing: Drawing, dots_per_inch: int) -> bytes:
+    """Return a drawing as PNG."""
     stream = io.BytesIO()
     drawing.figure.savefig(stream, format="png", dpi=dots_per_inch)
     return stream.getvalue()
 
 
 def page(chapters: Sequence[Chapter], every: bool) -> str:
-    """Everything as one HTML file: no network, no script."""
+    """Return all chapters as one HTML file, without network access or scripts."""
     environment = Environment(
         loader=PackageLoader("experiments.thesis"),
         autoescape=True,
+        # A name missing in the template is an error, not an empty cell.
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
+    # Pictures are embedded: the report is one file that can be mailed.
     pictures = {
         drawing.name: base64.b64encode(_png(drawing, 75)).decode()
         for chapter in chapters
@@ -172,16 +196,16 @@ def page(chapters: Sequence[Chapter], every: bool) -> str:
     }
     return environment.get_template("reproduction.html").render(
         chapters=chapters,
-        shares=shares(entries, every),
-        share=share,
-        total=share(entries),
+        shares=agreement_by_table(entries, every),
+        share=count_agreeing,
+        total=count_agreeing(entries),
         pictures=pictures,
         version=__version__,
     )
 
 
 def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
-    """Writes gallery.md and its pictures into a folder. Raises RigtwinError if it cannot."""
+    """Write gallery.md and its pictures. Raises RigtwinError if writing fails."""
     lines = ["# The thesis reproduced", ""]
     lines += [
         "Made by `make gallery`. Every figure is of the nominal twin or "
@@ -199,12 +223,14 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
     lines += [
-        f"| {one.table} | {one.agree} | {one.why.replace('|', '/')} |"
-        for one in shares(entries, every)
+        # A bar would end the cell of a Markdown table.
+        f"| {row.table} | {row.agree} | {row.why.replace('|', '/')} |"
+        for row in agreement_by_table(entries, every)
     ]
     lines += [
         "",
-        f"In all {share(entries)} entries agree, statements of the text and figures included.",
+        f"In all {count_agreeing(entries)} entries agree, "
+        "statements of the text and figures included.",
         "",
     ]
     pictures = folder / "gallery"

@@ -1,4 +1,4 @@
-"""The thesis reproduced: does the jobs of what was asked for, and holds what was concluded."""
+"""The reproduction of the thesis: running the requested studies and writing the results."""
 
 from __future__ import annotations
 
@@ -7,33 +7,42 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.thesis import reproduction
-from experiments.thesis.catalogue import asked
-from experiments.thesis.reproduction import Chapter, cut
-from experiments.thesis.work import done
+from experiments.thesis.catalogue import select_studies
+from experiments.thesis.reproduction import Chapter, restrict
+from experiments.thesis.work import run_studies
 from rigtwin.errors import RigtwinError
 from rigtwin.render.plot import check_ending, save
 from rigtwin.studies.sweep import Workers
 
 MOST_SEEDS = 1000
+"""Largest number of seeds."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What was asked for of the thesis, beside ours. every: whether that was everything."""
+    """Requested parts of the thesis beside the computed results.
+
+    Attributes
+    ----------
+    chapters : tuple of Chapter
+        Studies with their conclusions.
+    every : bool
+        Whether the whole thesis was requested.
+    """
 
     chapters: tuple[Chapter, ...]
     every: bool
 
     def text(self) -> str:
-        """Everything as plain text."""
+        """Return all results as plain text."""
         return reproduction.text(self.chapters, self.every)
 
     def document(self) -> dict[str, object]:
-        """Everything for other programs."""
+        """Return all results as a JSON document."""
         return reproduction.document(self.chapters, self.every)
 
     def page(self, out: str | Path) -> Path:
-        """Writes everything as one HTML file. Raises RigtwinError if it cannot."""
+        """Write all results as one HTML file. Raises RigtwinError if it cannot be written."""
         try:
             Path(out).write_text(reproduction.page(self.chapters, self.every), encoding="utf-8")
         except OSError as error:
@@ -41,26 +50,26 @@ class Reproduction:
         return Path(out)
 
     def gallery(self, folder: str | Path) -> Path:
-        """Writes gallery.md and its pictures into a folder. Raises RigtwinError if it cannot."""
+        """Write gallery.md and its pictures. Raises RigtwinError if writing fails."""
         return reproduction.gallery(self.chapters, Path(folder), self.every)
 
     def draw(self, folder: str | Path) -> dict[Path, str]:
-        """Draws every figure into a folder.
+        """Draw every figure into a folder.
 
         Parameters
         ----------
-        folder
-            It is made.
+        folder : str or Path
+            Folder, created if it does not exist.
 
         Returns
         -------
         dict
-            File → what of the thesis it covers.
+            Path of a file → figures of the thesis that it covers.
 
         Raises
         ------
         RigtwinError
-            If it cannot be written.
+            The folder cannot be written.
         """
         drawn: dict[Path, str] = {}
         try:
@@ -77,38 +86,44 @@ class Reproduction:
 
 
 def reproduce(
-    what: str | None,
+    part: str | None,
     seeds: int,
     folder: Path,
     workers: Workers,
     progress: Callable[[int, int], object] = lambda *_: None,
 ) -> Reproduction:
-    """Runs the studies asked for; a second run goes on where the first was stopped.
+    """Run the requested studies. A second run resumes an interrupted one.
 
     Parameters
     ----------
-    what
-        A chapter, study, table, figure or equation; None for everything.
-    seeds
-        Roads and noise to judge over.
-    folder
-        Of the results.
-    workers
-        That do the jobs.
-    progress
-        Called with the jobs done and with how many there are.
+    part : str or None
+        Chapter, study, table, figure or equation to reproduce. None reproduces everything.
+    seeds : int
+        Number of seeds of roads and noise, 1 to 1000.
+    folder : Path
+        Folder of the stored results.
+    workers : Workers
+        Processes that run the jobs.
+    progress : callable
+        Function called with the number of finished jobs and their total.
+
+    Returns
+    -------
+    Reproduction
+        Conclusions of the studies, restricted to the requested part.
 
     Raises
     ------
     RigtwinError
-        If nothing is called that, for a number of seeds that makes no sense, or if the folder
-        cannot be written.
+        If the part or the number of seeds is invalid, or the folder cannot be written.
     """
-    wanted = asked(what)
+    wanted = select_studies(part)
     if not 1 <= seeds <= MOST_SEEDS:
         raise RigtwinError(f"--seeds {seeds}: expected 1 to {MOST_SEEDS}")
-    results = done(wanted.studies, seeds, folder, workers, progress)
+    results = run_studies(wanted.studies, seeds, folder, workers, progress)
     return Reproduction(
-        tuple(cut(study, study.conclude(results[study.name]), wanted) for study in wanted.studies),
-        what is None,
+        tuple(
+            restrict(study, study.conclude(results[study.name]), wanted) for study in wanted.studies
+        ),
+        part is None,
     )

@@ -1,5 +1,7 @@
-"""Chapter 7: what a suspension gives the body and the wheel, over many roads; shared by the studies
-of both structures."""
+"""Chapter 7: ride comfort and road holding of a suspension, over many roads.
+
+The studies of both structures, point mass and beams, share this module.
+"""
 
 from __future__ import annotations
 
@@ -31,113 +33,126 @@ LIMIT_CYCLE = (
     "force loop's gains; the thesis does not give them"
 )
 TAXIING = 10.0
-"""s after which the drop has decayed and the road alone moves the car."""
+"""Time after which the drop has decayed and the road alone moves the car, s."""
 COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
 
 
 def states_of(test: Trial) -> Array:
-    """The controller's packed state at every tick, shape (ticks, SIZE)."""
-    demands = test.ran.commands[:, :3]
+    """Return the packed state of the controller at every tick, shape (ticks, SIZE)."""
+    demands = test.simulation.commands[:, :3]
     return states(
         test.configuration.controller,
         test.configuration.timing.period,
-        test.ran.measurements,
+        test.simulation.measurements,
         demands,
     )
 
 
 def damping(test: Trial) -> Array:
-    """Coefficient of the semi-active damper at every tick, Ns/m."""
-    settings, found = test.configuration.controller, states_of(test)
-    # The tick uses the structure's velocity of the tick before.
-    sprung = np.concatenate([[0.0], found[:-1, 6]])
+    """Return the coefficient of the semi-active damper at every tick, Ns/m, shape (ticks,)."""
+    settings, packed = test.configuration.controller, states_of(test)
+    # The controller uses the structure's velocity of the tick before.
+    sprung = np.concatenate([[0.0], packed[:-1, 6]])
     return np.array(
         [
             semi_active_damping(settings, s, v)
-            for s, v in zip(sprung.tolist(), found[:, 2].tolist(), strict=True)
+            for s, v in zip(sprung.tolist(), packed[:, 2].tolist(), strict=True)
         ]
     )
 
 
-def measures(test: Trial) -> dict[str, Array | float]:
-    """rms body acceleration (m/s²) of twin and ideal, travel and tyre deflection (m) about their
-    means, switches of the damper a second, and the errors of appendix B."""
+def ride_measures(test: Trial) -> dict[str, Array | float]:
+    """Return the measures of ride and road holding of a test.
+
+    They are the rms acceleration of the body, m/s², of twin and ideal; the rms of travel and tyre
+    deflection about their means, m; the switches of a semi-active damper per second; and the
+    tracking errors of appendix B.
+    """
     period = test.configuration.timing.period
     late = slice(round(TAXIING / period), None)
+    # Tyre deflection is wheel minus ground; its rms measures road holding.
     tyre, should_tyre = (
-        wheel - test.ran.commands[:, 0] for wheel in (test.wheel, test.should.wheel)
+        wheel - test.simulation.commands[:, 0] for wheel in (test.wheel, test.ideal.wheel)
     )
-    found: dict[str, Array | float] = dict(errors(test))
-    found |= {
+    result: dict[str, Array | float] = dict(errors(test))
+    result |= {
         "acceleration": body_acceleration(test.plate, period),
         "everything": rms(np.diff(test.plate, 2) / period**2),
-        "ideal acceleration": body_acceleration(test.should.structure, period),
-        "ideal everything": rms(test.should.acceleration(period)),
+        "ideal acceleration": body_acceleration(test.ideal.structure, period),
+        "ideal everything": rms(test.ideal.acceleration(period)),
         "taxiing": body_acceleration(test.plate[late], period),
         "travel rms": float(np.std(test.travel)),
         "tyre rms": float(np.std(tyre)),
-        "ideal travel rms": float(np.std(test.should.structure - test.should.wheel)),
+        "ideal travel rms": float(np.std(test.ideal.structure - test.ideal.wheel)),
         "ideal tyre rms": float(np.std(should_tyre)),
     }
     if test.configuration.controller.skyhook == Skyhook.SEMI_ACTIVE:
         coefficient = damping(test)
+        # A switch is a change between the lowest coefficient and a higher one.
         at_least = coefficient <= test.configuration.controller.damping_min
-        found["switches"] = float(np.sum(np.diff(at_least.astype(int)) != 0) / test.time[-1])
-        found["damping"] = coefficient[::SHOWN]
-    return found
+        result["switches"] = float(np.sum(np.diff(at_least.astype(int)) != 0) / test.time[-1])
+        result["damping"] = coefficient[::SHOWN]
+    return result
 
 
-def kept(test: Trial, seed: int) -> Result:
-    """What a job keeps of a test; of the shown seed its curves too."""
-    found = measures(test)
+def job_result(test: Trial, seed: int) -> Result:
+    """Return the stored result of a test, with its curves for the drawn seed."""
+    result = ride_measures(test)
     if seed == SHOWN_SEED:
-        found |= curves(test)
-        found["asked damper"] = _damper(test)[::SHOWN]
-        if test.should.wing is not None:
-            found |= {
+        result |= curves(test)
+        result["asked damper"] = _damper(test)[::SHOWN]
+        if test.ideal.wing is not None:
+            result |= {
                 "wing": 1e3 * _wing(test)[::SHOWN],
-                "ideal wing": 1e3 * (test.should.wing - test.should.wing[:, :1])[::SHOWN],
+                "ideal wing": 1e3 * (test.ideal.wing - test.ideal.wing[:, :1])[::SHOWN],
             }
-    elif "damping" in found:
-        del found["damping"]
-    return found
+    # The history of the damper is drawn for one seed only; the others need not store it.
+    elif "damping" in result:
+        del result["damping"]
+    return result
 
 
 def _wing(test: Trial) -> Array:
+    """Return the height of the beams' points above the centre, m, shape (ticks, points)."""
     return wing(test.configuration.controller, test.configuration.timing.period, states_of(test))
 
 
 def _damper(test: Trial) -> Array:
-    """The part of the demanded force that is not the spring's, N."""
-    settings, found = test.configuration.controller, states_of(test)
-    return test.ran.commands[:, 2] - settings.preload + settings.suspension_stiffness * found[:, 1]
+    """Return the demanded force without preload and spring, N, shape (ticks,)."""
+    settings, packed = test.configuration.controller, states_of(test)
+    return (
+        test.simulation.commands[:, 2]
+        - settings.preload
+        + settings.suspension_stiffness * packed[:, 1]
+    )
 
 
 def reduction(
     results: dict[str, Result], better: str, base: str, value: str = "acceleration"
 ) -> Array:
-    """In %, of each seed."""
+    """Return the reduction of a value against a base test, %, shape (seeds,)."""
     return 100 * (1 - over_seeds(results, better, value) / over_seeds(results, base, value))
 
 
 def interval(values: Array, unit: str) -> str:
+    """Format the median and the 5 to 95 % interval of some values."""
     low, middle, high = np.percentile(values, [5, 50, 95])
     return f"{middle:.3g}{unit} ({low:.3g} to {high:.3g})"
 
 
 def remark(results: dict[str, Result], name: str) -> str:
-    """The body's acceleration by both measures, and the ideal's."""
-    body, everything, should = (
+    """Return a remark on the acceleration of the body, by both measures, and of the ideal."""
+    body, unfiltered, ideal = (
         over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything")
     )
     return (
         f"{name}: body acceleration {interval(body, ' m/s²')}, with "
-        f"everything in it {interval(everything, '')}; "
-        f"ideal {interval(should, '')}"
+        f"everything in it {interval(unfiltered, '')}; "
+        f"ideal {interval(ideal, '')}"
     )
 
 
-def reduced(
+def reduction_entry(
     where: str,
     results: dict[str, Result],
     better: str,
@@ -146,7 +161,7 @@ def reduced(
     within: float,
     note: str = "",
 ) -> Entry:
-    """A printed reduction of the body's acceleration, in %, beside the interval over the seeds."""
+    """Return the entry of a printed reduction of the body's acceleration, %."""
     return band(
         where,
         f"{better} against {base}",
@@ -158,14 +173,14 @@ def reduced(
     )
 
 
-def tracking(
+def tracking_entries(
     table: str,
     results: dict[str, Result],
     name: str,
     printed: tuple[str, str, str, str],
     within: float,
 ) -> list[Entry]:
-    """A table of appendix B: force N and %, position m and %."""
+    """Return the entries of a table of appendix B: force error in N and %, position in m and %."""
     force, position = (
         over_seeds(results, name, "force_total"),
         over_seeds(results, name, "position_total"),
@@ -183,7 +198,7 @@ def tracking(
 def histories(
     name: str, covers: str, caption: str, runs: dict[str, Result], until: float = 20.0
 ) -> Drawing:
-    """Sprung mass, travel and tyre of several runs, label → result."""
+    """Draw sprung mass, travel and tyre deflection of several tests; until: last time shown, s."""
     figure, axes = sheet(3, 1, height=2.2)
     for label, result in runs.items():
         time = np.asarray(result["time"])

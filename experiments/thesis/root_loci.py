@@ -1,5 +1,7 @@
-"""Appendix A: root loci of the quarter car with suspension MIL, vehicle structure MIL and both, one
-parameter swept each."""
+"""Appendix A: root loci of the quarter car with suspension MIL, vehicle structure MIL, and both.
+
+Every table of the appendix sweeps one parameter.
+"""
 
 from __future__ import annotations
 
@@ -30,16 +32,17 @@ VARIED = {
 }
 MODELS = {"A1": "suspension", "A2": "structure", "A3": "combined"}
 CASES = {**appendix_a1.CASES, **appendix_a2.CASES, **appendix_a3.CASES}
-"""Table → its cases."""
+"""Functions that return the cases of a table, by its name."""
 
 
 def _tables() -> list[Entry]:
-    """What the tables of parameters print beside the figures that follow from the others."""
-    found = []
+    """Return entries for the printed parameters that follow from other parameters."""
+    entries = []
     for appendix, model in MODELS.items():
         for number, ratio, printed in ((1, 1.0, "316.2"), (2, 0.5, "158.1")):
+            # Eq. 5.34: b = 2 ζ √(k m).
             ours = damping(ratio, ARBITRARY.suspension_stiffness)
-            found.append(
+            entries.append(
                 digits(
                     f"Table {appendix}.1",
                     f"b_s of case {number}, ζ = {ratio:g}",
@@ -49,7 +52,7 @@ def _tables() -> list[Entry]:
                 )
             )
         end = math.sqrt(1e5 / ARBITRARY.sprung_mass)
-        found.append(
+        entries.append(
             digits(
                 f"Table {appendix}.2",
                 "natural frequency at the end, cases 1 to 3",
@@ -58,10 +61,11 @@ def _tables() -> list[Entry]:
                 "rad/s",
             )
         )
-        found.append(_ratio(f"Table {appendix}.3"))
+        entries.append(_ratio(f"Table {appendix}.3"))
         for table, variation in (("4", TYRES[PRINTED_LAG]), ("5", WHEELS[PRINTED_LAG])):
+            # A lag above the critical one of every value contradicts the printed statements.
             largest = _largest_critical(model, variation)
-            found.append(
+            entries.append(
                 statement(
                     f"Table {appendix}.{table}",
                     "lag of case 1",
@@ -71,11 +75,11 @@ def _tables() -> list[Entry]:
                     "a misprint of 0.0333 s, with which the section's statements hold",
                 )
             )
-    return found
+    return entries
 
 
 def _ratio(table: str) -> Entry:
-    """What stiffness and mass varied together vary."""
+    """Return the entry of the sweep of k_s = m_s: it must change the damping ratio alone."""
     variation = of_damping_ratio(FILTER_LAG)
     ends = [variation.at(value).car.sprung for value in (variation.start, variation.end)]
     frequencies, ratios = (
@@ -90,14 +94,14 @@ def _ratio(table: str) -> Entry:
 
 
 def _largest_critical(model: str, variation: Variation) -> float:
-    """Of the critical lags over a sweep, s."""
+    """Return the largest critical lag over a sweep, s."""
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), 36)
-    found = [critical_lag(LOOPS[model](variation.at(float(value)).car)) for value in values]
-    return max(each.time if each else math.inf for each in found)
+    critical_lags = [critical_lag(LOOPS[model](variation.at(float(value)).car)) for value in values]
+    return max(each.time if each else math.inf for each in critical_lags)
 
 
 def entries() -> list[Entry]:
-    """Every statement beside what was found."""
+    """Return an entry for every printed parameter and statement."""
     return [
         *_tables(),
         *(entry for cases_of in CASES.values() for case in cases_of() for entry in case.entries()),
@@ -105,11 +109,12 @@ def entries() -> list[Entry]:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    """Every case swept, its statements judged, its figures drawn."""
+    """Sweep every case, judge its statements and draw its figures."""
     drawings = []
     for table, cases_of in CASES.items():
         cases = cases_of()
         appendix, _, varied = table.partition(".")
+        # A figure drawn with two lags is named once: the suffix after the comma is cut off.
         names = dict.fromkeys(
             f"Figure {panel.name.partition(',')[0]}" for case in cases for panel in case.panels
         )

@@ -1,5 +1,8 @@
-"""Thesis §3.5: the Boeing 707's landing gear scaled down to the rig. Tables 3.1 to 3.3 and the gas
-spring, and a landing that is simulated in full size and at the rig's scale."""
+"""Thesis §3.5: the landing gear of a Boeing 707 scaled down to the rig.
+
+The study covers Tables 3.1 to 3.3, the gas spring, and a landing simulated in full size and at the
+scale of the rig.
+"""
 
 from __future__ import annotations
 
@@ -38,19 +41,25 @@ UNITS = {
 }
 UNITS |= {"stroke": "m", "time": "s"}
 RIG_STROKE = 0.18
-"""m, Table 3.2."""
+"""Stroke of the rig, m (Table 3.2)."""
 PRINTED = (200.0, 0.589)
-"""Sprung mass of the rig, kg, and stroke of the landing gear, m, as printed (Table 3.2, §3.5)."""
+"""Printed sprung mass of the rig, kg, and stroke of the landing gear, m (Table 3.2, §3.5)."""
 RECONSTRUCTED = (500.0, 0.559)
-"""The same as Table 3.3 and the gas spring's stiffness ask for; 0.559 m are 22 in."""
+"""Values that Table 3.3 and the stiffness of the gas spring require; 0.559 m are 22 in."""
 BORE, ROD = 0.050, 0.032
-"""m, of a standard cylinder whose annulus gives the printed area, volume and pressure; assumed."""
+"""Bore and rod of a standard cylinder, m, assumed.
+
+Its annulus gives the printed area, volume and pressure.
+"""
 INSTANTS = np.linspace(0.0, 3.0, 1501)
-"""s of full size, of the landing."""
+"""Times of the landing in full size, s."""
 
 
 def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
-    """Rig over aircraft. mass: sprung mass of the rig, kg; stroke: of the landing gear, m."""
+    """Return the scale factors, rig over aircraft.
+
+    mass: sprung mass of the rig, kg; stroke: stroke of the landing gear, m; time: scale of time.
+    """
     return scaling(
         UNITS,
         {"sprung_mass": mass / BOEING.sprung_mass, "stroke": RIG_STROKE / stroke, "time": time},
@@ -58,23 +67,28 @@ def similar(mass: float, stroke: float, time: float = 1.0) -> Scaling:
 
 
 def at_scale(landing: Landing, scale: Scaling) -> Landing:
-    """The landing of the scaled system."""
+    """Return the parameters of the scaled system."""
     return Landing(**scale_values(landing._asdict(), UNITS, scale))
 
 
 def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
-    """The scaled landing, simulated at its own size and pace, in the measures of the original;
-    instants: of the original, s."""
+    """Simulate a scaled landing and map it back to full size, shape (3, n).
+
+    The simulation runs at the size and pace of the rig. instants: times in full size, s.
+    """
     factors = np.array([scale.factor(unit) for unit in ("m", "m/s", "N")])
     return touch_down(landing, instants * scale.time) / factors[:, None]
 
 
-def difference(original: Array, other: Array) -> float:
-    """Largest, over the peak of each signal."""
-    return float(np.max(np.abs(other - original) / np.max(np.abs(original), axis=1, keepdims=True)))
+def difference(original: Array, mapped: Array) -> float:
+    """Return the largest difference of two landings, relative to the peak of each signal."""
+    return float(
+        np.max(np.abs(mapped - original) / np.max(np.abs(original), axis=1, keepdims=True))
+    )
 
 
 def _table_1() -> list[Entry]:
+    """Return the entries of Table 3.1: the vehicle that the twin runs."""
     vehicle, tyre = VEHICLES["boeing-707"], configuration(VEHICLES["boeing-707"]).plant.tyre
     note = "Table 6.1's, as the twin runs it"
     return [
@@ -97,8 +111,12 @@ def _table_1() -> list[Entry]:
 
 
 def _springs() -> dict[str, tuple[GasSpring, float]]:
-    """By words, the gas spring and its stroke, m: as printed, with the exponent of four times the
-    static load; and the one that the printed stiffness asks for."""
+    """Return two gas springs with their strokes, m, by a description.
+
+    The first is as printed: its exponent follows from four times the static load at full
+    compression. The second has the exponent 1.4 that the printed stiffness requires.
+    """
+    # F_full = F_0 (L/(L − x))^γ with F_full four times the load gives γ.
     load, length = BOEING.sprung_mass * BOEING.gravity, BOEING.gas_length
     _, printed = PRINTED
     exponent = math.log(4.0 * load / BOEING.gas_force) / math.log(length / (length - printed))
@@ -109,15 +127,51 @@ def _springs() -> dict[str, tuple[GasSpring, float]]:
     }
 
 
+WRONG_STROKE = "0.589 m and four times are not what this was computed with"
+
+
 def _equation_3() -> list[Entry]:
+    """Return the entries of the gas spring, Eq. 3.3."""
     where, load = "Equation 3.3", BOEING.sprung_mass * BOEING.gravity
     _, stroke = RECONSTRUCTED
-    lengths = [
-        design(load / 4.0, f * load, x, BOEING.exponent).length
-        for f, x in ((4.0, PRINTED[1]), (3.0, stroke))
+    pressed = spring_force(BOEING.spring, stroke) / load
+    beyond = "sized for three times: its length, 24.7 MN/m and 76 % ask for that"
+    soft, hard = (
+        1e-6 * stiffness(BOEING.spring, x) for x in (equilibrium(BOEING.spring, load), stroke)
+    )
+    rated = 1e-6 * VEHICLES["boeing-707"].suspension_stiffness
+    return [
+        *_spring_design(where, load),
+        *(
+            entry
+            for words, (spring, travel) in _springs().items()
+            for entry in _spring_stiffness(where, load, words, spring, travel)
+        ),
+        digits(
+            where,
+            "force fully compressed over static load, exponent 1.4",
+            "4",
+            pressed,
+            "1",
+            beyond,
+        ),
+        statement(
+            where,
+            "rated stiffness",
+            "11.25 MN/m lies between equilibrium and full compression",
+            soft < rated < hard,
+            f"{soft:.2f} < {rated:.2f} < {hard:.2f}",
+        ),
     ]
-    wrong = "0.589 m and four times are not what this was computed with"
-    entries = [
+
+
+def _spring_design(where: str, load: float) -> list[Entry]:
+    """Return the entries of the spring's charge, length and stroke; load: static load, N."""
+    lengths = [
+        design(load / 4.0, factor * load, stroke, BOEING.exponent).length
+        for factor, stroke in ((4.0, PRINTED[1]), (3.0, RECONSTRUCTED[1]))
+    ]
+    return [
         digits(
             where, "force fully extended, a quarter of the static load", "167285", load / 4.0, "N"
         ),
@@ -127,7 +181,7 @@ def _equation_3() -> list[Entry]:
             "0.673",
             lengths[0],
             "m",
-            wrong,
+            WRONG_STROKE,
         ),
         digits(
             where,
@@ -146,87 +200,75 @@ def _equation_3() -> list[Entry]:
             "velocity and gas force in Table 3.3 all need it",
         ),
     ]
-    for words, (spring, travel) in _springs().items():
-        at_rest = equilibrium(spring, load)
-        differs = wrong if travel == PRINTED[1] else ""
-        small = (
-            "the stroke is not in it; 3.79 MN/m is reached "
-            f"{1e3 * (_reaches(spring, 3.79e6) - at_rest):.1f} mm further on"
-        )
-        entries += [
-            digits(
-                where,
-                f"stiffness at equilibrium, {words}",
-                "3.79",
-                1e-6 * stiffness(spring, at_rest),
-                "MN/m",
-                small,
-            ),
-            digits(
-                where,
-                f"stiffness fully compressed, {words}",
-                "24.7",
-                1e-6 * stiffness(spring, travel),
-                "MN/m",
-                differs,
-            ),
-            digits(
-                where,
-                f"equilibrium over stroke, {words}",
-                "76",
-                100.0 * at_rest / travel,
-                "%",
-                differs,
-            ),
-        ]
-    spring, travel = BOEING.spring, stroke
-    pressed = spring_force(spring, travel) / load
-    beyond = "sized for three times: its length, 24.7 MN/m and 76 % ask for that"
-    entries.append(
+
+
+def _spring_stiffness(
+    where: str, load: float, words: str, spring: GasSpring, travel: float
+) -> list[Entry]:
+    """Return the entries of a spring's stiffness and equilibrium; travel: its stroke, m."""
+    at_rest = equilibrium(spring, load)
+    differs = WRONG_STROKE if travel == PRINTED[1] else ""
+    small = (
+        "the stroke is not in it; 3.79 MN/m is reached "
+        f"{1e3 * (_reaches(spring, 3.79e6) - at_rest):.1f} mm further on"
+    )
+    return [
         digits(
             where,
-            "force fully compressed over static load, exponent 1.4",
-            "4",
-            pressed,
-            "1",
-            beyond,
-        )
-    )
-    soft, hard = (1e-6 * stiffness(spring, x) for x in (equilibrium(spring, load), travel))
-    rated = 1e-6 * VEHICLES["boeing-707"].suspension_stiffness
-    says = "11.25 MN/m lies between equilibrium and full compression"
-    return [
-        *entries,
-        statement(
+            f"stiffness at equilibrium, {words}",
+            "3.79",
+            1e-6 * stiffness(spring, at_rest),
+            "MN/m",
+            small,
+        ),
+        digits(
             where,
-            "rated stiffness",
-            says,
-            soft < rated < hard,
-            f"{soft:.2f} < {rated:.2f} < {hard:.2f}",
+            f"stiffness fully compressed, {words}",
+            "24.7",
+            1e-6 * stiffness(spring, travel),
+            "MN/m",
+            differs,
+        ),
+        digits(
+            where,
+            f"equilibrium over stroke, {words}",
+            "76",
+            100.0 * at_rest / travel,
+            "%",
+            differs,
         ),
     ]
 
 
 def _reaches(spring: GasSpring, wanted: float) -> float:
-    """Compression at which the stiffness is the one wanted, N/m: where γ F L^γ = k (L − x)^(γ +
-    1)."""
+    """Return the compression at which a gas spring has a stiffness, m; wanted: N/m.
+
+    The stiffness k = γ F L^γ / (L − x)^(γ + 1) is solved for x.
+    """
     constant = spring.exponent * spring.force * spring.length**spring.exponent
     return spring.length - (constant / wanted) ** (1.0 / (spring.exponent + 1.0))
 
 
+VARIABLES = {
+    "m_u": "kg",
+    "m_s": "kg",
+    "x_u": "m",
+    "x_s": "m",
+    "u": "m",
+    "L": "m",
+    "P_iA_g": "N",
+    "b_s": "Ns/m",
+    "b_t": "Ns/m",
+    "k_t": "N/m",
+    "g": "m/s^2",
+    "t": "s",
+}
+"""Unit of every variable of Eq. 3.6, by its symbol."""
+
+
 def _equation_6() -> list[Entry]:
-    units = {
-        "m_u": "kg",
-        "m_s": "kg",
-        "x_u": "m",
-        "x_s": "m",
-        "u": "m",
-        "L": "m",
-        "P_iA_g": "N",
-        "b_s": "Ns/m",
-    }
-    units |= {"b_t": "Ns/m", "k_t": "N/m", "g": "m/s^2", "t": "s"}
-    groups = pi_groups(units, ("m_s", "x_s", "t"))
+    """Return the entries of the dimensionless groups (Eq. 3.6) and the scale factors (Eq. 3.8)."""
+    groups = pi_groups(VARIABLES, ("m_s", "x_s", "t"))
     ours = ", ".join(str(group) for group in groups)
     printed = (
         {"m_u": 1, "m_s": -1},
@@ -239,39 +281,18 @@ def _equation_6() -> list[Entry]:
         {"k_t": 1, "t": 2, "m_s": -1},
         {"g": 1, "t": 2, "x_s": -1},
     )
-    same = [dict(group.exponents) for group in groups] == [dict(group) for group in printed]
+    identical = [dict(group.exponents) for group in groups] == [dict(group) for group in printed]
     note = (
         "numbered to π8 because there are two π4; the exponent "
         "γ, a group of its own, is not counted"
     )
-    scale = scaling(units, {"m_s": 0.0123, "x_s": 0.345, "t": 6.78})
-    relations = (
-        "m_s = m_u",
-        "x_s = x_u",
-        "x_s = u",
-        "x_s = L",
-        "m_s x_s = P_iA_g t t",
-        "m_s = b_s t",
-        "m_s = b_t t",
-    )
-    relations += ("m_s = k_t t t", "x_s = g t t")
-    sides = [
-        [
-            math.prod(scale.factor(units[name]) for name in side.split())
-            for side in each.split(" = ")
-        ]
-        for each in relations
-    ]
-    apart = max(abs(left / right - 1.0) for left, right in sides)
-    # The groups are kept by any scale factors of these relations, and by no others.
-    before = dict.fromkeys(units, 1.0)
-    change = max(apart, largest_change(units, before, scale_values(before, units, scale)))
+    change = _change_of_groups()
     return [
         statement(
             "Equation 3.6",
             "groups of 12 variables",
             "n − m dimensionless groups, listed",
-            same,
+            identical,
             ours,
             note,
         ),
@@ -285,8 +306,38 @@ def _equation_6() -> list[Entry]:
     ]
 
 
+def _change_of_groups() -> float:
+    """Return the largest violation of Eq. 3.8, and of the groups, by arbitrary scale factors."""
+    scale = scaling(VARIABLES, {"m_s": 0.0123, "x_s": 0.345, "t": 6.78})
+    # Eq. 3.8: both sides of every relation are products of scale factors.
+    relations = (
+        "m_s = m_u",
+        "x_s = x_u",
+        "x_s = u",
+        "x_s = L",
+        "m_s x_s = P_iA_g t t",
+        "m_s = b_s t",
+        "m_s = b_t t",
+        "m_s = k_t t t",
+        "x_s = g t t",
+    )
+    sides = [
+        [
+            math.prod(scale.factor(VARIABLES[name]) for name in side.split())
+            for side in relation.split(" = ")
+        ]
+        for relation in relations
+    ]
+    violation = max(abs(first / second - 1.0) for first, second in sides)
+    # Any scale factors that satisfy these relations keep the groups, and no others do.
+    before = dict.fromkeys(VARIABLES, 1.0)
+    return max(violation, largest_change(VARIABLES, before, scale_values(before, VARIABLES, scale)))
+
+
 def _table_2() -> list[Entry]:
+    """Return the entries of Table 3.2, worked back from the scaled values of Table 3.3."""
     where, (_, stroke) = "Table 3.2", RECONSTRUCTED
+    # Ratios of Table 3.3 to Table 3.1: the scale factors of mass, damping, and the speed.
     wheel, damper, fast = (
         number("8.36") / BOEING.unsprung_mass,
         number("772") / BOEING.damping,
@@ -333,6 +384,7 @@ def _table_2() -> list[Entry]:
 
 
 def _table_3() -> list[Entry]:
+    """Return the entries of Table 3.3, from the printed and the reconstructed mass and stroke."""
     entries = []
     for mass, stroke in (PRINTED, RECONSTRUCTED):
         rig = at_scale(BOEING, similar(mass, stroke))
@@ -364,11 +416,17 @@ def _table_3() -> list[Entry]:
 
 
 def _cylinder() -> list[Entry]:
-    where, rig = "§3.5", at_scale(BOEING, similar(*RECONSTRUCTED))
-    area = math.pi / 4.0 * (BORE**2 - ROD**2)
-    charge, plain = (find_charge(rig.spring, each, RIG_STROKE) for each in (area, number("0.0012")))
+    """Return the entries of the gas spring's cylinder and of the actuators' capability."""
+    rig = at_scale(BOEING, similar(*RECONSTRUCTED))
+    return [*_charge(rig.spring), *_capability(rig)]
+
+
+def _charge(spring: GasSpring) -> list[Entry]:
+    """Return the entries of area, volume and pressure of the cylinder and its accumulator."""
+    where, area = "§3.5", math.pi / 4.0 * (BORE**2 - ROD**2)
+    charge, plain = (find_charge(spring, a, RIG_STROKE) for a in (area, number("0.0012")))
     bar = 1e-5
-    whose = (
+    source = (
         "annulus of a 50 mm bore with a 32 mm rod; an area of "
         "0.00116 m² gives all three printed figures"
     )
@@ -380,10 +438,8 @@ def _cylinder() -> list[Entry]:
         f"1 : {ratio:.3f}; printed 1 : {334 / 209:.3f}, "
         f"near 1.4 · 0.673/0.589 = {odd:.3f}, as if multiplied by the exponent"
     )
-    motor, limit = Motor(), Cylinder().speed_limit
-    damper = rig.damping * rig.velocity
     return [
-        digits(where, "cylinder's area", "0.0012", area, "m²", whose),
+        digits(where, "cylinder's area", "0.0012", area, "m²", source),
         digits(
             where, "cylinder's volume, in m³ as printed", "209e-3", charge.cylinder, "m³", litres
         ),
@@ -399,6 +455,14 @@ def _cylinder() -> list[Entry]:
         ),
         digits(where, "accumulator's volume, in m³ as printed", "334e-3", charge.gas, "m³", litres),
         digits(where, "accumulator's volume, in litres", "334e-3", 1e3 * charge.gas, "l", gas),
+    ]
+
+
+def _capability(rig: Landing) -> list[Entry]:
+    """Return the entries that compare the scaled landing with the limits of the actuators."""
+    where, motor, limit = "§3.5", Motor(), Cylinder().speed_limit
+    damper = rig.damping * rig.velocity
+    return [
         digits(where, "stroke of the electric actuator", "0.21", motor.stroke, "m", "the twin's"),
         digits(
             where, "force of the electric actuator", "1860", motor.force_limit, "N", "the twin's"
@@ -426,6 +490,7 @@ def _cylinder() -> list[Entry]:
             where,
             "gravity without a scale of time",
             "is altered",
+            # Without a scale of time, accelerations scale like the stroke; gravity does not.
             not math.isclose(rig.gravity, BOEING.gravity, rel_tol=1e-3),
             f"{rig.gravity:.2f} m/s² on the rig",
         ),
@@ -433,14 +498,17 @@ def _cylinder() -> list[Entry]:
 
 
 def _landings() -> tuple[list[Entry], Drawing, list[str]]:
+    """Return the entries, the drawing and the remarks of the simulated landing."""
     real = similar(*RECONSTRUCTED)
+    # The pseudo-dynamic test slows time until the sinking speed is within the cylinder's limit.
     slow = slow_down(real, BOEING.velocity, Cylinder().speed_limit)
     full = touch_down(BOEING, INSTANTS)
     pairs = [(scale, at_scale(BOEING, scale)) for scale in (real, slow)]
     backs = [mapped_back(landing, scale, INSTANTS) for scale, landing in pairs]
+    # The values of Table 3.3 with the sprung mass of Table 3.2: not a similar system.
     mixed = pairs[0][1]._replace(sprung_mass=PRINTED[0])
     wrong = mapped_back(mixed, real, INSTANTS)
-    apart = [difference(full, back) for back in backs]
+    deviations = [difference(full, back) for back in backs]
     off = difference(full, wrong)
     fastest = [
         float(np.max(np.abs(back[1]))) * scale.factor("m/s")
@@ -457,7 +525,7 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
             f"mass up to {speed:.3f} m/s on the rig",
         )
         for words, worst, speed in zip(
-            ("real time", f"{slow.time:.2f} times slower"), apart, fastest, strict=True
+            ("real time", f"{slow.time:.2f} times slower"), deviations, fastest, strict=True
         )
     ]
     entries.append(
@@ -477,17 +545,21 @@ def _landings() -> tuple[list[Entry], Drawing, list[str]]:
 
 
 def _rest() -> float:
-    """Compression of the aeroplane's spring at rest, m."""
+    """Return the compression of the aircraft's spring at rest, m."""
     return equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)
 
 
 def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
+    """Return the remarks on Tables 3.2 and 3.3 and on the pseudo-dynamic test."""
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
+    # Forces scale with 1/t² of the time scale, and the gas pressure with them.
     pressures = [
         1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure
         for each in (real, slow)
     ]
-    kept = scaling(UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time})
+    force_preserving = scaling(
+        UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time}
+    )
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
     return [
@@ -499,21 +571,16 @@ def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
         "exponent 1.4 and three times the static load fully "
         "compressed; the text says 0.589 m and four times. No stroke gives "
         "the 3.79 MN/m at equilibrium: the closed form is "
-        f"{1e-6 * stiffness(BOEING.spring, _rest()):.2f} "
-        ""
-        ""
-        ""
-        ""
-        ""
-        "MN/m.",
+        f"{1e-6 * stiffness(BOEING.spring, _rest()):.2f} MN/m.",
         f"Pseudo-dynamic: {BOEING.velocity:g} m/s are "
         f"{real.factor('m/s') * BOEING.velocity:.3f} m/s on the rig; a time scale "
         f"of {slow.time:.3f} brings them to {Cylinder().speed_limit:g} "
         "m/s. Forces fall by its square: the gas charge from "
         f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas "
         "spring, scale its force in place of the mass: the "
-        f"numerical sprung mass is then {kept.mass * BOEING.sprung_mass:.0f} kg and the wheel "
-        f"{kept.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that "
+        f"numerical sprung mass is then {force_preserving.mass * BOEING.sprung_mass:.0f} kg "
+        "and the wheel "
+        f"{force_preserving.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that "
         "is compressed slower gives off more heat, so its "
         "exponent falls: time cannot be stretched freely where the gas is hardware.",
         "Eq. 3.4 and 3.5 as printed lack the exponent γ, take the tyre's "
@@ -537,6 +604,7 @@ STYLES = (("rig, real time", "#2a6fa8", "--"), ("rig, pseudo-dynamic", "#d1603d"
 def _drawing(
     full: Array, backs: list[Array], wrong: Array, scales: list[Scaling], off: float
 ) -> Drawing:
+    """Draw the landing in full size, mapped back from the rig, and on the rig."""
     figure, axes = sheet(2, len(SIGNALS), 13.0, 3.4)
     worst = max(difference(full, back) for back in backs)
     for column, (name, unit, size) in enumerate(SIGNALS):
@@ -548,10 +616,10 @@ def _drawing(
             above.plot(
                 INSTANTS, size * back[column], dashes, color=colour, linewidth=2.0, label=label
             )
-            own = scale.factor(("m", "m/s", "N")[column]) * back[column]
+            on_rig = scale.factor(("m", "m/s", "N")[column]) * back[column]
             below.plot(
                 INSTANTS * scale.time,
-                own,
+                on_rig,
                 color=colour,
                 label=f"{label}, time scale {scale.time:.2f}",
             )
@@ -591,6 +659,7 @@ def _drawing(
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
+    """Return the entries, the drawing and the remarks of §3.5."""
     entries, drawing, remarks = _landings()
     tables = [*_table_1(), *_equation_3(), *_equation_6(), *_table_2(), *_table_3(), *_cylinder()]
     return Conclusion((*tables, *entries), (drawing,), tuple(remarks))

@@ -1,4 +1,4 @@
-"""§5.1: what the thesis derives of the single mass, and Figures 5.4 and 5.6."""
+"""§5.1: formulas of the single mass, and Figures 5.4 and 5.6."""
 
 from __future__ import annotations
 
@@ -18,42 +18,44 @@ from rigtwin.studies.stability.models import single_mass_structure, single_mass_
 from rigtwin.studies.stability.vehicle import SingleMass
 
 MASS = SingleMass(50.0, 500.0, 100.0)
-"""§5.1.4."""
+"""Single mass of §5.1.4: mass, kg, stiffness, N/m, damping, Ns/m."""
 SOFT = SingleMass(50.0, 41.4, 1.0)
-"""Table 5.2."""
+"""Single mass of Table 5.2."""
 FILTER = 0.01
-"""s, each of the two lags of (5.31)."""
+"""Time constant of both lags of (5.31), s."""
 
 
 def formulas() -> list[Entry]:
-    """Critical lags, Cardano's formula and the two lags of §5.1.6."""
+    """Return the entries of critical lags, Cardano's formula and the two lags of §5.1.6."""
     random = np.random.default_rng(0)
+    # Log-normal factors with σ = 2: the formulas must hold far from the printed values.
     masses = [SingleMass(*map(float, np.exp(random.normal(0.0, 2.0, 3)) * MASS)) for _ in range(20)]
-    found = [critical_lag(single_mass(mass)) for mass in masses]
-    off = [
+    criticals = [critical_lag(single_mass(mass)) for mass in masses]
+    # τ_c k/b − 1, and ω_c/√(k/m) − 1: both vanish if (5.28) holds.
+    time_errors = [
         each.time * mass.stiffness / mass.damping - 1.0 if each else math.inf
-        for each, mass in zip(found, masses, strict=True)
+        for each, mass in zip(criticals, masses, strict=True)
     ]
-    undamped = [
+    frequency_errors = [
         each.frequency / mass.natural_frequency - 1.0 if each else math.inf
-        for each, mass in zip(found, masses, strict=True)
+        for each, mass in zip(criticals, masses, strict=True)
     ]
-    worst, slowest = max(map(abs, off)), max(map(abs, undamped))
-    at = "of 20 masses drawn at random"
+    worst, worst_frequency = max(map(abs, time_errors)), max(map(abs, frequency_errors))
+    sample = "of 20 masses drawn at random"
     return [
         statement(
             "Equation 5.28",
             "critical lag",
             "τ_c = b/k",
             worst < 1e-9,
-            f"within {worst:.1g} of b/k {at}",
+            f"within {worst:.1g} of b/k {sample}",
         ),
         statement(
             "§5.1.5",
             "at the critical lag",
             "as undamped",
-            slowest < 1e-9,
-            f"at √(k/m) within {slowest:.1g} {at}",
+            worst_frequency < 1e-9,
+            f"at √(k/m) within {worst_frequency:.1g} {sample}",
         ),
         _region_entry(),
         _equivalence(),
@@ -63,48 +65,57 @@ def formulas() -> list[Entry]:
 
 
 def _region_entry() -> Entry:
-    own = _critical(MASS)
-    other = {
+    """Return the entry of Figure 5.4: how the critical lag depends on each parameter."""
+    nominal = _critical(MASS)
+    doubled = {
         name: _critical(MASS._replace(**{name: 2.0 * getattr(MASS, name)})) for name in MASS._fields
     }
-    holds = other["damping"] > own > other["stiffness"] and abs(other["mass"] / own - 1.0) < 1e-9
-    words = ", ".join(f"{time:.4g} s with twice the {name}" for name, time in other.items())
-    says = "larger with damping, smaller with stiffness, no matter the mass"
-    return statement("Figure 5.4", "critical lag", says, holds, f"{own:.4g} s; {words}")
+    holds = (
+        doubled["damping"] > nominal > doubled["stiffness"]
+        and abs(doubled["mass"] / nominal - 1.0) < 1e-9
+    )
+    words = ", ".join(f"{time:.4g} s with twice the {name}" for name, time in doubled.items())
+    claim = "larger with damping, smaller with stiffness, no matter the mass"
+    return statement("Figure 5.4", "critical lag", claim, holds, f"{nominal:.4g} s; {words}")
 
 
 def _equivalence() -> Entry:
-    """(5.17): to the wheel's ground the lagged force and the lagged position of the mass are one
-    system."""
+    """Return the entry of (5.17): suspension MIL and structure MIL are the same system.
+
+    From the ground's motion to its output, a lag on the force equals a lag on the position.
+    """
     lag, frequencies = 0.1, np.logspace(-1.0, 3.0, 50)
     s = 1j * frequencies
     spring = MASS.damping * s + MASS.stiffness
+    # (5.17): (b s + k) / (m τ s³ + m s² + b s + k).
     printed = spring / (MASS.mass * lag * s**3 + MASS.mass * s**2 + spring)
     force = _response(single_mass_suspension(MASS, lag), "position", s)
     plate = _response(single_mass_structure(MASS, lag), "plate", s)
-    off = max(float(np.max(np.abs(each * spring / printed - 1.0))) for each in (force, plate))
+    deviation = max(float(np.max(np.abs(each * spring / printed - 1.0))) for each in (force, plate))
     note = "with the ground's share of the force filtered too, which (5.13) leaves out"
     return statement(
         "Equation 5.17",
         "suspension and structure MIL",
         "identical",
-        off < 1e-9,
-        f"both within {off:.1g} of (5.17)",
+        deviation < 1e-9,
+        f"both within {deviation:.1g} of (5.17)",
         note,
     )
 
 
 def _response(system: StateSpace, output: str, s: np.ndarray) -> np.ndarray:
+    """Return the frequency response of one output of a system to its only input."""
     return np.asarray(system(s, squeeze=False))[system.output_labels.index(output), 0]
 
 
 def _cardano() -> list[Entry]:
-    """(5.18) with (5.21) to (5.24) in the cubic (5.17)."""
+    """Return the entries of Cardano's root (5.18), with (5.21) to (5.24), of the cubic (5.17)."""
     tau = 0.1
     m, k, b = MASS
     cubic = np.polynomial.Polynomial([k / (tau * m), b / (tau * m), 1.0 / tau, 1.0])
 
     def remainder(a: float, b_: float) -> float:
+        # s = ∛(A + √(A² + B³)) + ∛(A − √(A² + B³)) − 1/(3τ), real cube roots.
         root = np.emath.sqrt(a**2 + b_**3)
         s = (
             complex(a + root) ** (1.0 / 3.0)
@@ -122,7 +133,7 @@ def _cardano() -> list[Entry]:
         1 / (27 * tau**3) - b / (6 * m * tau**2) - k / (2 * m * tau),
         1 / (9 * tau**2) + b / (3 * m * tau),
     )
-    right = remainder(
+    corrected = remainder(
         -1 / (27 * tau**3) + b / (6 * m * tau**2) - k / (2 * m * tau),
         -1 / (9 * tau**2) + b / (3 * m * tau),
     )
@@ -143,30 +154,37 @@ def _cardano() -> list[Entry]:
             "Equation 5.18",
             "with the signs put right",
             "a root of (5.17)",
-            right < 1e-6,
-            f"leaves {right:.2g}",
+            corrected < 1e-6,
+            f"leaves {corrected:.2g}",
         ),
     ]
 
 
 def _double_lag() -> list[Entry]:
-    """§5.1.6: two lags of 10 ms, and the one lag that stands for them."""
+    """Return the entries of §5.1.6: two lags of 10 ms, and the single lag that replaces them."""
 
     def phase(frequency: float) -> float:
         return math.degrees(-2.0 * math.atan(frequency * FILTER))
 
-    at = _root(lambda frequency: phase(frequency) + 45.0)
-    below = np.linspace(0.1, 0.999, 200) * at
-    ahead = [phase(each) - math.degrees(-math.atan(each / at)) for each in below]
+    at_45_degrees = _root(lambda frequency: phase(frequency) + 45.0)
+    frequencies = np.linspace(0.1, 0.999, 200) * at_45_degrees
+    # Both filters lag by 45° at the same frequency; below it they differ slightly.
+    lead = [
+        phase(frequency) - math.degrees(-math.atan(frequency / at_45_degrees))
+        for frequency in frequencies
+    ]
 
     def excess(stiffness: float, lags: int, lag: float) -> float:
-        found = critical_lag(single_mass(SOFT._replace(stiffness=stiffness), lags))
-        return (found.time if found else math.inf) - lag
+        critical = critical_lag(single_mass(SOFT._replace(stiffness=stiffness), lags))
+        return (critical.time if critical else math.inf) - lag
 
-    first, second = _root(lambda k: excess(k, 1, 1.0 / at)), _root(lambda k: excess(k, 2, FILTER))
-    safe = f"up to 45° the second order filter is ahead by {min(ahead):.2g} to {max(ahead):.2g}°"
+    first, second = (
+        _root(lambda k: excess(k, 1, 1.0 / at_45_degrees)),
+        _root(lambda k: excess(k, 2, FILTER)),
+    )
+    safe = f"up to 45° the second order filter is ahead by {min(lead):.2g} to {max(lead):.2g}°"
     return [
-        digits("§5.1.6", "frequency of 45° lag", "41.4", at, "rad/s"),
+        digits("§5.1.6", "frequency of 45° lag", "41.4", at_45_degrees, "rad/s"),
         digits(
             "§5.1.6",
             "k/b, first order, marginal",
@@ -187,19 +205,19 @@ def _double_lag() -> list[Entry]:
             "Figure 5.6",
             "first order filter",
             "slightly larger lag up to 45°: safe",
-            min(ahead) > 0.0,
+            min(lead) > 0.0,
             safe,
         ),
     ]
 
 
 def _root(function: Callable[[float], float]) -> float:
-    """Between 10 and 100."""
+    """Return the root of a function between 10 and 100."""
     return float(root_scalar(function, bracket=(10.0, 100.0), method="brentq", xtol=1e-9).root)
 
 
 def region() -> Drawing:
-    """Figure 5.4."""
+    """Draw Figure 5.4: the critical lag over stiffness and damping."""
     figure, axes = sheet(1, 1, width=7.0, height=5.0)
     stiffness, dampings = np.linspace(100.0, 2000.0, 24), np.linspace(10.0, 400.0, 24)
     lags = np.array([[_critical(SingleMass(MASS.mass, k, b)) for k in stiffness] for b in dampings])
@@ -224,24 +242,31 @@ def region() -> Drawing:
 
 
 def _critical(mass: SingleMass) -> float:
-    found = critical_lag(single_mass(mass))
-    return found.time if found else math.inf
+    """Return the critical lag of a mass, s; infinite if every lag is stable."""
+    critical = critical_lag(single_mass(mass))
+    return critical.time if critical else math.inf
 
 
 def bode() -> Drawing:
-    """Figure 5.6."""
+    """Draw Figure 5.6: the Bode plot of both filters."""
     figure, axes = sheet(2, 1, width=8.0, height=2.8)
     frequencies = np.logspace(0.0, 4.0, 400)
-    at = (math.sqrt(2.0) - 1.0) / FILTER
+    # 2 atan(ω T) = 45° at ω = tan(22.5°)/T = (√2 − 1)/T.
+    at_45_degrees = (math.sqrt(2.0) - 1.0) / FILTER
     for name, coefficients in (
         ("second order (5.31)", [FILTER**2, 2.0 * FILTER, 1.0]),
-        ("first order (5.32)", [1.0 / at, 1.0]),
+        ("first order (5.32)", [1.0 / at_45_degrees, 1.0]),
     ):
         response = 1.0 / np.polyval(coefficients, 1j * frequencies)
         axes[0][0].semilogx(frequencies, 20.0 * np.log10(np.abs(response)), label=name)
         axes[1][0].semilogx(frequencies, np.degrees(np.unwrap(np.angle(response))), label=name)
     axes[1][0].plot(
-        at, -45.0, "o", color="black", markerfacecolor="white", label=f"45° at {at:.1f} rad/s"
+        at_45_degrees,
+        -45.0,
+        "o",
+        color="black",
+        markerfacecolor="white",
+        label=f"45° at {at_45_degrees:.1f} rad/s",
     )
     axes[0][0].set_ylabel("magnitude, dB")
     axes[1][0].set_ylabel("phase, degrees")

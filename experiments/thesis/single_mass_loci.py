@@ -1,5 +1,7 @@
-"""§5.2 as data: every case of Tables 5.3 to 5.5, the figures that show it, and what the thesis says
-of it."""
+"""§5.2 as data: the root loci of the single mass.
+
+Every case of Tables 5.3 to 5.5 stands here with its figures and the thesis' statements.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,8 @@ from dataclasses import replace
 from experiments.thesis import judges, resemblance, shapes
 from experiments.thesis.judges import Judge
 from experiments.thesis.loci import (
-    Case,
     Claim,
+    LocusCase,
     Panel,
     locus,
     of_damping_ratio,
@@ -20,6 +22,7 @@ from experiments.thesis.loci import (
 from rigtwin.studies.stability.locus import BODY
 
 MODEL = "single-mass"
+# Sweeps by damping ratio or by lag, s. For a single mass the tables write k and m without index.
 LAGS = {ratio: of_lag(ratio) for ratio in (1.0, 0.5)}
 SLOW = {
     ratio: replace(of_natural_frequency(ratio, 0.2, 1e5), symbol="k") for ratio in (1.0, 1.5, 0.5)
@@ -30,27 +33,30 @@ QUICK = {
 RATIOS = {lag: replace(of_damping_ratio(lag), symbol="k = m") for lag in (0.2, 0.01, 0.001)}
 
 
-def _says(figure: str, what: str, says: str, judge: Judge, note: str = "") -> Claim:
-    return Claim(f"Figure {figure}", what, says, judge, note)
+def _claim(figure: str, topic: str, words: str, judge: Judge, note: str = "") -> Claim:
+    """Return a claim about a figure, such as `5.7`."""
+    return Claim(f"Figure {figure}", topic, words, judge, note)
 
 
-def _table_5_3() -> tuple[Case, ...]:
+def _table_5_3() -> tuple[LocusCase, ...]:
+    """Return the cases of Table 5.3: the lag is swept at two damping ratios."""
+    # At the critical lag τ = b/k the damping vanishes, and the mass swings at √(k/m).
     cases = []
     for number, ratio in ((1, 1.0), (2, 0.5)):
         claims = [
-            _says(
+            _claim(
                 "5.7", "smallest lag", "the filter's pole is on the far left", shapes.far_left(1)
             ),
-            _says(
+            _claim(
                 "5.7", "stability", "unstable as the lag increases", judges.becomes_unstable(BODY)
             ),
-            _says(
+            _claim(
                 "5.8",
                 "small lags",
                 "the poles match the ideal ones",
                 resemblance.resembles("start"),
             ),
-            _says(
+            _claim(
                 "5.8",
                 "boundary",
                 "resembles an undamped mass on a spring",
@@ -59,22 +65,24 @@ def _table_5_3() -> tuple[Case, ...]:
         ]
         if number == 1:
             claims.append(
-                _says(
+                _claim(
                     "5.8", "critically damped", "moves away from the real axis", shapes.breaks_away
                 )
             )
         panels = (Panel("5.7"), Panel("5.8", (-12.0, 2.0, 6.0)))
         cases.append(
-            Case(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims))
+            LocusCase(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims))
         )
     return tuple(cases)
 
 
-def _table_5_4() -> tuple[Case, ...]:
+def _table_5_4() -> tuple[LocusCase, ...]:
+    """Return the cases of Table 5.4: the natural frequency is swept by the stiffness."""
+    # At a constant ζ, b/k ∝ 1/√k: 0.2 s becomes unstable within the sweep, 0.01 s does not.
     cases = []
     for number, ratio, figure in ((1, 1.0, "5.9"), (2, 1.5, "5.10"), (3, 0.5, "5.11")):
         claims = [
-            _says(
+            _claim(
                 figure,
                 "stability",
                 "unstable as the natural frequency increases",
@@ -82,12 +90,17 @@ def _table_5_4() -> tuple[Case, ...]:
             )
         ]
         if ratio > 0.5:
-            left = shapes.ends_left_of(locus(MODEL, SLOW[0.5]), "ζ = 0.5")
+            further_left = shapes.ends_left_of(locus(MODEL, SLOW[0.5]), "ζ = 0.5")
             claims.append(
-                _says(figure, "end of the sweep", "further right for lower damping ratios", left)
+                _claim(
+                    figure,
+                    "end of the sweep",
+                    "further right for lower damping ratios",
+                    further_left,
+                )
             )
         cases.append(
-            Case(
+            LocusCase(
                 MODEL,
                 f"case {number}, ζ = {ratio:g}, τ = 0.2 s",
                 SLOW[ratio],
@@ -98,8 +111,8 @@ def _table_5_4() -> tuple[Case, ...]:
     for number, ratio, figure in ((4, 1.0, "5.12"), (5, 1.5, "5.13"), (6, 0.5, "5.14")):
         slow = locus(MODEL, SLOW[ratio])
         claims = [
-            _says(figure, "stability", "no instability at 44.72 rad/s", judges.stable_throughout),
-            _says(
+            _claim(figure, "stability", "no instability at 44.72 rad/s", judges.stable_throughout),
+            _claim(
                 figure,
                 "end of the sweep",
                 "a much higher frequency",
@@ -107,10 +120,10 @@ def _table_5_4() -> tuple[Case, ...]:
             ),
         ]
         if ratio >= 1.0:
-            left = shapes.breaks_away_left_of(slow, "τ = 0.2 s")
-            claims.append(_says(figure, "breakaway", "further left with less lag", left))
+            further_left = shapes.breaks_away_left_of(slow, "τ = 0.2 s")
+            claims.append(_claim(figure, "breakaway", "further left with less lag", further_left))
         cases.append(
-            Case(
+            LocusCase(
                 MODEL,
                 f"case {number}, ζ = {ratio:g}, τ = 0.01 s",
                 QUICK[ratio],
@@ -121,66 +134,70 @@ def _table_5_4() -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def _table_5_5() -> tuple[Case, ...]:
+def _table_5_5() -> tuple[LocusCase, ...]:
+    """Return the cases of Table 5.5: the damping ratio falls from 50 to 0.0005."""
+    # The sweep starts at the high ratio, so `start` of a judge means strong damping.
     slow, quick = (locus(MODEL, RATIOS[lag]) for lag in (0.2, 0.01))
     further = shapes.asymptote_left_of(slow, "τ = 0.2 s")
-    at = 1e4  # k = m of a damping ratio of 0.005
+    at_ratio_0_005 = 1e4  # k = m, in N/m and kg
     note = "at 0.005 it is on the boundary, b/k = τ, and below it, in the printed range, unstable"
     low = (-0.6, 0.2, 1.6)
     return (
-        Case(
+        LocusCase(
             MODEL,
             "case 1, τ = 0.2 s",
             RATIOS[0.2],
             (Panel("5.15"), Panel("5.16", low)),
             (
-                _says("5.15", "high ratios", "vertical asymptote", shapes.asymptote("start")),
-                _says("5.16", "low ratios", "unstable", judges.becomes_unstable(BODY)),
+                _claim("5.15", "high ratios", "vertical asymptote", shapes.asymptote("start")),
+                _claim("5.16", "low ratios", "unstable", judges.becomes_unstable(BODY)),
             ),
         ),
-        Case(
+        LocusCase(
             MODEL,
             "case 2, τ = 0.01 s",
             RATIOS[0.01],
             (Panel("5.17"), Panel("5.18", low)),
             (
-                _says("5.17", "high ratios", "asymptote further left, frequencies higher", further),
-                _says(
+                _claim(
+                    "5.17", "high ratios", "asymptote further left, frequencies higher", further
+                ),
+                _claim(
                     "5.18",
                     "damping ratio 0.005",
                     "does not cause instability",
-                    judges.not_unstable_at(at),
+                    judges.not_unstable_at(at_ratio_0_005),
                     note,
                 ),
             ),
         ),
-        Case(
+        LocusCase(
             MODEL,
             "case 3, τ = 0.001 s",
             RATIOS[0.001],
             (Panel("5.19"), Panel("5.20", low)),
             (
-                _says("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
-                _says(
+                _claim("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
+                _claim(
                     "5.19",
                     "resemblance",
                     "far better than with more lag",
                     resemblance.closer_than(quick, "τ = 0.01 s"),
                 ),
-                _says(
+                _claim(
                     "5.20",
                     "damping ratio 0.005",
                     "does not cause instability",
-                    judges.not_unstable_at(at),
+                    judges.not_unstable_at(at_ratio_0_005),
                 ),
             ),
         ),
     )
 
 
-CASES: Mapping[str, Callable[[], tuple[Case, ...]]] = {
+CASES: Mapping[str, Callable[[], tuple[LocusCase, ...]]] = {
     "5.3": _table_5_3,
     "5.4": _table_5_4,
     "5.5": _table_5_5,
 }
-"""Table → its cases."""
+"""Functions that return the cases of a table, by its number."""

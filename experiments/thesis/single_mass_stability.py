@@ -1,5 +1,4 @@
-"""§5.1 and §5.2: the stability of a single mass whose suspension or structure comes through a
-lag."""
+"""§5.1 and §5.2: stability of a single mass with a lag in the suspension or in the structure."""
 
 from __future__ import annotations
 
@@ -35,27 +34,29 @@ TABLE_5_1 = {
         ("-2.946", "0.4732 + 2.562i", "0.4732 - 2.562i"),
     ),
 }
-"""Lag → poles of the structure's model and of the suspension's. A real part that is not printed is
-written to the digits of its column."""
+"""Lag, s → poles of the structure model and of the suspension model.
+
+A real part that the table leaves out is written to the digits of its column.
+"""
 TABLE_5_2 = (
     ("0.00 + 0.91i", "0.00 - 0.91i", "-41.4"),
     ("-1.7e-5 + 0.91i", "-1.7e-5 - 0.91i", "-101", "-98.9"),
 )
-"""Poles with the first and with the second order filter; 0 is written to the digits beside it."""
+"""Poles with the first-order and with the second-order filter; 0 is written out to two digits."""
 
 
 def _pole_entries(
-    where: str, what: str, printed: Sequence[str], found: np.ndarray, notes: Mapping[str, str]
+    where: str, system: str, printed: Sequence[str], computed: np.ndarray, notes: Mapping[str, str]
 ) -> list[Entry]:
-    """Every printed pole beside the one of ours that stands for it."""
+    """Return entries for the printed poles, each with its computed counterpart."""
     values = np.array([complex(text.replace(" ", "").replace("i", "j")) for text in printed])
-    # By the square root, so that what agrees is paired first and one wrong figure stays one.
-    rows, columns = linear_sum_assignment(np.sqrt(np.abs(values[:, None] - found[None, :])))
+    # The square root favours exact pairs, so a single misprint does not disturb the other pairs.
+    rows, columns = linear_sum_assignment(np.sqrt(np.abs(values[:, None] - computed[None, :])))
     entries = []
     for row, column in zip(rows, columns, strict=True):
-        text, ours = printed[int(row)], complex(found[column])
+        text, ours = printed[int(row)], complex(computed[column])
         real, _, imaginary = text.partition(" ")
-        name, note = f"{what}, pole {row + 1}", notes.get(text, "")
+        name, note = f"{system}, pole {row + 1}", notes.get(text, "")
         entries.append(digits(where, f"{name}, real part", real, ours.real, "1/s", note))
         if imaginary:
             frequency = imaginary.replace(" ", "").rstrip("i").lstrip("+")
@@ -64,6 +65,7 @@ def _pole_entries(
 
 
 def _tables() -> list[Entry]:
+    """Return the entries of Tables 5.1 to 5.5 and of §5.2.3."""
     entries = []
     doubled = {"-4": "the fourth pole of (5.16) is −1/τ, as in the other rows: −2, not −4"}
     for lag, (structure, suspension) in TABLE_5_1.items():
@@ -79,12 +81,12 @@ def _tables() -> list[Entry]:
         ("first", TABLE_5_2[0], (1.0 / 41.4,)),
         ("second", TABLE_5_2[1], (FILTER, FILTER)),
     ):
-        found = poles(single_mass_suspension(SOFT, *lags))
-        entries += _pole_entries("Table 5.2", f"{name} order filter", printed, found, slip)
+        computed = poles(single_mass_suspension(SOFT, *lags))
+        entries += _pole_entries("Table 5.2", f"{name} order filter", printed, computed, slip)
     for number, ratio, printed in ((1, 1.0, "316.2"), (2, 0.5, "158.1")):
-        found = damping(ratio, ARBITRARY.suspension_stiffness)
+        ours = damping(ratio, ARBITRARY.suspension_stiffness)
         entries.append(
-            digits("Table 5.3", f"b of case {number}, ζ = {ratio:g}", printed, found, "Ns/m")
+            digits("Table 5.3", f"b of case {number}, ζ = {ratio:g}", printed, ours, "Ns/m")
         )
     entries.append(
         digits(
@@ -95,6 +97,7 @@ def _tables() -> list[Entry]:
             "rad/s",
         )
     )
+    # Table 5.5 varies k = m with b = 100 Ns/m: ω = 1 rad/s and ζ = b/(2 k).
     ends = [SingleMass(both, both, 100.0) for both in (1.0, 1e5)]
     for case in (1, 2, 3):
         entries.append(
@@ -116,7 +119,7 @@ def _tables() -> list[Entry]:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    """All tables, formulas and root loci of the single mass."""
+    """Return the entries, drawings and remarks of the single mass."""
     entries, drawings = [*_tables(), *formulas()], [region(), bode()]
     for table, cases_of in CASES.items():
         cases = cases_of()

@@ -1,5 +1,4 @@
-"""§7.1 and appendix B1, B2: semi-active and active skyhook under a point mass, over many roads:
-Tables 7.1 to 7.3."""
+"""§7.1 and appendices B1, B2 (Tables 7.1 to 7.3): skyhook under a point mass, over many roads."""
 
 from __future__ import annotations
 
@@ -16,17 +15,19 @@ from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
-WITHIN = 1.5
+WITHIN = 1.5  # factor within which a computed value agrees with a printed one
+# Skyhook damping, Ns/m, of the active tests of Table 7.2.
 GAINS = {"active 100": 100.0, "active": 200.0, "active 500": 500.0}
 TABLE_7_2 = {"active 100": "0.1039", "active": "0.0819", "active 500": "0.0588"}
 TABLE_7_3 = {"passive": "0.2264", "semi-active": "0.0874", "active": "0.0819"}
-"""rms sprung mass acceleration, m/s²."""
+"""Acceleration of the sprung mass of Tables 7.2 and 7.3, m/s² rms."""
 
 
 def _run(name: str, seed: int) -> Result:
+    """Return the measures of one test; `active 100` is the active test with 100 Ns/m."""
     if name in GAINS:
         gain = GAINS[name]
-        return ride.kept(
+        return ride.job_result(
             trial(
                 "active",
                 seed,
@@ -34,10 +35,11 @@ def _run(name: str, seed: int) -> Result:
             ),
             seed,
         )
-    return ride.kept(trial(name, seed), seed)
+    return ride.job_result(trial(name, seed), seed)
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
+    """Return the jobs of the study."""
     return seeded(
         {
             name: lambda seed, name=name: _run(name, seed)
@@ -48,6 +50,7 @@ def jobs(seeds: int) -> Mapping[str, Job]:
 
 
 def _entries(results: dict[str, Result]) -> list[Entry]:
+    """Return all entries of §7.1 and of appendices B1 and B2."""
     configuration = find("semi-active").configuration
     settings = configuration.controller
     entries = [
@@ -70,27 +73,37 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
                 )
             )
     entries += [
-        ride.reduced("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
-        ride.reduced("§7.1.2", results, "active", "passive", "63.8", WITHIN),
+        ride.reduction_entry("§7.1.1", results, "semi-active", "passive", "61.4", WITHIN),
+        ride.reduction_entry("§7.1.2", results, "active", "passive", "63.8", WITHIN),
         digits("§7.1.1", "61.4 % from Table 7.3 itself", "61.4", 100 * (1 - 0.0874 / 0.2264), "%"),
         digits("§7.1.2", "63.8 % from Table 7.3 itself", "63.8", 100 * (1 - 0.0819 / 0.2264), "%"),
-        *ride.tracking("Table B1.1", results, "semi-active", ("7.50", "286", "0.0593", "58"), 1.5),
-        *ride.tracking("Table B2.1", results, "active", ("8.47", "425", "0.0595", "58"), 1.5),
+        *ride.tracking_entries(
+            "Table B1.1", results, "semi-active", ("7.50", "286", "0.0593", "58"), 1.5
+        ),
+        *ride.tracking_entries(
+            "Table B2.1", results, "active", ("8.47", "425", "0.0595", "58"), 1.5
+        ),
     ]
     return entries + _statements(results)
 
 
 def _statements(results: dict[str, Result]) -> list[Entry]:
+    """Return the entries of what §7.1 says about its figures."""
+
     def all_of(name: str, value: str) -> np.ndarray:
         return over_seeds(results, name, value)
 
+    # Seeds are paired: all gains drive over the same roads.
     falls = np.all(np.diff([all_of(name, "acceleration") for name in GAINS], axis=0) < 0, axis=0)
     text = f"in {int(np.sum(falls))} of {len(falls)} seeds"
-    more = all_of("active 500", "ideal tyre rms") > all_of("active 100", "ideal tyre rms")
-    tyre = all_of("active 500", "tyre rms") > all_of("active 100", "tyre rms")
-    words = f"twin: in {int(np.sum(tyre))} of {len(tyre)} seeds, ideal: in {int(np.sum(more))}"
-    alike = np.abs(all_of("semi-active", "travel rms") / all_of("active", "travel rms") - 1)
-    less = all_of("semi-active", "travel rms") < all_of("passive", "travel rms")
+    more_in_ideal = all_of("active 500", "ideal tyre rms") > all_of("active 100", "ideal tyre rms")
+    more_on_twin = all_of("active 500", "tyre rms") > all_of("active 100", "tyre rms")
+    twin, ideal = int(np.sum(more_on_twin)), int(np.sum(more_in_ideal))
+    words = f"twin: in {twin} of {len(more_on_twin)} seeds, ideal: in {ideal}"
+    travel_differences = np.abs(
+        all_of("semi-active", "travel rms") / all_of("active", "travel rms") - 1
+    )
+    travels_less = all_of("semi-active", "travel rms") < all_of("passive", "travel rms")
     switches = all_of("semi-active", "switches")
     return [
         statement(
@@ -100,7 +113,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
             "§7.1.2",
             "more skyhook damping",
             "more tyre vibration",
-            bool(np.mean(tyre) > 0.5),
+            bool(np.mean(more_on_twin) > 0.5),
             words,
             "over the whole test, drop included, it is not so in the ideal system either",
         ),
@@ -108,15 +121,15 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
             "Figure 7.8",
             "travel, semi-active and active",
             "nearly identical",
-            bool(np.median(alike) < 0.1),
-            f"rms differs by {100 * np.median(alike):.1f} %",
+            bool(np.median(travel_differences) < 0.1),
+            f"rms differs by {100 * np.median(travel_differences):.1f} %",
         ),
         statement(
             "Figure 7.8",
             "travel, semi-active",
             "less than passive",
-            bool(np.all(less)),
-            f"in {int(np.sum(less))} of {len(less)} seeds",
+            bool(np.all(travels_less)),
+            f"in {int(np.sum(travels_less))} of {len(travels_less)} seeds",
         ),
         statement(
             "Figure 7.2",
@@ -129,6 +142,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
 
 
 def _forces(results: dict[str, Result]) -> Drawing:
+    """Draw the demanded damping forces and the coefficient of the semi-active damper."""
     figure, axes = sheet(3, 1, height=2.2)
     for name, axis in (("semi-active", axes[0][0]), ("active", axes[2][0])):
         for label, colour in (
@@ -154,6 +168,7 @@ def _forces(results: dict[str, Result]) -> Drawing:
 
 
 def _box(results: dict[str, Result]) -> Drawing:
+    """Draw the accelerations over the seeds as boxes, beside the ideal and the thesis."""
     figure, axes = sheet(1, 2, height=3.2)
     for axis, printed in ((axes[0][0], TABLE_7_3), (axes[0][1], TABLE_7_2)):
         for number, (name, text) in enumerate(printed.items()):
@@ -192,11 +207,12 @@ def _box(results: dict[str, Result]) -> Drawing:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    found = dict(results)
-    shown = {name: found[f"{name}/{SHOWN_SEED}"] for name in ("passive", "semi-active", "active")}
-    gains = {f"{gain:g} Ns/m": found[f"{name}/{SHOWN_SEED}"] for name, gain in GAINS.items()}
+    """Return the entries, drawings and remarks of §7.1."""
+    by_key = dict(results)
+    shown = {name: by_key[f"{name}/{SHOWN_SEED}"] for name in ("passive", "semi-active", "active")}
+    gains = {f"{gain:g} Ns/m": by_key[f"{name}/{SHOWN_SEED}"] for name, gain in GAINS.items()}
     drawings = [
-        _forces(found),
+        _forces(by_key),
         ride.histories("figure-7.4", "Figure 7.4 to 7.6", "Active skyhook, three gains.", gains),
         ride.histories(
             "figure-7.7",
@@ -204,14 +220,14 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
             "Passive, semi-active and active skyhook.",
             shown,
         ),
-        _box(found),
+        _box(by_key),
     ]
-    remarks = [ride.remark(found, name) for name in ("passive", "semi-active", *GAINS)]
+    remarks = [ride.remark(by_key, name) for name in ("passive", "semi-active", *GAINS)]
     remarks.append(
         f"{MEASURED}; below the twin's limit cycle by friction, at "
         "3.4 Hz and above, whose tail is still in it"
     )
-    return Conclusion(_entries(found), drawings, remarks)
+    return Conclusion(_entries(by_key), drawings, remarks)
 
 
 STUDY = Study(

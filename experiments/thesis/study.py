@@ -1,5 +1,4 @@
-"""What a study of the thesis is: jobs that can run side by side, and what is concluded from their
-results."""
+"""A study of the thesis: jobs that can run in parallel, and a conclusion from their results."""
 
 from __future__ import annotations
 
@@ -13,14 +12,26 @@ from experiments.thesis.entry import Entry
 from rigtwin.numerics.arrays import Array
 
 Result = Mapping[str, Array | float]
-"""Of one job: name → array or number."""
+"""Result of one job: arrays or numbers by name."""
 Job = Callable[[], Result]
+"""Work of one job."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of the thesis drawn anew. name: of its file, without ending; covers: the figures it
-    stands for, in words."""
+    """A figure of the thesis drawn from computed results.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file, without its suffix.
+    covers : str
+        Figures of the thesis that the drawing reproduces, such as `Figure 3.11 to 3.14`.
+    caption : str
+        Caption.
+    figure : matplotlib.figure.Figure
+        Drawing.
+    """
 
     name: str
     covers: str
@@ -30,7 +41,17 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What a study found. remarks: lines of text that stand beside the figures."""
+    """Conclusion of a study.
+
+    Attributes
+    ----------
+    entries : sequence of Entry
+        Printed results beside the computed ones.
+    drawings : sequence of Drawing
+        Reproduced figures.
+    remarks : sequence of str
+        Further findings, one paragraph each.
+    """
 
     entries: Sequence[Entry] = ()
     drawings: Sequence[Drawing] = ()
@@ -38,16 +59,29 @@ class Conclusion:
 
 
 def _no_jobs(seeds: int) -> Mapping[str, Job]:
+    """Return no jobs: the study concludes from closed forms alone."""
     return {}
 
 
 @dataclass(frozen=True)
 class Study:
-    """name: as `rigtwin reproduce` takes it; chapter: `3` to `7`, `A` or `B`; covers: the tables,
-    figures and equations that can be asked for by name, such as `Table 5.1` or `Figure 5.7`.
+    """A study of one section of the thesis.
 
-    jobs: of the number of seeds, key → work whose result is kept on disk, so that a broken run goes
-    on where it was; conclude: of the results by key.
+    Attributes
+    ----------
+    name : str
+        Name, as `rigtwin reproduce` takes it.
+    title : str
+        Title.
+    chapter : str
+        Chapters, separated by spaces: `3` to `7`, `A` or `B`.
+    covers : tuple of str
+        Tables, figures and equations that can be reproduced by name, such as `Table 5.1`.
+    conclude : callable
+        Function of the results by key that returns the conclusion.
+    jobs : callable
+        Function of the number of seeds that returns the jobs by key. Results are stored on disk,
+        so an interrupted run resumes. Defaults to no jobs.
     """
 
     name: str
@@ -59,14 +93,15 @@ class Study:
 
 
 def span(kind: str, chapter: str, first: int, last: int) -> tuple[str, ...]:
-    """`Figure 5.7` to `Figure 5.20`: span("Figure", "5.", 7, 20)."""
+    """Return consecutive names: span("Figure", "5.", 7, 20) is `Figure 5.7` to `Figure 5.20`."""
     return tuple(f"{kind} {chapter}{number}" for number in range(first, last + 1))
 
 
 def sheet(
     rows: int, columns: int, width: float = 11.0, height: float = 3.0
 ) -> tuple[Figure, list[list]]:
-    """An empty figure and its axes, in rows; height: of a row, inch."""
+    """Return an empty figure and its axes in rows; width: of the figure, height: of a row, inch."""
+    # A figure of its own, without pyplot: jobs of several threads draw without global state.
     figure = Figure(figsize=(width, height * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False)

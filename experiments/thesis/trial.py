@@ -1,5 +1,4 @@
-"""One test of a study: run on the twin in memory, beside the ideal system, and what of it is
-kept."""
+"""One test of a study: simulated on the twin in memory and compared with the ideal system."""
 
 from __future__ import annotations
 
@@ -22,78 +21,119 @@ from rigtwin.simulation.runner import SimulationResult, simulate
 from rigtwin.simulation.safety import Trip, explain_trip
 
 BODY = 3.0
-"""Hz; up to which the body's motion is counted. The road of chapter 7 ends at 1.6 Hz, and the
-twin's friction limit cycle, whose size depends on gains that the thesis does not give, begins at
-3.4 Hz."""
+"""Highest frequency counted in the acceleration of the body, Hz.
+
+The road of chapter 7 ends at 1.6 Hz. The twin's friction limit cycle begins at 3.4 Hz; its size
+depends on controller gains that the thesis does not give.
+"""
 SHOWN = 20
-"""Ticks between the samples of a curve that is kept to be drawn."""
+"""Ticks between the samples of a curve stored for drawing."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A test, what the twin did, and what the ideal system would have done. truth columns: ground,
-    structure, travel, force."""
+    """A test on the twin, and the same test of the ideal system.
+
+    Attributes
+    ----------
+    configuration : Configuration
+        Settings of the test.
+    simulation : SimulationResult
+        Commands, measurements and true values of the twin.
+    ideal : Ideal
+        Motion of the ideal system on the same ground.
+    """
 
     configuration: Configuration
-    ran: SimulationResult
-    should: Ideal
+    simulation: SimulationResult
+    ideal: Ideal
 
     @property
     def time(self) -> Array:
-        return np.arange(len(self.ran.commands)) * self.configuration.timing.period
+        """Time of every tick, s, shape (ticks,)."""
+        return np.arange(len(self.simulation.commands)) * self.configuration.timing.period
 
     @property
     def plate(self) -> Array:
-        return self.ran.truth[:, 1]
+        """True position of the structure plate, m, shape (ticks,)."""
+        return self.simulation.truth[:, 1]
 
     @property
     def travel(self) -> Array:
-        return self.ran.truth[:, 2]
+        """True suspension travel, m, shape (ticks,)."""
+        return self.simulation.truth[:, 2]
 
     @property
     def wheel(self) -> Array:
-        return self.ran.truth[:, 1] - self.ran.truth[:, 2]
+        """True position of the wheel, m, shape (ticks,): plate minus travel."""
+        return self.simulation.truth[:, 1] - self.simulation.truth[:, 2]
 
     @property
     def force(self) -> Array:
-        return self.ran.truth[:, 3]
+        """True suspension force, N, shape (ticks,)."""
+        return self.simulation.truth[:, 3]
 
 
 def trial(
     name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c
 ) -> Trial:
-    """Runs an experiment, with its configuration changed. Raises RigtwinError if it trips."""
+    """Run a named experiment on the twin and on the ideal system.
+
+    Parameters
+    ----------
+    name : str
+        Name of the experiment.
+    seed : int
+        Seed of the road and of the sensor noise.
+    change : callable
+        Function that changes the configuration. Defaults to none.
+
+    Returns
+    -------
+    Trial
+        Both results.
+
+    Raises
+    ------
+    RigtwinError
+        If the test ends early at a limit.
+    """
     experiment = find(name)
     configuration = change(experiment.configuration)
     demands = experiment.demands(configuration, seed)
-    ran = simulate(configuration, demands, seed)
-    if ran.trip != Trip.NONE:
+    simulated = simulate(configuration, demands, seed)
+    if simulated.trip != Trip.NONE:
         raise RigtwinError(
-            f"{name} with seed {seed}: {explain_trip(ran.trip, configuration.safety)} "
-            f"after {len(ran.commands)} ticks"
+            f"{name} with seed {seed}: {explain_trip(simulated.trip, configuration.safety)} "
+            f"after {len(simulated.commands)} ticks"
         )
-    return Trial(configuration, ran, simulate_ideal(configuration, ran.commands[:, 0]))
+    # The ideal system gets the commanded ground, so the ground cylinder's lag is not an error of
+    # the suspension.
+    return Trial(configuration, simulated, simulate_ideal(configuration, simulated.commands[:, 0]))
 
 
 def errors(test: Trial) -> dict[str, float]:
-    """rms e1, e2 and e1 + e2 of position (m) and force (N), and of what they are a share: the
-    ideal's motion about its mean."""
-    found = compute_tracking(test.should, test.ran.commands, test.plate, test.force)
+    """Return the rms errors of position, m, and force, N, and the ideal's rms about its mean.
+
+    e1 is ideal minus demanded, e2 demanded minus true (§3.6); `total` is the rms of e1 + e2.
+    """
+    tracking = compute_tracking(test.ideal, test.simulation.commands, test.plate, test.force)
     swing = {
-        "ideal_position": float(np.std(test.should.structure)),
-        "ideal_force": float(np.std(test.should.force)),
+        "ideal_position": float(np.std(test.ideal.structure)),
+        "ideal_force": float(np.std(test.ideal.force)),
     }
-    return {**vars(found), **swing}
+    return {**vars(tracking), **swing}
 
 
 def body_acceleration(position: Array, period: float) -> float:
-    """rms acceleration of the body up to BODY Hz, m/s², of its position (m)."""
+    """Return the rms acceleration of the body up to `BODY` Hz, m/s², from its position, m."""
+    # Filtered before it is differentiated twice, and forwards and backwards: no phase lag.
     smooth = sosfiltfilt(butter(2, BODY, fs=1.0 / period, output="sos"), position)
     return rms(np.diff(smooth, 2) / period**2)
 
 
 def vehicle(where: str, configuration: Configuration) -> list[Entry]:
-    """The quarter car of Tables 6.2 and 7.1 as a test has it."""
+    """Return the entries of the quarter car's parameters (Tables 6.2 and 7.1)."""
     settings, plant = configuration.controller, configuration.plant
     return [
         digits(where, "sprung mass", "25", settings.sprung_mass, "kg"),
@@ -106,27 +146,28 @@ def vehicle(where: str, configuration: Configuration) -> list[Entry]:
 
 
 def curves(test: Trial) -> dict[str, Array]:
-    """What is drawn of a test, every SHOWN-th tick, in mm, N and s."""
+    """Return the curves to draw, every `SHOWN`-th tick, in mm, N and s."""
     shown = slice(None, None, SHOWN)
-    found = {
+    signals = {
         "time": test.time,
-        "ground": 1e3 * test.ran.commands[:, 0],
-        "asked position": 1e3 * test.ran.commands[:, 1],
-        "asked force": test.ran.commands[:, 2],
+        "ground": 1e3 * test.simulation.commands[:, 0],
+        "asked position": 1e3 * test.simulation.commands[:, 1],
+        "asked force": test.simulation.commands[:, 2],
         "plate": 1e3 * test.plate,
         "travel": 1e3 * test.travel,
         "wheel": 1e3 * test.wheel,
         "force": test.force,
-        "ideal plate": 1e3 * test.should.structure,
-        "ideal travel": 1e3 * (test.should.structure - test.should.wheel),
-        "ideal wheel": 1e3 * test.should.wheel,
-        "ideal force": test.should.force,
+        "ideal plate": 1e3 * test.ideal.structure,
+        "ideal travel": 1e3 * (test.ideal.structure - test.ideal.wheel),
+        "ideal wheel": 1e3 * test.ideal.wheel,
+        "ideal force": test.ideal.force,
     }
-    return {name: values[shown] for name, values in found.items()}
+    return {name: values[shown] for name, values in signals.items()}
 
 
 def seeded(names: Mapping[str, Callable[[int], Result]], seeds: int) -> dict[str, Job]:
-    """A job for each name and seed, its key `name/seed`."""
+    """Return a job for each name and seed, with the key `name/seed`."""
+    # The defaults bind the loop variables now; a closure would see their last values.
     return {
         f"{name}/{seed}": (lambda work=work, seed=seed: work(seed))
         for name, work in names.items()
@@ -135,7 +176,8 @@ def seeded(names: Mapping[str, Callable[[int], Result]], seeds: int) -> dict[str
 
 
 def over_seeds(results: Mapping[str, Result], name: str, value: str) -> Array:
-    """One value of every seed's result, shape (seeds,)."""
+    """Return one value of the results of all seeds, in the order of the seeds, shape (seeds,)."""
+    # Seeds are sorted as numbers: differences between two tests pair equal roads.
     keys = [key for key in results if key.rpartition("/")[0] == name]
     return np.array(
         [

@@ -1,5 +1,4 @@
-"""§3.6: the rig against the ideal single mass, dropped and driven: Table 3.4 and 3.5, Figures 3.11
-to 3.20."""
+"""§3.6 (Tables 3.4 and 3.5, Figures 3.11 to 3.20): the rig against the ideal single mass."""
 
 from __future__ import annotations
 
@@ -11,14 +10,16 @@ from scipy.signal import csd, welch
 from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
-from experiments.thesis.trial import curves, errors, over_seeds, seeded, trial
+from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IDEAL = COLOURS["other"]
 WITHIN = 2.0
-"""Factor within which an experimental figure agrees: the force loop's gains, noise and road are not
-those of the lab."""
+"""Factor within which an experimental value agrees.
+
+The gains of the force loop, the noise and the road of the laboratory are unknown.
+"""
 TESTS = {"single-mass": "no ground input", "single-mass-road": "ground input"}
 TABLE_3_5 = {
     "position_e1": ("0.00772", "0.00448", "m"),
@@ -28,55 +29,66 @@ TABLE_3_5 = {
     "force_e2": ("9.53", "8.79", "N"),
     "force_sum": ("12.2", "11.5", "N"),
 }
-"""Thesis Table 3.5: without and with ground input. The totals are sums of both rms errors, as in
-the thesis."""
+"""Thesis Table 3.5: value without and with ground input, and unit.
+
+The totals are sums of both rms errors, as in the thesis.
+"""
 SHOWN_SEED = 0
 MOST_SEEDS = 12
 
 
 def _run(name: str, seed: int) -> Result:
+    """Return the errors and responses of one test, and its curves for the drawn seed."""
     test = trial(name, seed)
-    found: dict[str, object] = dict(errors(test))
+    result: dict[str, object] = dict(errors(test))
     frequencies, ours, ideal = _acceleration_response(test)
-    found |= {"frequencies": frequencies, "response": ours, "ideal response": ideal}
-    late = slice(0, 8000)
-    found["overshoot"] = -float(
-        np.min(test.ran.commands[late, 1]) - np.min(test.should.structure[late])
+    result |= {"frequencies": frequencies, "response": ours, "ideal response": ideal}
+    early = slice(0, 8000)
+    # The drop goes down: an overshoot is a minimum below the ideal one.
+    result["overshoot"] = -float(
+        np.min(test.simulation.commands[early, 1]) - np.min(test.ideal.structure[early])
     )
     if seed == SHOWN_SEED:
-        found |= curves(test)
-    return found  # type: ignore[return-value]
+        result |= curves(test)
+    return result  # type: ignore[return-value]
 
 
-def _acceleration_response(test) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
-    """Sprung acceleration per ground velocity, 1/s, up to 2 Hz (Fig. 3.18)."""
+def _acceleration_response(test: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return frequencies up to 2 Hz, and the responses of twin and ideal there (Fig. 3.18).
+
+    A response is the acceleration of the sprung mass per ground velocity, 1/s.
+    """
     period = test.configuration.timing.period
-    ground = np.gradient(test.ran.commands[:, 0], period)
+    ground = np.gradient(test.simulation.commands[:, 0], period)
     options = {"fs": 1 / period, "nperseg": 20_000, "noverlap": 15_000, "detrend": "linear"}
     frequencies, power = welch(ground, **options)
     shown = (frequencies > 0) & (frequencies <= 2.0)
-    found = []
-    for position in (test.ran.commands[:, 1], test.should.structure):
+    responses = []
+    for position in (test.simulation.commands[:, 1], test.ideal.structure):
         acceleration = np.gradient(np.gradient(position, period), period)
+        # H1 estimate S_yx/S_xx. Without ground input S_xx is zero and the response undefined.
         with np.errstate(divide="ignore", invalid="ignore"):
-            found.append(np.abs(csd(ground, acceleration, **options)[1][shown]) / power[shown])
-    return frequencies[shown], found[0], found[1]
+            responses.append(np.abs(csd(ground, acceleration, **options)[1][shown]) / power[shown])
+    return frequencies[shown], responses[0], responses[1]
 
 
 def jobs(seeds: int) -> Mapping[str, Job]:
+    """Return the jobs of the study; at most `MOST_SEEDS` seeds are used."""
     return seeded(
         {name: lambda seed, name=name: _run(name, seed) for name in TESTS}, min(seeds, MOST_SEEDS)
     )
 
 
 def _value(results: Mapping[str, Result], name: str, error: str) -> np.ndarray:
-    kind, _, which = error.partition("_")
-    if which == "sum":
+    """Return an error of Table 3.5 over the seeds, shape (seeds,), such as `force_sum`."""
+    kind, _, index = error.partition("_")
+    if index == "sum":
         return over_seeds(results, name, f"{kind}_e1") + over_seeds(results, name, f"{kind}_e2")
     return over_seeds(results, name, error)
 
 
 def _entries(results: Mapping[str, Result]) -> list[Entry]:
+    """Return all entries of §3.6."""
     settings = find("single-mass").configuration.controller
     entries = [
         digits("Table 3.4", "sprung mass", "25", settings.sprung_mass, "kg"),
@@ -84,17 +96,18 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
         digits("Table 3.4", "preload", "220", settings.preload, "N"),
         digits("Table 3.4", "suspension damping", "30", settings.suspension_damping, "Ns/m"),
     ]
+    # Eq. of §3.6: the spring starts with the preload alone and sags by (m g − F_0)/k.
     drop = (
         settings.sprung_mass * settings.gravity - settings.preload
     ) / settings.suspension_stiffness
     entries.append(digits("§3.6", "extension above equilibrium at the start", "0.072", drop, "m"))
     for error, (*printed, unit) in TABLE_3_5.items():
         for name, text in zip(TESTS, printed, strict=True):
-            what = f"{error.replace('_', ' ').replace('sum', 'e1 + e2')}, {TESTS[name]}"
+            quantity = f"{error.replace('_', ' ').replace('sum', 'e1 + e2')}, {TESTS[name]}"
             entries.append(
-                factor("Table 3.5", what, text, _value(results, name, error), unit, WITHIN)
+                factor("Table 3.5", quantity, text, _value(results, name, error), unit, WITHIN)
             )
-    for name, says in TESTS.items():
+    for name, condition in TESTS.items():
         larger = _value(results, name, "force_e2") > _value(results, name, "force_e1")
         smaller = _value(results, name, "position_e2") < _value(results, name, "position_e1")
         share = f"in {int(np.sum(larger & smaller))} of {len(larger)} seeds"
@@ -102,7 +115,7 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
         entries.append(
             statement(
                 "§3.6",
-                f"which error is larger, {says}",
+                f"which error is larger, {condition}",
                 text,
                 bool(np.all(larger & smaller)),
                 share,
@@ -129,6 +142,7 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
 
 
 def _time_panels(result: Result, title: str) -> Drawing:
+    """Draw the time histories of a test and a close-up of its tracking."""
     figure, axes = sheet(2, 2)
     time = np.asarray(result["time"])
     early = time <= 25.0
@@ -182,6 +196,7 @@ def _time_panels(result: Result, title: str) -> Drawing:
 
 
 def _subspace(results: Mapping[str, Result]) -> Drawing:
+    """Draw twin over ideal: the synchronisation subspaces of Figures 3.19 and 3.20."""
     figure, axes = sheet(1, 4, height=3.2)
     for column, (name, words) in enumerate(TESTS.items()):
         result = results[f"{name}/{SHOWN_SEED}"]
@@ -189,11 +204,9 @@ def _subspace(results: Mapping[str, Result]) -> Drawing:
             (axes[0][2 * column], "force", "N"),
             (axes[0][2 * column + 1], "plate", "mm"),
         ):
-            should = np.asarray(result[f"ideal {kind}"])
-            axis.plot(
-                should, np.asarray(result[kind]), color="#2f9e44", linewidth=0.6, label="twin"
-            )
-            axis.plot(should, should, color=SENSED, linewidth=1.0, label="ideal")
+            ideal = np.asarray(result[f"ideal {kind}"])
+            axis.plot(ideal, np.asarray(result[kind]), color="#2f9e44", linewidth=0.6, label="twin")
+            axis.plot(ideal, ideal, color=SENSED, linewidth=1.0, label="ideal")
             axis.set(title=f"{kind}, {words}", xlabel=f"ideal, {unit}", ylabel=f"twin, {unit}")
             axis.title.set_fontsize(9)
     axes[0][0].legend(fontsize=8)
@@ -202,15 +215,16 @@ def _subspace(results: Mapping[str, Result]) -> Drawing:
 
 
 def _response(results: Mapping[str, Result]) -> Drawing:
+    """Draw the acceleration response over frequency (Fig. 3.18)."""
     figure, axes = sheet(1, 1, width=7.0, height=3.5)
     axis = axes[0][0]
-    found = [result for key, result in results.items() if key.startswith("single-mass-road/")]
-    frequencies = np.asarray(found[0]["frequencies"])
+    roads = [result for key, result in results.items() if key.startswith("single-mass-road/")]
+    frequencies = np.asarray(roads[0]["frequencies"])
     inside = frequencies <= 0.6
     for kind, colour, label in (("ideal response", IDEAL, "ideal"), ("response", SENSED, "twin")):
-        middle = np.median([np.asarray(result[kind]) for result in found], axis=0)
-        axis.semilogy(frequencies[inside], middle[inside], color=colour, marker=".", label=label)
-        axis.semilogy(frequencies[~inside], middle[~inside], color=colour, alpha=0.35)
+        median = np.median([np.asarray(result[kind]) for result in roads], axis=0)
+        axis.semilogy(frequencies[inside], median[inside], color=colour, marker=".", label=label)
+        axis.semilogy(frequencies[~inside], median[~inside], color=colour, alpha=0.35)
     axis.axvline(0.576, color="black", linewidth=0.6, linestyle=":")
     axis.set(
         xlabel="Hz",
@@ -222,6 +236,7 @@ def _response(results: Mapping[str, Result]) -> Drawing:
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
+    """Return the entries and drawings of §3.6."""
     drawings = [
         _time_panels(results[f"single-mass/{SHOWN_SEED}"], "drop"),
         _time_panels(results[f"single-mass-road/{SHOWN_SEED}"], "road at 65 km/h"),

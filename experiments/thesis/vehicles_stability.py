@@ -1,4 +1,4 @@
-"""§6.2: the vehicles of Table 6.1 on the rig with its four lags."""
+"""§6.2: stability of the vehicles of Table 6.1 on the rig with its four lags."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rigtwin.studies.stability.models import Lags, ideal_quarter_car, rig, right
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 LAG = 0.01
-"""s, of each of the four filters (§6.2)."""
+"""Time constant of each of the four filters, s (§6.2)."""
 RIG = Lags(LAG, LAG, LAG, LAG)
 LIGHT_WHEEL = 40.0
-"""kg: with it the car of Table 6.1, printed with 400 kg, behaves as §6.2 says."""
+"""Unsprung mass with which the car of Table 6.1 behaves as §6.2 says, kg. 400 kg is printed."""
 UNLOADED = 0.1
-"""Of the sprung mass's weight: what the spring does not carry when the body is let go."""
+"""Share of the body's weight that the spring does not carry when the body is released."""
 PRINTED_RATIOS = {
     "boeing-707": "0.0094",
     "truck": "0.0484",
@@ -39,30 +39,45 @@ SHOWN = (
     ("car", "6.19, as printed", "6.20, as printed", 3.0),
     ("motorcycle", "6.21", "6.22", 3.0),
 )
-"""Vehicle, the figures of its body and its wheel, the seconds shown."""
+"""Vehicle, figures of its body and of its wheel, and time shown, s."""
 
 
 def vehicles() -> dict[str, QuarterCar]:
-    """Those of Table 6.1, tyres without damping, and the car with the wheel that it ought to
-    have."""
-    found = {
+    """Return the vehicles of Table 6.1 and the car with the corrected unsprung mass.
+
+    The tyres have no damping.
+    """
+    cars = {
         name: QuarterCar(tyre_damping=0.0, **vehicle._asdict())
         for name, vehicle in VEHICLES.items()
     }
-    return found | {"car, 40 kg wheel": found["car"]._replace(unsprung_mass=LIGHT_WHEEL)}
+    return cars | {"car, 40 kg wheel": cars["car"]._replace(unsprung_mass=LIGHT_WHEEL)}
 
 
 def growth(car: QuarterCar) -> complex:
-    """The rightmost pole on the rig: growth rate 1/s and frequency rad/s."""
+    """Return the rightmost pole on the rig: growth rate, 1/s, and frequency, rad/s."""
     return rightmost(rig(car, RIG))
 
 
 def drop(system: StateSpace, car: QuarterCar, time: np.ndarray) -> dict[str, np.ndarray]:
-    """Body and wheel, m from where they would come to rest, after the body is let go with a tenth
-    of its weight unsupported.
+    """Simulate the release of the body with a tenth of its weight unsupported.
 
-    time: s, in equal steps from 0.
+    Parameters
+    ----------
+    system : StateSpace
+        Linear rig or ideal quarter car.
+    car : QuarterCar
+        Vehicle of the system.
+    time : ndarray
+        Times, s, in equal steps from 0, shape (n,).
+
+    Returns
+    -------
+    dict
+        Positions of `body` and `wheel` relative to their rest, m, shape (n,).
     """
+    # Without input the exact step is x[n + 1] = exp(A T) x[n]: no integration error, even though
+    # the motion grows without bound.
     step = expm(np.asarray(system.A) * (time[1] - time[0]))
     states = np.empty((len(time), len(system.state_labels)))
     states[0] = _start(system, car)
@@ -72,7 +87,7 @@ def drop(system: StateSpace, car: QuarterCar, time: np.ndarray) -> dict[str, np.
 
 
 def _start(system: StateSpace, car: QuarterCar) -> np.ndarray:
-    """At rest, every filter settled; m from the rest after the drop, and N."""
+    """Return the initial state, relative to the rest after the drop, with every filter settled."""
     force = UNLOADED * car.sprung_mass * Settings().gravity
     travel, wheel = force / car.suspension_stiffness, force / car.tyre_stiffness
     start = {
@@ -86,6 +101,7 @@ def _start(system: StateSpace, car: QuarterCar) -> np.ndarray:
 
 
 def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
+    """Return all entries of Table 6.1 and §6.2."""
     entries = []
     for name, printed in PRINTED_RATIOS.items():
         car = cars[name]
@@ -132,9 +148,10 @@ def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
 
 
 def _all_dampings(cars: Mapping[str, QuarterCar]) -> list[Entry]:
-    """`The system was actually unstable for all damping values`."""
+    """Judge §6.2: `The system was actually unstable for all damping values`."""
     entries = []
     for name, car in cars.items():
+        # Six decades about the printed damping.
         dampings = car.suspension_damping * np.logspace(-3.0, 3.0, 601)
         real = np.array(
             [growth(car._replace(suspension_damping=float(damping))).real for damping in dampings]
@@ -153,6 +170,7 @@ def _all_dampings(cars: Mapping[str, QuarterCar]) -> list[Entry]:
 
 
 def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
+    """Draw the released vehicles on the rig and in the ideal system (Fig. 6.15 to 6.22)."""
     figure, axes = sheet(len(SHOWN), 2, width=11.0, height=2.3)
     for row, (name, body, wheel, seconds) in zip(axes, SHOWN, strict=True):
         car, time = cars[name], np.linspace(0.0, seconds, 3000)
@@ -161,6 +179,7 @@ def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
         for axis, numbered, part in zip(row, (body, wheel), ("body", "wheel"), strict=True):
             axis.plot(time, 1e3 * moved[part], linewidth=0.9, label="on the rig")
             axis.plot(time, 1e3 * ideal[part], color="0.6", linewidth=0.9, zorder=1, label="ideal")
+            # The fastest growing mode dominates soon; its envelope is e^(σ t).
             height = 1e3 * _share(car, part) * np.exp(rate * time)
             axis.plot(
                 time,
@@ -184,29 +203,32 @@ def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
 
 
 def _share(car: QuarterCar, part: str) -> float:
-    """The amplitude of the rightmost mode in a drop, m at its start."""
+    """Return the initial amplitude of the rightmost mode in a drop, m."""
     system = rig(car, RIG)
     values, vectors = np.linalg.eig(np.asarray(system.A))
     weights = np.linalg.solve(vectors, _start(system, car))
     row, column = system.state_labels.index(part), int(np.argmax(values.real))
+    # The pair of conjugate modes adds up to twice the modulus of one.
     return float(2.0 * abs(vectors[row, column] * weights[column]))
 
 
-def _said(found: Critical | None) -> str:
-    return f"{1e3 * found.time:.2f} ms ({found.frequency:.1f} rad/s)" if found else "none"
+def _format_critical(critical: Critical | None) -> str:
+    """Format a critical lag or delay with its frequency."""
+    return f"{1e3 * critical.time:.2f} ms ({critical.frequency:.1f} rad/s)" if critical else "none"
 
 
 def _remarks(cars: Mapping[str, QuarterCar]) -> list[str]:
+    """Return the critical lag and delay of every vehicle, one line each."""
     return [
         f"{name}: four equal lags are critical at "
-        f"{_said(critical_lag(LOOPS['rig'](car)))}, four equal pure delays at "
-        f"{_said(critical_delay(LOOPS['rig'](car)))}."
+        f"{_format_critical(critical_lag(LOOPS['rig'](car)))}, four equal pure delays at "
+        f"{_format_critical(critical_delay(LOOPS['rig'](car)))}."
         for name, car in cars.items()
     ]
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
-    """Table 6.1 and what §6.2 says of its vehicles."""
+    """Return the entries, the drawing and the remarks of §6.2."""
     cars = vehicles()
     return Conclusion(_entries(cars), (_drawing(cars),), _remarks(cars))
 

@@ -1,5 +1,7 @@
-"""Does the jobs of studies side by side, and keeps each result on disk, so that what was done is
-never done again."""
+"""Parallel execution of the studies' jobs, with every result stored on disk.
+
+A stored result is never computed again.
+"""
 
 from __future__ import annotations
 
@@ -10,26 +12,49 @@ from experiments.thesis.study import Result, Study
 from rigtwin.studies.sweep import Store, Workers, run_jobs
 
 
-def job(which: tuple[str, int, str]) -> Result:
-    """The work of one job: a study's name, its number of seeds, the job's key. Runs in any
-    process."""
+def run_job(request: tuple[str, int, str]) -> Result:
+    """Return the result of one job: name of the study, number of seeds, key of the job.
+
+    The function runs in any process.
+    """
+    # Imported here: a worker process loads the studies when it has its first job.
     from experiments.thesis.catalogue import BENCHMARKS, STUDIES
 
-    study, seeds, key = which
+    study, seeds, key = request
     return (STUDIES | BENCHMARKS)[study].jobs(seeds)[key]()
 
 
-def done(
+def run_studies(
     studies: Sequence[Study],
     seeds: int,
     folder: Path,
     workers: Workers,
     progress: Callable[[int, int], object] = lambda *_: None,
 ) -> dict[str, dict[str, Result]]:
-    """Results of every job of studies of the catalogue, study → key → result. progress is called
-    with (jobs done, jobs in all).
+    """Run the jobs of some studies of the catalogue, and return all their results.
 
-    Interrupted, it keeps what is finished. Raises RigtwinError if the folder cannot be written.
+    Parameters
+    ----------
+    studies : sequence of Study
+        Studies to run.
+    seeds : int
+        Number of seeds.
+    folder : Path
+        Folder of the stored results. An interrupted run keeps the finished ones.
+    workers : Workers
+        Processes that run the jobs.
+    progress : callable
+        Function called with the number of finished jobs and their total.
+
+    Returns
+    -------
+    dict
+        Study → key → result.
+
+    Raises
+    ------
+    RigtwinError
+        If the folder cannot be written.
     """
     keys = {study.name: list(study.jobs(seeds)) for study in studies}
     total, count = sum(map(len, keys.values())), 0
@@ -42,7 +67,12 @@ def done(
 
     with Store(folder / "results.sqlite") as store:
         jobs = [
-            (f"{study}/{key}", (study, seeds, key)) for study, own in keys.items() for key in own
+            (f"{study}/{key}", (study, seeds, key))
+            for study, keys_of_study in keys.items()
+            for key in keys_of_study
         ]
-        run_jobs(store, workers, job, jobs, step)
-        return {study: {key: store[f"{study}/{key}"] for key in own} for study, own in keys.items()}
+        run_jobs(store, workers, run_job, jobs, step)
+        return {
+            study: {key: store[f"{study}/{key}"] for key in keys_of_study}
+            for study, keys_of_study in keys.items()
+        }

@@ -1,4 +1,4 @@
-"""The studies that come along, each a TOML file beside this one: what to tune, and for what."""
+"""The shipped tuning studies, one TOML file each: the parameters, the objective, the limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rigtwin.studies.tuning.study import Study
 from rigtwin.studies.tuning.study_file import read_study
 
 STUDIES = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.toml"))}
-"""Name → file."""
+"""Path of the file of every shipped study, by name."""
 
 
 def find_study(
@@ -26,18 +26,23 @@ def find_study(
     Parameters
     ----------
     name : str
-        Of `STUDIES`, or the path of a TOML file.
+        Name in `STUDIES`, or the path of a TOML file.
     assignments : sequence of str, optional
-        `group.name=value` for every run, over the study's own.
+        Settings `group.name=value` for every run. They override those of the study.
     machine : Machine, optional
-        Whose controller is tuned; by default that which the study names.
+        Machine whose controller is tuned. Defaults to the one named in the study.
     **numbers : int or None
-        Of roads, held_out, evaluations; None for the study's own.
+        Values of `roads`, `held_out` and `evaluations`. None keeps the study's value.
+
+    Returns
+    -------
+    Study
+        Study with the overriding values applied.
 
     Raises
     ------
     RigtwinError
-        With what there is, or what is wrong with it.
+        If no study has this name, or its file is invalid.
     """
     path = STUDIES.get(name, Path(name))
     if path.suffix != ".toml" and not path.exists():

@@ -139,7 +139,7 @@ def _tuning(parsed: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from experiments.tuning import find_study
-    from referee.tuning import Case, check, document, text
+    from referee.tuning import TuningCase, check, document, text
     from rigtwin.studies.sweep import Store, open_workers
     from rigtwin.studies.tuning.bench import Bench
 
@@ -157,8 +157,8 @@ def _tuning(parsed: argparse.Namespace) -> int:
         tqdm(total=total, disable=None, unit="run", leave=False, file=sys.stderr) as bar,
     ):
 
-        def show(case: Case) -> None:
-            told = f"withheld {case.defect}; diagnosed: {case.found}"
+        def show(case: TuningCase) -> None:
+            told = f"withheld {case.defect}; diagnosed: {case.sentence}"
             bar.write(f"rig {case.number + 1}: {told}", file=sys.stdout)
 
         bench = Bench(study, store, workers, bar.update)

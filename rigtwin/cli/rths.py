@@ -101,7 +101,7 @@ def _tune(parsed: argparse.Namespace) -> int:
             parsed.case,
             quake=parsed.quake,
             plants=plants,
-            others=plants,
+            held_out_plants=plants,
             evaluations=parsed.evaluations,
             seed=parsed.seed,
             progress=bar.update,

@@ -12,11 +12,11 @@ from controllers.formula import (
     ADD,
     CLIP,
     COSINE,
+    DELAY,
     DERIVATIVE,
     DIVIDE,
     INTEGRAL,
     LARGER,
-    LATE,
     LOW_PASS,
     MEAN,
     MULTIPLY,
@@ -160,6 +160,6 @@ def _remember(code: int, signal: Array, length: float, period: float) -> Array |
         return sosfiltfilt(butter(1, corner, output="sos"), signal)
     if code == MEAN:
         return uniform_filter1d(signal, max(int(length), 1), mode="nearest")
-    assert code == LATE
+    assert code == DELAY
     ticks = min(int(length), len(signal))
     return np.concatenate([np.full(ticks, signal[0]), signal[: len(signal) - ticks]])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from controllers import Compensator, Settings
 from controllers.filters import low_pass
 from controllers.force import MOTOR_CONSTANT
-from controllers.friction import MAINS, MOTOR_LAG, NO_ERRORS, NO_VELOCITIES, REST, stepped
+from controllers.friction import MAINS, MOTOR_LAG, NO_ERRORS, NO_VELOCITIES, REST, step_compensator
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -83,7 +83,7 @@ def _detect(settings: Settings, travels: Array, errors: Array, period: float, ou
     state, velocities, last = REST, NO_VELOCITIES, NO_ERRORS
     for tick in range(len(travels)):
         before = state.added
-        state, velocities, last = stepped(
+        state, velocities, last = step_compensator(
             settings,
             state,
             velocities,
@@ -132,7 +132,7 @@ def _close_loop(
         errors[tick] = -filtered
         before = state.added
         if compensated:
-            state, velocities, last = stepped(
+            state, velocities, last = step_compensator(
                 settings,
                 state,
                 velocities,

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from referee.bench_cases import Case, record
+from referee.bench_cases import BenchCase, record
 from rigtwin.recording import Recording
 
 
-def recording_of(case: Case) -> Recording:
+def recording_of(case: BenchCase) -> Recording:
     data = record(case)
     time = np.arange(len(data.first)) * case.period
     if case.machine == "actuator":
