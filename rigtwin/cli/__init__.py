@@ -54,6 +54,7 @@ COMMANDS = (
     "calibrate",
     "compare",
     "diagnose",
+    "fit",
     "look",
     "watch",
     "machines",

@@ -14,8 +14,8 @@ from rigtwin.cli.options import (
     add_machine,
     add_settings,
     add_workers,
-    columns_of,
     counting_bar,
+    read_recordings,
     settings_of,
 )
 from rigtwin.console import writable, write_json
@@ -129,7 +129,7 @@ def execute(parsed: argparse.Namespace) -> int:
             if out.suffix.lower() != ending:
                 raise RigtwinError(f"--{name} {out}: expected a name that ends in {ending}")
             find_browser()
-    recordings, held_out = _recordings(parsed)
+    recordings, held_out = read_recordings(parsed)
     with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
 
         def progress(stage: str, steps: int) -> None:
@@ -178,26 +178,6 @@ def execute(parsed: argparse.Namespace) -> int:
         said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
     print("\n".join(said))
     return 1 if diagnosis.verdict == "unusable" else 0
-
-
-def _recordings(
-    parsed: argparse.Namespace,
-) -> tuple[list[rigtwin.Recording], list[rigtwin.Recording]]:
-    """Recordings that are diagnosed, and those held out; a model's logs are described first."""
-    import rigtwin
-    from rigtwin.api.describing import is_model, record_log
-    from rigtwin.errors import RigtwinError
-
-    stated = columns_of(parsed)
-    paths, apart = parsed.recordings, parsed.held_out
-    if not is_model(parsed.machine):
-        if stated or parsed.test:
-            raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
-        load = rigtwin.load
-        return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in apart]
-    described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
-    print(described, file=sys.stderr)
-    return [record_log(described, p) for p in paths], [record_log(described, p) for p in apart]
 
 
 def _diagnose_each(parsed: argparse.Namespace) -> int:

@@ -7,9 +7,12 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rigtwin.console import assigned_settings
+
+if TYPE_CHECKING:
+    import rigtwin
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -82,6 +85,26 @@ def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
             raise RigtwinError(f"--column {text}: expected KEY=SOURCE, such as elbow.position=q2")
         stated[key.strip()] = source.strip()
     return stated
+
+
+def read_recordings(
+    parsed: argparse.Namespace,
+) -> tuple[list[rigtwin.Recording], list[rigtwin.Recording]]:
+    """Return the recordings to explain and those held out; logs of a model are described first."""
+    import rigtwin
+    from rigtwin.api.describing import is_model, record_log
+    from rigtwin.errors import RigtwinError
+
+    stated = columns_of(parsed)
+    paths, apart = parsed.recordings, parsed.held_out
+    if not is_model(parsed.machine):
+        if stated or parsed.test:
+            raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
+        load = rigtwin.load
+        return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in apart]
+    described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
+    print(described, file=sys.stderr)
+    return [record_log(described, p) for p in paths], [record_log(described, p) for p in apart]
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

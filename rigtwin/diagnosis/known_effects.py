@@ -26,6 +26,8 @@ WIDTH = 1.96
 """Half width of a 95 % interval of a normal distribution, in standard deviations."""
 CONFOUNDED = 0.05
 """Eigenvalue of the correlation matrix below which a combination counts as undetermined."""
+SINGULAR = 1e-10
+"""Least eigenvalue of a scaled normal matrix; what is smaller is rounding."""
 TAKES_PART = 0.3
 """Share of a combination from which a parameter counts as part of it."""
 TIED = 4.0
@@ -291,11 +293,26 @@ def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
 
     here = np.concatenate([np.asarray(values, float) for values in fit.values])
     rest = residual(here)
-    _, high = fitter.bounds(fit.effects)
+    low, high = fitter.bounds(fit.effects)
     jacobian = take_derivatives(residual, here, rest, steps, high)
     normal, _ = fitter.space.beside(fit.effects).normal_equations(jacobian, rest)
     excess = max(fit.misfit / evidence.expected, 1.0)
-    return np.linalg.pinv(normal, hermitian=True) * np.outer(steps, steps) * excess
+    return _invert(normal, steps, high - low) * excess
+
+
+def _invert(normal: Array, steps: Array, ranges: Array) -> Array:
+    """Return the inverse of a normal matrix in units of `steps`, in SI.
+
+    A direction that the data say nothing about gets the variance of the whole range instead of
+    none, as a pseudo-inverse would give it.
+    """
+    least = (steps / ranges) ** 2
+    scale = np.sqrt(np.maximum(np.diag(normal), least))
+    eigenvalues, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    inverse = (vectors / np.maximum(eigenvalues, SINGULAR)) @ vectors.T
+    widest = np.minimum(np.sqrt(np.diag(inverse)) * steps / scale, ranges)
+    sizes = np.sqrt(np.diag(inverse))
+    return inverse / np.outer(sizes, sizes) * np.outer(widest, widest)
 
 
 def _list_parameters(machine: Machine, fit: Fit, covariance: Array) -> tuple[FittedParameter, ...]:

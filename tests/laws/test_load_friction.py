@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigtwin.models.choose import model_of
 
 from rigtwin.components import Guide
 from rigtwin.components.guide import friction
 from rigtwin.description.document import load
-from rigtwin.models.choose import model_of
 from rigtwin.models.guided import resist_at_once
 from rigtwin.recording import Recording
 from tests.laws.joints import INTERPRETED, PERIOD, force_to_move, motion_under

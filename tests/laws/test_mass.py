@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from rigtwin.models.choose import model_of
 
 from rigtwin.components import Guide, Mass, Rotor
-from rigtwin.models.choose import model_of
 from tests.helpers.described import TOML, described, recording_of
 from tests.laws.written import law_of
 
