@@ -12,6 +12,7 @@ import numpy as np
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Structure
 from rigtwin.diagnosis.component_replays import REPLAYS, ComponentReplays, Undetermined
+from rigtwin.diagnosis.contacts import find_contacts
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
@@ -64,7 +65,8 @@ def compare(
     """
     configuration = configuration or machine.configuration_of(recording)
     faults = require_fit(machine, recording, configuration)
-    notes = (*recording.notes, *(fault.message for fault in faults))
+    messages = [fault.message for fault in faults]
+    notes = (*recording.notes, *messages, *find_contacts(machine, recording))
     evidence = Evidence(machine, [recording], [configuration])
     gap = gap_level(evidence, configuration.plant)
     if machine.structure is not Structure.QUARTER_CAR:
