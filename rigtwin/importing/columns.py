@@ -19,13 +19,15 @@ MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "
 class Columns:
     """values: name → numbers, shape (rows,), not a number where a cell held none; units: name → as
     the file says; form: how it was read, for people; notes: what was odd on the way; wrong: name →
-    the first cell that should be a number and is none, and where it stands."""
+    the first cell that should be a number and is none, and where it stands; words: name of a
+    column that is left out, as it holds no numbers → its first cell, and where that stands."""
 
     values: Mapping[str, Array]
     units: Mapping[str, str] = field(default_factory=dict)
     form: str = ""
     notes: tuple[str, ...] = ()
     wrong: Mapping[str, str] = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -139,4 +141,8 @@ def join(tables: Mapping[str, Columns]) -> Columns:
                 wrong |= {own: table.wrong[name]} if name in table.wrong else {}
     notes = tuple(f"{file}: {note}" for file, table in tables.items() for note in table.notes)
     form = "; ".join(f"{file}: {table.form}" for file, table in tables.items())
-    return Columns(values, units, form, notes, wrong)
+    words = {
+        f"{file}.{n}": cell for file, table in tables.items() for n, cell in table.words.items()
+    }
+    words |= {n: cell for table in tables.values() for n, cell in table.words.items()}
+    return Columns(values, units, form, notes, wrong, words)

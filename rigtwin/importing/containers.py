@@ -77,13 +77,18 @@ def _hdf(path: Path) -> dict[str, Any]:
             f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'"
         ) from None
 
-    def content(group: Any) -> dict[str, Any]:
+    def content(group: Any, above: tuple[int, ...] = ()) -> dict[str, Any]:
         found: dict[str, Any] = {}
+        above = (*above, h5py.h5o.get_info(group.id).addr)
         for name, item in group.items():
             # A link may lead nowhere.
             if name.startswith("#") or item is None:
                 continue
-            found[name] = content(item) if isinstance(item, h5py.Group) else item[()]
+            if not isinstance(item, h5py.Group):
+                found[name] = item[()]
+            elif h5py.h5o.get_info(item.id).addr not in above:
+                # A group may link to one that it stands in.
+                found[name] = content(item, above)
         return found
 
     try:

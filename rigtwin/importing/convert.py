@@ -22,6 +22,7 @@ from rigtwin.importing.timing import (
     drop_repeats,
     find_period,
     require_even_ticks,
+    require_plausible,
     resample,
 )
 from rigtwin.importing.units import is_unit, unit_of
@@ -72,6 +73,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
         report += _notes(columns, inputs)
+        report += _time_notes(columns, wanted)
         time = _time(columns, wanted, signals)
         time, signals = drop_repeats(time, signals, report)
         taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
@@ -81,6 +83,8 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
             )
         time, signals = time[taken], {name: values[taken] for name, values in signals.items()}
         period = wanted.period or find_period(time)
+        if wanted.period is None:
+            require_plausible(period, not _times_without_unit(columns, wanted))
         _require_numbers(columns, inputs, time, signals)
         if wanted.resample is not None:
             time, signals = resample(time, signals, period, wanted.resample, report)
@@ -122,6 +126,12 @@ def _named(columns: Columns, name: str) -> str:
 
 def _column(columns: Columns, name: str) -> Array:
     if name not in columns.values:
+        if name in columns.words:
+            raise RigtwinError(
+                f"column {name!r} holds {columns.words[name]}, which was taken for a word; "
+                "expected plain numbers, such as 1234.5, without thousands separators, and not "
+                "hexadecimal"
+            )
         close = difflib.get_close_matches(name, columns.values, 1)
         hint = f"did you mean {close[0]!r}? " if close else ""
         raise RigtwinError(f"no column {name!r}; {hint}there are {', '.join(columns.values)}")
@@ -168,6 +178,21 @@ def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:
                 f"other; if it begins again there, say wrap = {wrap:.0f} in the map"
             )
     return found
+
+
+def _times_without_unit(columns: Columns, wanted: Map) -> list[str]:
+    """Columns of time whose unit neither the map nor the file states."""
+    if wanted.time_unit is not None:
+        return []
+    names = [_named(columns, name) for name in wanted.time]
+    return [name for name in names if name not in columns.units]
+
+
+def _time_notes(columns: Columns, wanted: Map) -> list[str]:
+    return [
+        f"time: no unit is said of column {name!r}; taken as s"
+        for name in _times_without_unit(columns, wanted)
+    ]
 
 
 def _time(columns: Columns, wanted: Map, signals: Signals) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
-from rigtwin.importing.columns import Columns, is_missing, is_value, numbers_of
+from rigtwin.importing.columns import Columns, is_missing, is_value, number_of, numbers_of
 from rigtwin.importing.units import is_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
@@ -72,7 +72,25 @@ def read_text(path: Path) -> Columns:
     if found.words:
         form += f"; words in {', '.join(found.names[place] for place in sorted(found.words))}"
     units = {n: u for n, u in zip(found.names, found.units, strict=True) if u and n in values}
-    return Columns(values, units, form, notes, wrong)
+    for place, name in enumerate(found.names):
+        if name in values and name not in units and _holds_stamps(rows, place, found.decimal):
+            units[name] = "s"
+    words = {
+        found.names[place]: f"{rows[0][place][:40]!r} in line {numbers[0]}"
+        for place in sorted(found.words)
+        if rows
+    }
+    return Columns(values, units, form, notes, wrong, words)
+
+
+def _holds_stamps(rows: Sequence[Sequence[str]], place: int, decimal: str) -> bool:
+    """Whether a column's first cell is a date or a time of day, which are in seconds."""
+    cell = next((row[place] for row in rows if not is_missing(row[place])), "")
+    try:
+        number_of(cell, decimal)
+    except ValueError:
+        return bool(cell)
+    return False
 
 
 def _rows(
