@@ -74,6 +74,10 @@ def test_zeros_take_no_longer_than_reading_them(tmp_path: Path, head: bytes) -> 
     assert time.perf_counter() - begun < 2.0
     with pytest.raises(RigtwinError):
         growing.recording()
+    begun = time.perf_counter()
+    with pytest.raises(RigtwinError):
+        load(path)
+    assert time.perf_counter() - begun < 2.0
 
 
 @pytest.mark.parametrize("byte", [3, 4, 7])

@@ -14,7 +14,16 @@ from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.reader import Gathered, Recording
-from rigtwin.recording.records import CHUNK_HEAD, DAMAGE, Lost, find_chunk, length_of, take_apart
+from rigtwin.recording.records import (
+    CHUNK_HEAD,
+    DAMAGE,
+    PRIVATE,
+    Lost,
+    find_chunk,
+    is_opcode,
+    length_of,
+    take_apart,
+)
 
 _PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
@@ -22,8 +31,6 @@ READ = 2**18
 """Bytes that are read of a file at a time."""
 LONGEST = 2**26
 """Bytes that a record may have; a longer one is damage."""
-KNOWN, PRIVATE = frozenset(int(opcode) for opcode in Opcode), 0x80
-"""Kinds of record, and the first of those that programs may define; anything else is damage."""
 
 
 class GrowingRecording:
@@ -115,7 +122,7 @@ class GrowingRecording:
         if waiting < _PREFIX.size:
             return False
         opcode, length = _PREFIX.unpack_from(self._buffer, self._at)
-        if (opcode not in KNOWN and opcode < PRIVATE) or length > LONGEST:
+        if not is_opcode(opcode) or length > LONGEST:
             self._note_damage()
             return True
         end = self._at + _PREFIX.size + length

@@ -40,6 +40,8 @@ CHUNK_HEAD = _PLACE + len(_COMPRESSION)
 """Bytes by which the beginning of a chunk is known."""
 FEW = 8
 """Turns of the same channels below which it is not worth while to take them at once."""
+_KNOWN, PRIVATE = frozenset(int(opcode) for opcode in Opcode), 0x80
+"""Kinds of record of the format, and the first of those that programs may define."""
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 """Of a record: its kind and length; of a message: its channel, number and two times."""
@@ -72,11 +74,19 @@ class _Reader(StreamReader):
         if opcode == Opcode.MESSAGE_INDEX:
             self._stream.read(length)
             return None
+        if not is_opcode(opcode):
+            raise McapError(f"no record is of kind {opcode}")
         record = super()._read_record(opcode, length)
         if isinstance(record, Chunk) and length_of(record) != length:
             # What follows within the wrong length would be passed over in silence.
             raise McapError(f"chunk of {length_of(record)} bytes says {length}")
         return record
+
+
+def is_opcode(number: int) -> bool:
+    """Whether a byte says the kind of a record: one of the format's, or one that programs may
+    define."""
+    return number in _KNOWN or number >= PRIVATE
 
 
 def length_of(chunk: Chunk) -> int:
