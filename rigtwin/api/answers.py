@@ -11,6 +11,8 @@ from rigtwin.api.machines import (
     described_machine,
     effect_texts,
     machine_of,
+    names_of,
+    require_unrecorded,
     twin_of,
 )
 from rigtwin.api.recordings import the_recording
@@ -41,6 +43,7 @@ def diagnose(
     held_out: Recorded | Sequence[Recorded] = (),
     settings: Settings = (),
     without: Sequence[str] = (),
+    exclude: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Diagnosis:
@@ -58,6 +61,8 @@ def diagnose(
         Changes of the twin that they are compared with: of its plant and `timing.timestep`.
     without
         Effects that are taken out of the twin first, such as "coulomb@rail".
+    exclude
+        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
     progress
         Called with a stage's name and the steps done in it.
     first_look
@@ -83,7 +88,8 @@ def diagnose(
             if several
             else "no recording to diagnose"
         )
-    found = described_machine(several[0], machine)
+    found = described_machine(several[0], machine).excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, found, [*several, *apart])
     base = twin_of(found, settings, without)
     tests = [find_experiment(found, name) for name in found.next_tests]
     return find_reasons(
@@ -97,6 +103,7 @@ def what_changed(
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
     without: Sequence[str] = (),
+    exclude: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Changes:
     """Says what changed between recordings of one machine, and what that goes with.
@@ -111,6 +118,8 @@ def what_changed(
         Changes of the twin that they are compared with: of its plant and `timing.timestep`.
     without
         Effects that are taken out of the twin first, such as "coulomb@rail".
+    exclude
+        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
     progress
         Called with a stage's name and the steps done in it.
 
@@ -129,7 +138,8 @@ def what_changed(
         raise RigtwinError("a recording is named twice; it is the same as itself")
     if not several:
         raise RigtwinError("what changed is a question to two recordings or more; none was given")
-    found = described_machine(several[0], machine)
+    found = described_machine(several[0], machine).excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, found, several)
     return find_changes(found, several, twin_of(found, settings, without), progress)
 
 
@@ -164,6 +174,7 @@ def compare(
     """
     recording = the_recording(recording)
     found = described_machine(recording, machine)
+    require_unrecorded(settings, found, [recording])
     base = twin_of(found, settings, (), effect_texts(effects))
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 

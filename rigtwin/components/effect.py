@@ -135,6 +135,16 @@ class Kind:
     negative: str = field(default="", compare=False, repr=False)
     nuisances: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
+    def __reduce__(self) -> tuple[Callable[[str], Kind], tuple[str]]:
+        """Kinds are code, which stays where it is: another process looks one up by its name."""
+        return _kind_of, (self.name,)
+
+
+def _kind_of(name: str) -> Kind:
+    from rigtwin.components.library import KINDS  # Late: the library is made of kinds.
+
+    return next(kind for kind in KINDS if kind.name == name)
+
 
 @dataclass(frozen=True)
 class Effect:
