@@ -172,7 +172,5 @@ def test_a_shipped_channel_table_is_found_by_its_name(name):
 
 
 def test_a_channel_table_that_does_not_exist_lists_the_shipped_ones(tmp_path):
-    with pytest.raises(
-        RigtwinError, match="card.toml does not exist; shipped ones: cart"
-    ):
+    with pytest.raises(RigtwinError, match="card.toml does not exist; shipped ones: cart"):
         find_table(tmp_path / "card.toml")
