@@ -185,8 +185,9 @@ def require_unrecorded(
             own = recording.machine == of.name and name in recording.controller
             if group == "controller" and own:
                 raise RigtwinError(
-                    f"{key}: {recording.path} states {recording.controller[name]} for it, which "
-                    "holds; expected settings of the plant, or timing.timestep"
+                    f"{key}: {recording.path} states {recording.controller[name]} for it, and the "
+                    "recording's own settings hold; expected settings of the plant, or "
+                    "timing.timestep"
                 )
 
 

@@ -28,7 +28,13 @@ def execute(parsed: argparse.Namespace) -> int:
     recording = rigtwin.load(parsed.recording, parsed.machine)
     units: dict[str, str] = {}
     if parsed.machine is not None:
-        units = rigtwin.machine(parsed.machine).units
+        machine = rigtwin.machine(parsed.machine)
+        if machine.name != recording.machine:
+            raise rigtwin.RigtwinError(
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"--machine is {machine.name!r}"
+            )
+        units = machine.units
     elif recording.machine in rigtwin.machines():
         units = rigtwin.machine(recording.machine).units
     print(f"{recording.path}: {recording.experiment} on {recording.machine}")
