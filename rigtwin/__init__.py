@@ -13,10 +13,10 @@ Names are loaded when they are first used, so that importing it costs nothing.
 from __future__ import annotations
 
 from importlib import import_module
-from types import FunctionType
-from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
+TYPE_CHECKING = False
+"""As in `typing`, which takes a while to import."""
 
 if TYPE_CHECKING:
     from rigtwin.api.answers import (
@@ -239,7 +239,7 @@ _WHERE = {name: module for module, names in _MODULES.items() for name in names}
 def __getattr__(name: str) -> object:
     if name in _WHERE:
         value = getattr(import_module(f"rigtwin.api.{_WHERE[name]}"), name)
-        if isinstance(value, FunctionType):
+        if isinstance(value, type(__getattr__)):
             value = import_module("rigtwin.api.arguments").explained(value)
         globals()[name] = value
         return value

@@ -13,6 +13,8 @@ import pytest
 
 import rigtwin
 from rigtwin.api.arguments import describe, explained, fits
+from rigtwin.errors import RigtwinError
+from rigtwin.hardware.daq.table import find_table
 
 FUNCTIONS = {
     name: value
@@ -116,3 +118,59 @@ def test_a_failure_of_right_arguments_stays_what_it_is() -> None:
         fail("x")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="unexpected keyword"):
         fail(numbers=1)  # type: ignore[call-arg]
+
+
+def test_a_truth_value_is_no_number():
+    with pytest.raises(RigtwinError, match="cases True: expected a whole number"):
+        rigtwin.blindcheck(True)
+
+
+@pytest.mark.parametrize("effects", ["coulomb@guide", ["coulomb@guide"]])
+def test_an_effect_without_a_value_is_answered_in_terms_of_python_too(effects):
+    with pytest.raises(RigtwinError) as caught:
+        rigtwin.run("emps", "positioning", effects=effects)
+    assert "effect 'coulomb@guide' has no value" in str(caught.value)
+    assert "in Python {'coulomb@rail': 80}" in str(caught.value)
+    assert "--" not in str(caught.value)
+
+
+def test_a_misspelt_effect_has_a_suggestion():
+    with pytest.raises(RigtwinError, match=r"'coulomb@gide'; did you mean 'coulomb@guide'\?"):
+        rigtwin.run("emps", "positioning", effects={"coulomb@gide": 10.0})
+    machine = rigtwin.machine("emps")
+    with pytest.raises(RigtwinError, match=r"cannot exclude 'delay@drve': .* 'delay@drive'\?"):
+        machine.excluding(["delay@drve"])
+
+
+def test_effects_that_are_excluded_are_not_searched_for():
+    machine = rigtwin.machine("emps")
+    some = machine.excluding(["delay", "coulomb@guide"])
+    left = {effect.name for effect in rigtwin.effects(some)}
+    gone = {effect.name for effect in rigtwin.effects(machine)} - left
+    assert "coulomb@guide" in gone
+    assert {name.partition("@")[0] for name in gone} == {"delay", "coulomb"}
+
+
+def test_a_setting_that_the_recording_states_is_not_ignored_in_silence(tmp_path):
+    recording = rigtwin.run("emps", "positioning", settings={"timing": {"duration": 2}})
+    for value in (100.0, 160.18):
+        with pytest.raises(RigtwinError, match=r"controller.kp: .* states 160.18 for it"):
+            rigtwin.compare(recording, settings={"controller": {"kp": value}})
+
+
+def test_a_delay_of_the_controller_needs_one_that_is_described():
+    arm = rigtwin.machine("cart-pole")
+    assert arm.control is None
+    assert not any(each.group == "computer" for each in rigtwin.effects(arm))
+    rig = rigtwin.machine("suspension-rig")
+    assert any(each.group == "computer" for each in rigtwin.effects(rig))
+
+
+@pytest.mark.parametrize("name", ["pci-6229", "pci-6229.toml", "cart_pole", "cart-pole.toml"])
+def test_a_shipped_channel_table_is_found_by_its_name(name):
+    assert find_table(Path(name)).is_file()
+
+
+def test_a_channel_table_that_does_not_exist_lists_the_shipped_ones(tmp_path):
+    with pytest.raises(RigtwinError, match="card.toml does not exist; shipped ones: cart"):
+        find_table(tmp_path / "card.toml")

@@ -254,3 +254,14 @@ def test_no_output_is_an_input_or_another_output(arguments, said, tmp_path, caps
     assert main([text.format(file=file) for text in arguments]) == 1
     assert said in capsys.readouterr().err
     assert file.read_text() == "[rail]\ncoulomb = 80\n"
+
+
+def test_info_has_the_units_of_hinges(tmp_path, capsys):
+    path = str(tmp_path / "swing.mcap")
+    run = ["run", "swing", "--machine", "double-pendulum", "--set", "timing.duration=2"]
+    assert main([*run, "--out", path]) == 0
+    capsys.readouterr()
+    assert main(["info", path]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[1] for line in lines if "angle_" in line] == ["rad", "rad"]
+    assert [line.split()[1] for line in lines if "torque_" in line] == ["Nm", "Nm"]

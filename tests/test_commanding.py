@@ -281,6 +281,22 @@ TIED = """<equality><joint joint1="rail" joint2="pivot" polycoef="0 1 0 0 0"/></
             "[components.angle]: its channel 'place' is that of place",
         ),
         (
+            'free = ["rail", "pivot"]',
+            'free = ["place", "angle"]',
+            "free: 'place', 'angle' are components; expected joints of the MJCF: rail (of place), "
+            "pivot (of angle)",
+        ),
+        (
+            'free = ["rail", "pivot"]',
+            'free = ["rial", "pivot"]',
+            "free: 'rial' is no joint; did you mean 'rail'?",
+        ),
+        (
+            'free = ["rail", "pivot"]',
+            "free = { rail = true, pivot = true }",
+            "expected a list of joints that nothing prescribes",
+        ),
+        (
             'moved_by = ["drive"]',
             'moved_by = ["drive", "drive"]',
             "moved_by: drive stands there twice",
@@ -315,20 +331,60 @@ def test_a_joint_that_an_equality_ties_to_another_is_not_free(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("actuator", "said"),
     [
-        ('<velocity name="drive" joint="rail" kv="3"/>', "actuator drive: its force by velocity"),
+        (
+            '<velocity name="drive" joint="rail" kv="3"/>',
+            "its force depends on speed, -3 (biasprm, as <velocity> has it); expected <motor> with "
+            "3 more damping at its joint",
+        ),
         (
             '<general name="drive" joint="rail" biastype="affine" biasprm="5 0 0"/>',
-            "actuator drive: its constant force 5",
+            "its constant force is 5 (biasprm); expected 0",
+        ),
+        (
+            '<general name="drive" joint="rail" biastype="user" biasprm="5 0 0"/>',
+            "its biastype is user; expected <motor>, <position>, or <general> with a fixed gain",
+        ),
+        (
+            '<general name="drive" joint="rail" gaintype="affine" gainprm="5 0 2"/>',
+            "its gaintype is affine, force per command by position and speed; expected <motor>",
+        ),
+        (
+            '<general name="drive" joint="rail" gaintype="user" gainprm="5"/>',
+            "its gaintype is user, force per command by a law of its own; expected <motor>",
+        ),
+        (
+            '<dcmotor name="drive" joint="rail" gear="2" motorconst="0.5" resistance="4"/>',
+            'it is a <dcmotor>, whose force falls with speed; expected <motor gear="0.25"> with '
+            "0.25 more damping at its joint (the back-EMF)",
+        ),
+        (
+            '<dcmotor name="drive" joint="rail" motorconst="0.5" resistance="4" '
+            'inductance="0.01"/>',
+            "it is a <dcmotor>, whose force falls with speed; expected <motor>, <position>",
+        ),
+        (
+            '<general name="drive" joint="rail" dyntype="integrator"/>',
+            "its activation dynamics are dyntype integrator; expected none, filter or filterexact",
+        ),
+        (
+            '<motor name="drive" joint="rail" delay="0.1" nsample="2"/>',
+            "its nsample 2 holds 0.004 s of its delay of 0.1 s; expected nsample at least 50",
+        ),
+        (
+            '<motor name="drive" joint="rail" damping="2"/>',
+            "its damping is 2; expected 0, and the damping at the joint that it moves",
         ),
     ],
 )
-def test_what_an_actuator_does_besides_is_not_overlooked_in_silence(
+def test_a_force_law_that_no_component_has_is_refused_by_name(
     tmp_path: Path, actuator: str, said: str
 ) -> None:
     (tmp_path / "upright.xml").write_text(MODEL.replace(MOTOR, actuator))
     path = tmp_path / "upright.toml"
     path.write_text(TABLES)
-    assert any(said in each for each in rigtwin.machine(path).overlooked)
+    _, mistakes = examine(path)
+    assert len(mistakes) == 1
+    assert f"actuator 'drive': {said}" in mistakes[0]
 
 
 @pytest.mark.parametrize("name", ["_k", "__class__", "1k", ""])

@@ -4,18 +4,21 @@ they do not."""
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
 
+import rigtwin
 from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
+from rigtwin.description.catalogue import find
 from rigtwin.description.changes import from_assignments
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.settings import Timing
-from rigtwin.diagnosis.compare import compare, compare_recordings
+from rigtwin.diagnosis.compare import compare, compare_recordings, differences
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording, load
 from rigtwin.rig.component_replays import REPLAYS, ComponentReplays, Undetermined
@@ -237,3 +240,22 @@ def test_a_twin_with_the_effect_explains_a_rig_with_it(name):
     assert loud or rig_effect(name).kind.name in ("hum", "noise"), (
         "the nominal twin does not explain it"
     )
+
+
+def test_a_recording_that_is_all_but_zero_has_no_signal_to_compare(example):
+    """Numbers near the smallest that a computer has are no motion, and no ratio says anything."""
+    for machine, recording in ((find("emps"), None), (RIG, example)):
+        taken = recording or rigtwin.run(machine, "positioning")
+        columns = {
+            topic: {name: 1e-300 * values for name, values in names.items()}
+            for topic, names in taken.columns.items()
+        }
+        still = dataclasses.replace(taken, columns=columns)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(RigtwinError, match="there is no signal"):
+                compare(machine, still)
+
+
+def test_the_same_data_are_no_two_tests(example):
+    assert "both hold the same data" in differences(example, example)[0]

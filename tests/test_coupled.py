@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 import rigtwin
 from rigtwin.components import Guide
-from rigtwin.description.document import load
+from rigtwin.description.document import examine, load
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.stops import find_cut_commands
 from rigtwin.errors import RigtwinError
@@ -169,6 +169,63 @@ def test_a_joint_tied_to_another_goes_with_it(tmp_path: Path) -> None:
     # 2 N at twice the way, against 2 kg and 4 · 3.5 kg.
     assert found[0, -1] == pytest.approx(0.5 * 4.0 / 16.0 * TIME[-1] ** 2, rel=3e-3)
     assert np.allclose(found[1], 2.0 * found[0])
+
+
+CHAIN = """<mujoco><option gravity="0 0 0"/><worldbody>
+<body><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><joint name="a" type="slide"/></body>
+<body><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/><joint name="b" type="slide"/></body>
+<body><inertial pos="0 0 0" mass="3" diaginertia="1 1 1"/><joint name="c" type="slide"/></body>
+</worldbody><actuator><motor name="push" joint="c"/></actuator>
+<sensor><jointpos name="x_a" joint="a"/><jointpos name="x_c" joint="c"/></sensor>
+<equality>{ties}</equality></mujoco>"""
+CHAIN_TOML = """
+[machine]
+name = "chain"
+model = "chain.xml"
+[components]
+push = {{ actuator = "push", effects = [] }}
+x_a = {{ sensor = "x_a", effects = [] }}
+x_c = {{ sensor = "x_c", effects = [] }}
+[[replays]]
+free = ["{free}"]
+moved_by = ["push"]
+observe = ["x_a", "x_c"]
+"""
+C_OF_B = '<joint joint1="c" joint2="b" polycoef="0 2 0 0 0"/>'
+B_OF_A = '<joint joint1="b" joint2="a" polycoef="0.1 3 0 0 0"/>'
+
+
+@pytest.mark.parametrize("free", ["a", "b", "c"])
+@pytest.mark.parametrize("ties", [C_OF_B + B_OF_A, B_OF_A + C_OF_B])
+def test_a_chain_of_equalities_is_followed_in_any_order(
+    tmp_path: Path, free: str, ties: str
+) -> None:
+    machine = described(tmp_path, "chain", CHAIN.format(ties=ties), CHAIN_TOML.format(free=free))
+    assert not any("equality" in each for each in machine.overlooked)
+    still = np.zeros(1000)
+    sensors = {"x_a": still, "x_c": still + 0.2}
+    record = {"/command": {"push": still + 1.0}, "/sensor": sensors}
+    found = coupled(machine, record).predict(machine.plant)
+    # 6 N along a, against 1, 9 · 2 and 36 · 3 kg.
+    assert found[0, -1] == pytest.approx(0.5 * 6.0 / 127.0 * TIME[-1] ** 2, rel=3e-3)
+    assert np.allclose(found[1], 0.2 + 6.0 * found[0])
+
+
+def test_a_free_joint_at_the_far_end_of_a_chain_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "chain.xml").write_text(CHAIN.format(ties=C_OF_B + B_OF_A))
+    path = tmp_path / "chain.toml"
+    path.write_text(CHAIN_TOML.format(free='a", "c'))
+    _, mistakes = examine(path)
+    assert len(mistakes) == 1
+    assert "an equality ties c to b, so it goes with that; leave c out" in mistakes[0]
+
+
+def test_a_motor_on_a_joint_that_stands_still_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "chain.xml").write_text(CHAIN.format(ties=B_OF_A))
+    path = tmp_path / "chain.toml"
+    path.write_text(CHAIN_TOML.format(free="a").replace('"x_a", "x_c"', '"x_a"'))
+    _, mistakes = examine(path)
+    assert "moved_by push: it pushes c, which stands still; expected a joint" in mistakes[0]
 
 
 def test_a_motor_on_a_tendon_pulls_both_ends(tmp_path: Path) -> None:

@@ -168,6 +168,18 @@ MISTAKES = [
     ("[[replays]]", "[[replay]]", "did you mean 'replays'?"),
     ('[components.mass]\nbody = "arm"', "", "whose mass is no component"),
     (
+        'sensor = "encoder"',
+        'sensor = "encoder"\ntype = "force actuator"',
+        "type 'force actuator' goes with actuator, not with sensor 'encoder'; expected position",
+    ),
+    (
+        'sensor = "encoder"',
+        'sensor = "encoder"\ntype = "velocity sensor"',
+        "sensor 'encoder' of the MJCF measures a position; expected 'position sensor'",
+    ),
+    ('joint = "axis"', 'joint = "axis"\ntype = "servo"', "goes with actuator, not with joint"),
+    ('body = "arm"', 'body = "arm"\ntype = "guide"', "goes with joint or tendon, not with body"),
+    (
         "[[replays]]",
         '[controller]\noutput = "force"\nformula = "kp *"\n[[replays]]',
         "is not a formula",
@@ -270,6 +282,16 @@ def test_a_value_of_the_mjcf_is_checked_like_one_of_the_description(
     assert said in out
     assert len(out.splitlines()) == 2, "the mistake and how many there are"
     assert err == ""
+
+
+@pytest.mark.parametrize("declaration", ["", '<?xml version="1.0" encoding="ISO-8859-1"?>'])
+def test_a_name_in_latin_1_is_one_clear_line(tmp_path: Path, declaration: str):
+    model = declaration + MJCF.format(body='<joint name="axis"/><geom name="größe" size="0.05"/>')
+    (tmp_path / "bench.xml").write_bytes(model.encode("latin-1"))
+    (tmp_path / "bench.toml").write_text(TOML)
+    _, mistakes = examine(tmp_path / "bench.toml")
+    assert len(mistakes) == 1
+    assert "bench.xml, line 2: byte 0xf6 is not UTF-8" in mistakes[0]
 
 
 def test_a_demand_that_is_not_finite_is_said(tmp_path: Path):

@@ -342,6 +342,18 @@ def test_regions_are_told_apart():
     )
 
 
+@pytest.mark.parametrize(
+    ("unit", "said"), [("m", "within 33 mm after"), ("rad", "within 1.9 ° after")]
+)
+def test_a_way_after_a_reversal_is_in_the_unit_of_the_joint(unit, said):
+    time = np.arange(8000) * 1e-3
+    way = 1.0 - np.cos(2 * np.pi * 0.5 * time)
+    since = np.where(np.sin(2 * np.pi * 0.5 * time) > 0.0, way, 2.0 - way)
+    near = (since < 0.05).astype(float)
+    motion = Motion(way, np.gradient(way, 1e-3), np.ones_like(time))
+    assert region(near * (1.0 + since), motion, 1e-3, unit).startswith(said)
+
+
 @SLOW
 def test_the_fast_multisine_tells_a_delay_from_a_lag():
     evidence = evidence_of(recorded("imposed", ("delay@motor=0.0012",), 4.0))

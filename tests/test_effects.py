@@ -4,6 +4,7 @@ closed form."""
 from __future__ import annotations
 
 import math
+import pickle
 
 import mujoco
 import numpy as np
@@ -27,6 +28,7 @@ from rigtwin.components import (
 )
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import breakaway, friction, gap_at
+from rigtwin.description.catalogue import find, shipped
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects, with_effect
 from rigtwin.description.settings import Timing
@@ -289,3 +291,15 @@ def test_tyre_law(damping, hardening):
         assert data.qfrc_constraint[view.carriage] == pytest.approx(
             max(law, 0.0), rel=1e-3, abs=1e-3
         )
+
+
+def test_every_effect_of_every_machine_goes_to_another_process_and_back():
+    for name in shipped():
+        for effect in find(name).effects():
+            back = pickle.loads(pickle.dumps(effect))
+            assert back == effect
+            assert back.kind is effect.kind
+
+
+def test_kinds_are_told_by_name_and_components():
+    assert all(pickle.loads(pickle.dumps(kind)) is kind for kind in KINDS)

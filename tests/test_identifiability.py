@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import rigtwin
+from rigtwin.cli import main
 
 CART = """
 <mujoco model="cart">
@@ -54,6 +55,27 @@ def test_two_zeros_and_a_gain_that_scales_all_there_is():
     # Force over velocity is all that a damper bench measures.
     assert set(can.alike["gain@load_cell"]) == {"viscous@damper", "coulomb@damper"}
     assert {"viscous@damper", "coulomb@damper", "lag@load_cell"} <= set(can.seen)
+
+
+def test_the_table_comes_before_what_takes_long(capsys, monkeypatch):
+    monkeypatch.setattr("rigtwin.cli.machine.ALLOWED", 0.0)
+    assert main(["machine", "check", "damper-bench"]) == 0
+    out, err = capsys.readouterr()
+    *_, done, untried = out.splitlines()
+    assert done == "no mistakes"
+    assert untried.startswith("not worked out within 0 s, --identifiability goes on: ")
+    assert "viscous@damper" in untried
+    # Off a terminal too something is said before the first result.
+    assert err.startswith("working out what its sensors can show, 0 s: packages")
+
+
+def test_effects_that_the_time_does_not_suffice_for_are_neither_seen_nor_unseen():
+    machine = rigtwin.machine("damper-bench")
+    stages: list[str] = []
+    can = rigtwin.identifiability(machine, seconds=0.0, progress=stages.append)
+    assert (can.seen, can.unseen, can.alike) == ((), (), {})
+    assert set(can.untried) == {e.name for e in rigtwin.effects(machine) if e.searched}
+    assert stages[0] == "made-up motions"
 
 
 @pytest.mark.slow

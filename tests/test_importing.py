@@ -558,3 +558,69 @@ def test_every_module_with_a_format_is_found():
     assert len(set(titles)) == len(titles) >= 7
     endings = [ending for known in formats() for ending in known.endings]
     assert len(set(endings)) == len(endings)
+
+
+def in_another_unit(factor: float, digits: int) -> str:
+    """The data with their time in units of `factor` seconds."""
+    rows = [
+        f"{t / factor:.{digits}f},{x:.6f},{f:.5f}"
+        for t, x, f in zip(TIME, POSITION, FORCE, strict=True)
+    ]
+    return "\n".join(["t,x,f", *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("factor", "digits", "unit"),
+    [(86_400.0, 13, "d"), (1e-3, 1, "ms"), (1e-6, 0, "us"), (1e-9, 0, "ns")],
+)
+def test_a_time_without_a_unit_is_asked_for_where_seconds_are_implausible(
+    tmp_path: Path, factor: float, digits: int, unit: str
+):
+    data = in_another_unit(factor, digits)
+    with pytest.raises(RigtwinError) as caught:
+        imported(tmp_path, data)
+    said = str(caught.value)
+    assert said.startswith(str(tmp_path / "data.csv")), "the input, not the output"
+    assert f'"{unit}" (a step of 0.002 s)' in said
+    assert not (tmp_path / "out.mcap").exists()
+    stated = MAP.replace('column = "t"', f'column = "t"\nunit = "{unit}"')
+    recording, _ = imported(tmp_path, data, stated)
+    assert recording.period == pytest.approx(0.002, rel=1e-5)
+
+
+def test_an_implausible_period_in_a_stated_unit_is_refused(tmp_path: Path):
+    stated = MAP.replace('column = "t"', 'column = "t"\nunit = "d"')
+    with pytest.raises(
+        RigtwinError, match=r"data.csv: the time column's step is 172.8 s; expected"
+    ):
+        imported(tmp_path, text(), stated)
+
+
+def test_seconds_that_are_assumed_are_said(tmp_path: Path):
+    _, report = imported(tmp_path, text())
+    assert "time: no unit is said of column 't'; taken as s" in report
+    _, report = imported(tmp_path, text(units="s,mm,N"))
+    assert not any("no unit is said of column 't'" in line for line in report)
+
+
+@pytest.mark.parametrize("cell", ['"1,234.5"', "0x1F"])
+def test_a_column_of_other_numbers_is_said_with_its_cell(tmp_path: Path, cell: str):
+    lines = [line.rsplit(",", 1)[0] + f",{cell}" for line in text().splitlines()[1:]]
+    with pytest.raises(RigtwinError) as caught:
+        imported(tmp_path, "\n".join(["t,x,f", *lines]))
+    said = str(caught.value)
+    assert f"column 'f' holds {cell.strip(chr(34))!r} in line 2, which was taken for a word" in said
+    assert "no column" not in said
+
+
+def test_a_group_that_links_to_itself_ends(tmp_path: Path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "loop.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file["x"] = POSITION
+        file["inner/y"] = FORCE
+        file["inner/again"] = h5py.SoftLink("/inner")
+        file["whole"] = h5py.SoftLink("/")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    assert set(read(path).values) == {"x", "inner.y"}

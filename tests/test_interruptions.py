@@ -90,3 +90,26 @@ def test_an_interruption_comes_behind_what_it_would_spoil() -> None:
     with pytest.raises(KeyboardInterrupt):
         work()
     assert done == ["all of it"]
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        ["-c", "import rigtwin.start; KILL"],
+        ["-c", "import sys; sys.argv = ['-m']; import rigtwin.cli; KILL"],
+    ],
+)
+def test_an_interruption_while_packages_are_imported_prints_nothing(start: list[str]) -> None:
+    kill = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
+    command = [sys.executable, *(part.replace("KILL", kill) for part in start)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_the_command_line_hears_interruptions_as_usual() -> None:
+    code = (
+        "import rigtwin.start, signal, sys; sys.argv = ['rigtwin', '--version']; "
+        "rigtwin.start.main(); print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "True"

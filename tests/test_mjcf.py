@@ -68,6 +68,21 @@ def test_only_what_is_corrected_changes(machine, tmp_path):
     assert undone.replace('gear="3.3"', 'gear="3 0 0 0 0 0"') == old
 
 
+def test_a_limit_of_the_force_stays_where_it_is_when_the_gear_changes(machine, tmp_path):
+    text = MODEL.replace('gear="3 0 0 0 0 0"', 'gear="3 0 0 0 0 0" forcerange="-5 5"')
+    machine.model.write_text(text)
+    machine = rigtwin.machine(tmp_path / "bench.toml")
+    assert machine.plant.drive.force_limit == 15.0
+    path = tmp_path / "new.xml"
+    assert write_mjcf(path, machine, [Change("drive", "gain", 1.25)]) == ()
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.actuator_gear[0, 0] * model.actuator_forcerange[0, 1] == pytest.approx(15.0)
+    both = [Change("drive", "gain", 1.25), Change("drive", "force_limit", 7.5)]
+    assert write_mjcf(path, machine, both) == ()
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.actuator_gear[0, 0] * model.actuator_forcerange[0, 1] == pytest.approx(7.5)
+
+
 def test_a_mass_is_that_of_all_that_moves(machine, tmp_path):
     path = tmp_path / "new.xml"
     nominal = machine.plant.mass.mass

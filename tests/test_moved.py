@@ -158,7 +158,7 @@ def test_what_shares_nothing_is_searched_apart(tmp_path):
 MISTAKES = [
     (
         'sensor = "angle_2"',
-        'sensor = "angle_2"\ntype = "velocity sensor"',
+        'joint = "elbow"\ntype = "velocity sensor"',
         "position sensor of each",
     ),
     (

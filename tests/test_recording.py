@@ -372,6 +372,12 @@ def test_times_that_make_no_sense_are_refused(tmp_path):
     rows = ['{"load_cell": 1.0}'] * 10
     with pytest.raises(RigtwinError, match=r"messages come every 0\.001 s"):
         load(other_recording(tmp_path / "p.mcap", rows, period="0.0014"))
+    for period in ("0.0011", "0.00095"):
+        with pytest.raises(RigtwinError, match=r"time stamps within 2 % of the period"):
+            load(other_recording(tmp_path / "q.mcap", rows, period=period))
+    assert load(other_recording(tmp_path / "q.mcap", rows, period="0.001")).notes == ()
+    (note,) = load(other_recording(tmp_path / "q.mcap", rows, period="0.00099")).notes
+    assert note.startswith("messages come every 0.001 s, 1 % off the period of 0.00099 s")
     with pytest.raises(RigtwinError, match="expected ns since the start"):
         load(other_recording(tmp_path / "t.mcap", rows, times=[2**63 + n for n in range(10)]))
 

@@ -215,13 +215,57 @@ def test_the_users_mjcf_gets_the_gains_that_were_found(tmp_path: Path) -> None:
     machine = machine_in(tmp_path, ONE, model_text(two=False))
     changes = [Change("servo", "position_gain", 15.0), Change("servo", "damping_gain", 1.4)]
     left = write_mjcf(tmp_path / "new.xml", machine, [*changes, Change("servo", "delay", 0.01)])
-    assert left == ("servo.delay = 0.01",)
+    assert left == ()
     before, after = (
         mujoco.MjModel.from_xml_path(str(tmp_path / n)) for n in ("arm.xml", "new.xml")
     )
     assert before.actuator_gainprm[0, 0] == 20.0
     assert after.actuator_gainprm[0, 0] == 15.0
     assert after.actuator_biasprm[0, 1:3].tolist() == [-15.0, -1.4]
+    assert after.actuator_delay[0] == 0.01
+    assert after.actuator_history[0, 0] * after.opt.timestep >= 0.01
+
+
+def test_the_users_mjcf_gets_the_timing_and_the_limit_of_a_servo(tmp_path: Path) -> None:
+    machine = machine_in(tmp_path, ONE, model_text(two=False))
+    values = {"delay": 0.0101, "lag": 0.03, "force_limit": 4.0, "deadband": 0.01}
+    changes = [Change("servo", name, value) for name, value in values.items()]
+    assert write_mjcf(tmp_path / "new.xml", machine, changes) == ("servo.deadband = 0.01",)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
+    assert model.actuator_delay[0] == 0.0101
+    assert model.actuator_dynprm[0, 0] == 0.03
+    assert model.actuator_dyntype[0] == mujoco.mjtDyn.mjDYN_FILTEREXACT
+    assert model.actuator_forcerange[0].tolist() == [-4.0, 4.0]
+    # And the description of the written model has them as its nominal values.
+    servo = machine_in(tmp_path, ONE, (tmp_path / "new.xml").read_text()).plant.servo
+    assert (servo.delay, servo.lag, servo.force_limit) == (0.0101, 0.03, 4.0)
+
+
+def test_delay_and_time_constant_of_the_mjcf_act_as_in_mujoco(tmp_path: Path) -> None:
+    """MuJoCo itself runs the servo, on the same ticks, and the model predicts the same angle."""
+    text = model_text(two=False).replace(
+        'kv="1.0" ', 'kv="1.0" timeconst="0.05" delay="0.02" nsample="200" '
+    )
+    machine = machine_in(tmp_path, ONE, text)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    data = mujoco.MjData(model)
+    steps = round(1e-3 / model.opt.timestep)
+    command, angle = 0.4 * np.sin(9.0 * np.arange(2000) * 1e-3), np.empty(2000)
+    for tick in range(2000):
+        angle[tick], data.ctrl[0] = data.qpos[0], command[tick]
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+    columns = {"/command": {"shoulder": command}, "/sensor": {"shoulder": angle}}
+    time = np.arange(2000) * 1e-3
+    recording = Recording(Path("servo"), machine.name, "", 1e-3, time, columns, {})
+    configuration = machine.configuration_of(recording)
+    predicted = machine.physics.model(machine, recording.inputs, configuration, 8).predict(
+        machine.plant
+    )[0]
+    assert np.max(np.abs(predicted - angle)) < 0.02 * np.ptp(angle)
+    plain = machine.plant._replace(servo=machine.plant.servo._replace(delay=0.0, lag=0.0))
+    off = machine.physics.model(machine, recording.inputs, configuration, 8).predict(plain)[0]
+    assert np.max(np.abs(off - angle)) > 0.2 * np.ptp(angle)
 
 
 @pytest.mark.parametrize("name", ["forcerange", "ctrlrange"])

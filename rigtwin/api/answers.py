@@ -13,6 +13,8 @@ from rigtwin.api.machines import (
     described_machine,
     effect_texts,
     machine_of,
+    names_of,
+    require_unrecorded,
     twin_of,
 )
 from rigtwin.api.recordings import the_recording
@@ -44,6 +46,7 @@ def diagnose(
     held_out: Recorded | Sequence[Recorded] = (),
     settings: Settings = (),
     without: Sequence[str] = (),
+    exclude: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     first_look: Callable[[FirstLook], object] = lambda _: None,
     columns: Mapping[str, str] | None = None,
@@ -65,6 +68,8 @@ def diagnose(
         Changes of the twin that they are compared with: of its plant and `timing.timestep`.
     without
         Effects that are taken out of the twin first, such as "coulomb@rail".
+    exclude
+        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
     progress
         Called with a stage's name and the steps done in it.
     first_look
@@ -84,7 +89,8 @@ def diagnose(
         If the recordings' settings are unknown, or held-out data are not fit to be compared.
     """
     given = read_inputs(recordings, machine, held_out, columns, test)
-    found = given.machine
+    found = given.machine.excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, found, [*given.recordings, *given.held_out])
     base = twin_of(found, settings, without)
     tests = [find_experiment(found, name) for name in found.next_tests]
     return find_reasons(
@@ -158,6 +164,7 @@ def what_changed(
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
     without: Sequence[str] = (),
+    exclude: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Changes:
     """Says what changed between recordings of one machine, and what that goes with.
@@ -172,6 +179,8 @@ def what_changed(
         Changes of the twin that they are compared with: of its plant and `timing.timestep`.
     without
         Effects that are taken out of the twin first, such as "coulomb@rail".
+    exclude
+        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
     progress
         Called with a stage's name and the steps done in it.
 
@@ -190,7 +199,8 @@ def what_changed(
         raise RigtwinError("a recording is named twice; it is the same as itself")
     if not several:
         raise RigtwinError("what changed is a question to two recordings or more; none was given")
-    found = described_machine(several[0], machine)
+    found = described_machine(several[0], machine).excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, found, several)
     return find_changes(found, several, twin_of(found, settings, without), progress)
 
 
@@ -225,6 +235,7 @@ def compare(
     """
     recording = the_recording(recording)
     found = described_machine(recording, machine)
+    require_unrecorded(settings, found, [recording])
     base = twin_of(found, settings, (), effect_texts(effects))
     return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
 

@@ -25,7 +25,7 @@ NAMES = {
 def explained(function: Function) -> Function:
     """A function whose failure is laid to its arguments where they are of other types than it says.
 
-    Nothing is looked at while it does not fail.
+    While it does not fail, only truth values are looked at: Python takes them for numbers.
 
     Parameters
     ----------
@@ -41,6 +41,9 @@ def explained(function: Function) -> Function:
 
     @wraps(function)
     def called(*values: Any, **named: Any) -> Any:
+        truths = any(isinstance(value, bool) for value in (*values, *named.values()))
+        if truths and (said := _mistake(function, values, named)) is not None:
+            raise RigtwinError(said)
         try:
             return function(*values, **named)
         except (TypeError, AttributeError, ValueError):

@@ -108,12 +108,22 @@ def effect_texts(given: Effects) -> list[str]:
             return [f"{name}={_values(value)}" for name, value in given.items()]
         texts = [given] if isinstance(given, str) else list(given)
         if all(isinstance(each, str) for each in texts):
-            return texts
+            return [_require_value(each) for each in texts]
     except (TypeError, ValueError):
         pass
     raise RigtwinError(
         f"effects {given!r:.60}: expected {{'coulomb@rail': 80}}, or texts as 'coulomb@rail=80'"
     )
+
+
+def _require_value(text: str) -> str:
+    """An effect as text. Raises RigtwinError if it has no value."""
+    if "=" not in text:
+        raise RigtwinError(
+            f"effect {text!r:.60} has no value; expected KIND@COMPONENT=VALUE, such as "
+            "'coulomb@rail=80', or in Python {'coulomb@rail': 80}"
+        )
+    return text
 
 
 def _values(value: float | Mapping[str, float]) -> str:
@@ -165,6 +175,36 @@ def twin_of(
     for name in taken_out:
         base = take_out(base, name)
     return apply_effects(base, effects)
+
+
+def names_of(argument: str, names: Sequence[str]) -> list[str]:
+    """Names of effects as an argument gives them. Raises RigtwinError for anything but a list of
+    texts."""
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise RigtwinError(f"{argument} {names!r:.60}: expected a list of effects' names")
+    return list(names)
+
+
+def require_unrecorded(
+    settings: Settings, of: Machine, recordings: Sequence[reader.Recording]
+) -> None:
+    """Refuse controller settings that have no effect, as the recordings state their own.
+
+    Raises
+    ------
+    RigtwinError
+        For a setting that is named one by one and that a recording of the machine states.
+    """
+    for key in _told(settings):
+        group, _, name = key.partition(".")
+        for recording in recordings:
+            own = recording.machine == of.name and name in recording.controller
+            if group == "controller" and own:
+                raise RigtwinError(
+                    f"{key}: {recording.path} states {recording.controller[name]} for it, and the "
+                    "recording's own settings hold; expected settings of the plant, or "
+                    "timing.timestep"
+                )
 
 
 class _Written(dict[str, Any]):

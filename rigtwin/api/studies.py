@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Literal
@@ -47,13 +48,22 @@ def _nothing(*_: object) -> None:
     """Tells nobody."""
 
 
-def identifiability(of: Machine | str | Path) -> Identifiability:
+def identifiability(
+    of: Machine | str | Path,
+    *,
+    seconds: float = math.inf,
+    progress: Callable[[str], object] = _nothing,
+) -> Identifiability:
     """What a machine's sensors can never show, whatever it does: before there are any data.
 
     Parameters
     ----------
     of
         The machine, see `machine`.
+    seconds
+        Time that the work may take, s; effects that it does not suffice for are `untried`.
+    progress
+        Called with the name of what is worked out next.
 
     Returns
     -------
@@ -61,7 +71,7 @@ def identifiability(of: Machine | str | Path) -> Identifiability:
         Effects that leave a trace of their own, those that leave none, and those whose trace others
         can leave as well.
     """
-    return find_identifiable(the_machine(of))
+    return find_identifiable(the_machine(of), seconds, progress)
 
 
 def tune(

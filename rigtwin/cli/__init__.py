@@ -3,12 +3,19 @@ help is instant."""
 
 from __future__ import annotations
 
+import sys
+
+if sys.argv[:1] == ["-m"]:
+    # The interpreter looks for the module that it is to run: this one.
+    import rigtwin.start  # noqa: F401
+
 import argparse
 import atexit
 import gc
 import io
 import os
-import sys
+import signal
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -97,6 +104,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point. Returns the exit code: 0 done, 1 a fault said in one line, 2 wrong usage, 3 a
     test that tripped, 4 done and something is not as it should be, 130 interrupted."""
     try:
+        if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+            # From here on an interruption is said.
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         return _main(arguments)
     except KeyboardInterrupt:
         # Also while packages are imported.
@@ -112,6 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(arguments: Sequence[str] | None) -> int:
     gc.set_threshold(COLLECTED)
+    # What overflows is judged by its result; where in numpy it did so helps nobody.
+    warnings.simplefilter("ignore", RuntimeWarning)
     # The end of the program frees everything anyhow; to look through it first takes 0.3 s.
     atexit.register(gc.freeze)
     for name in ("stdout", "stderr"):

@@ -66,6 +66,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="take this out of the twin first, e.g. coulomb@rail",
     )
     parser.add_argument(
+        "--exclude",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="do not look for this, e.g. delay@motor, or delay at every component",
+    )
+    parser.add_argument(
         "--held-out",
         action="extend",
         nargs="+",
@@ -145,6 +152,7 @@ def execute(parsed: argparse.Namespace) -> int:
                 recordings,
                 settings=settings_of(parsed),
                 without=parsed.without,
+                exclude=parsed.exclude,
                 progress=progress,
             )
             if parsed.json is not None:
@@ -157,6 +165,7 @@ def execute(parsed: argparse.Namespace) -> int:
             held_out=held_out,
             settings=settings_of(parsed),
             without=parsed.without,
+            exclude=parsed.exclude,
             progress=progress,
             first_look=show,
         )
@@ -187,6 +196,11 @@ def _diagnose_each(parsed: argparse.Namespace) -> int:
     from rigtwin.errors import RigtwinError
 
     alone = (parsed.json, parsed.html, parsed.pdf, parsed.png, parsed.save_twin, parsed.save_mjcf)
+    if parsed.exclude:
+        raise RigtwinError(
+            "--exclude: of one diagnosis; for --each, list the effects of a component in its "
+            "description, effects = [...]"
+        )
     if parsed.changed or parsed.held_out or any(alone):
         raise RigtwinError(
             "--each keeps its answers in its folder; leave out --held-out, --changed, --json, "

@@ -7,6 +7,7 @@ import contextlib
 import textwrap
 from pathlib import Path
 
+from rigtwin.cli.options import add_machine
 from rigtwin.console import late, table
 
 SUMMARY = "say what is in a recording"
@@ -15,6 +16,7 @@ MORE = ""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path)
+    add_machine(parser)
 
 
 def execute(parsed: argparse.Namespace) -> int:
@@ -23,7 +25,18 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
     from rigtwin.recording.channels import channels_of
 
-    recording = rigtwin.load(parsed.recording)
+    recording = rigtwin.load(parsed.recording, parsed.machine)
+    units: dict[str, str] = {}
+    if parsed.machine is not None:
+        machine = rigtwin.machine(parsed.machine)
+        if machine.name != recording.machine:
+            raise rigtwin.RigtwinError(
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"--machine is {machine.name!r}"
+            )
+        units = machine.units
+    elif recording.machine in rigtwin.machines():
+        units = rigtwin.machine(recording.machine).units
     print(f"{recording.path}: {recording.experiment} on {recording.machine}")
     print(
         f"{recording.ticks} ticks of {recording.period:g} s, "
@@ -49,9 +62,9 @@ def execute(parsed: argparse.Namespace) -> int:
             if (energy := rigtwin.energy_error(recording)) is not None:
                 print(f"energy error: {energy}")
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
-    for channel in channels_of(recording.columns):
+    for channel in channels_of(recording.columns, recording.machine, units):
         values = recording.column(channel.topic, channel.name)
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
         rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))
     print(table(rows))

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,12 +20,24 @@ SUMMARY = "check a machine's description"
 MORE = """\
 rigtwin machine check F.toml explains every mistake in one line each; without
 any, what will be looked for, and what its sensors can never show whatever the
-machine does: worked out by made-up motions within the range of its joints."""
+machine does: worked out by made-up motions within the range of its joints, as
+far as that takes less than 20 s; --identifiability works all of it out."""
+ALLOWED = 20.0
+"""s for what can never be identified, unless all of it is asked for."""
+REPORTED = 2.0
+"""s between lines of progress off a terminal."""
+WIDTH = 78
+"""Signs of a line of progress."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("action", choices=["check"])
     parser.add_argument("description", type=Path, metavar="F.toml")
+    parser.add_argument(
+        "--identifiability",
+        action="store_true",
+        help="work out all that can never be identified, however long it takes",
+    )
 
 
 def execute(parsed: argparse.Namespace) -> int:
@@ -65,31 +80,54 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"controller: {found.control.text}")
     for line in found.overlooked:
         print(f"not taken into account: {line}")
-    _print_never(found)
-    print("no mistakes")
+    print("no mistakes", flush=True)
+    _print_never(found, math.inf if parsed.identifiability else ALLOWED)
     return 0
 
 
-def _print_never(machine: Machine) -> None:
+def _print_never(machine: Machine, seconds: float) -> None:
     """What can never be identified, before there are any data."""
-    import rigtwin
+    with _telling() as progress:
+        progress("packages")
+        import rigtwin
 
-    told = "working out what its sensors can show ..."
-    if sys.stderr.isatty():
-        print(told, end="\r", file=sys.stderr, flush=True)
-    can = rigtwin.identifiability(machine)
-    if sys.stderr.isatty():
-        print(" " * len(told), end="\r", file=sys.stderr, flush=True)
+        can = rigtwin.identifiability(machine, seconds=seconds, progress=progress)
     if not can.motions:
         print("never identifiable: not worked out; give its joints a range")
     for name in can.unseen:
         print(f"never identifiable: {name}; nothing that is recorded changes with it")
     for name, others in can.alike.items():
         print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
-    if can.motions and not can.unseen and not can.alike:
+    if can.untried:
+        print(
+            f"not worked out within {seconds:g} s, --identifiability goes on: "
+            f"{', '.join(can.untried)}"
+        )
+    if can.motions and not can.unseen and not can.alike and not can.untried:
         print("never identifiable: none; what a recording does not excite, its diagnosis says")
     for each in can.sums:
         print(f"seen of bodies and rotors: {_write_sum(each)}")
+
+
+@contextmanager
+def _telling() -> Iterator[Callable[[str], None]]:
+    """What is worked out at present, on standard error: in one line of a terminal, else a line now
+    and then."""
+    terminal, begun, last = sys.stderr.isatty(), time.monotonic(), -math.inf
+
+    def tell(stage: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        said = f"working out what its sensors can show, {now - begun:.0f} s: {stage}"
+        if terminal:
+            print(f"\r{said[:WIDTH].ljust(WIDTH)}", end="", file=sys.stderr, flush=True)
+        elif now - last >= REPORTED:
+            print(said, file=sys.stderr, flush=True)
+            last = now
+
+    yield tell
+    if terminal:
+        print("\r" + " " * WIDTH + "\r", end="", file=sys.stderr, flush=True)
 
 
 def _write_sum(terms: Mapping[str, float]) -> str:

@@ -135,6 +135,21 @@ class Kind:
     negative: str = field(default="", compare=False, repr=False)
     nuisances: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
+    def __reduce__(self) -> tuple[Callable[[str, list[str]], Kind], tuple[str, list[str]]]:
+        """Kinds are code, which stays where it is: another process looks one up by its name and the
+        components that can have it."""
+        return _kind_of, (self.name, _types_of(self))
+
+
+def _types_of(kind: Kind) -> list[str]:
+    return sorted(each.__name__ for each in kind.at)
+
+
+def _kind_of(name: str, types: list[str]) -> Kind:
+    from rigtwin.components.library import KINDS  # Late: the library is made of kinds.
+
+    return next(kind for kind in KINDS if (kind.name, _types_of(kind)) == (name, types))
+
 
 @dataclass(frozen=True)
 class Effect:

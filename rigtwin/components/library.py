@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from difflib import get_close_matches
 
 from rigtwin.components import body, computer, conditioning, guide, mass, mount, rotor, servo, tyre
 from rigtwin.components.effect import Effect, Kind
@@ -52,9 +53,14 @@ def find(name: str, plant: Plant) -> Effect:
         return effects[name]
     kind, _, component = name.partition("@")
     there = [effect.kind.name for effect in effects.values() if effect.component == component]
+    meant = [each for each in effects if not there or each.endswith(f"@{component}")]
+    close = get_close_matches(name, meant, 1, 0.75)
+    hint = f"did you mean {close[0]!r}? " if close else ""
     if there:
-        raise RigtwinError(f"unknown effect {kind!r} at {component}; there are {', '.join(there)}")
+        raise RigtwinError(
+            f"unknown effect {kind!r} at {component}; {hint}there are {', '.join(there)}"
+        )
     known = ", ".join(dict.fromkeys(effect.component for effect in effects.values()))
     raise RigtwinError(
-        f"unknown effect {name!r}; expected KIND@COMPONENT with a component of {known}"
+        f"unknown effect {name!r}; {hint}expected KIND@COMPONENT with a component of {known}"
     )

@@ -52,6 +52,21 @@ MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
 """What is measured → its unit where the joint slides, and where it turns."""
+AT: dict[str, tuple[str, ...]] = {
+    "mass": ("body",),
+    "body": ("body",),
+    "base": ("body",),
+    "carriage": ("body",),
+    "guide": ("joint", "tendon"),
+    "rail": ("joint",),
+    "rotor": ("joint", "tendon"),
+    "gas spring": ("joint", "tendon"),
+    "tyre": ("contact",),
+    "cylinder": ("joint", "actuator"),
+    **dict.fromkeys((*PUSHING, "position actuator", "motor"), ("actuator",)),
+    **dict.fromkeys(SENSED, ("sensor", "joint", "tendon")),
+}
+"""Type of component → elements of an MJCF that it can be."""
 TAKEN = ("computer", "mains", "controller", "safety", "timing")
 """Names of other groups of settings."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
@@ -167,7 +182,7 @@ class Components:
                     where, f"unknown type {table['type']!r}; {near(table['type'], TYPES)}"
                 )
                 return None
-            return str(table["type"])
+            return self._fitting(where, str(table["type"]), element, mjcf)
         if element == "body":
             return "mass"
         if element == "joint" or (element == "tendon" and self._mechanism.acts_on(element, mjcf)):
@@ -178,6 +193,26 @@ class Components:
             return f"{measures} sensor"
         self.mistakes.note(where, f"{element} {mjcf!r} needs a type; there are {', '.join(TYPES)}")
         return None
+
+    def _fitting(self, where: str, kind: str, element: str, mjcf: str) -> str | None:
+        """The type, if its element of the MJCF can be one."""
+        if element not in AT[kind]:
+            fits = [each for each, at in AT.items() if element in at]
+            self.mistakes.note(
+                where,
+                f"type {kind!r} goes with {' or '.join(AT[kind])}, not with {element} {mjcf!r}; "
+                f"expected {', '.join(fits)}",
+            )
+            return None
+        measures = self._mechanism.measures(mjcf) if element == "sensor" else ""
+        if measures and SENSED[kind] != measures:
+            self.mistakes.note(
+                where,
+                f"type {kind!r}: sensor {mjcf!r} of the MJCF measures a {measures}; "
+                f"expected '{measures} sensor', or joint = ... in place of sensor",
+            )
+            return None
+        return kind
 
     def _kinds(self, where: str, kind: str, table: Mapping[str, Any]) -> frozenset[str] | None:
         if "effects" not in table:
@@ -223,6 +258,14 @@ class Components:
             component = component._replace(**self._mechanism.friction(element, mjcf))
         elif kind == "rotor" and (element == "tendon" or joint):
             component = component._replace(inertia=self._mechanism.armature(element, mjcf))
+        if kind in (*PUSHING, "position actuator"):
+            obstacle = self._mechanism.actuator_obstacle(mjcf, kind)
+            if obstacle is not None:
+                self.mistakes.note(where, f"actuator {mjcf!r}: {obstacle}")
+                return component
+            component = component._replace(**self._mechanism.actuator_timing(mjcf))
+        if kind == "position actuator":
+            component = component._replace(**self._mechanism.rest_position(mjcf))
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
             if not constant > 0.0:
@@ -232,9 +275,9 @@ class Components:
                 )
                 return component
             component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
-        elif kind == "servo" and element == "actuator":
+        elif kind == "servo":
             component = component._replace(**self._servo(where, mjcf))
-        if kind in (*PUSHING, "position actuator") and element == "actuator":
+        if kind in (*PUSHING, "position actuator"):
             low, high = self._mechanism.command_limits(mjcf)
             component = component._replace(
                 command_low=max(low, -UNLIMITED), command_high=min(high, UNLIMITED)

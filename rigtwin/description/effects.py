@@ -67,7 +67,7 @@ def without_effect(configuration: Configuration, name: str) -> Configuration:
             if _is_removable(each, configuration.plant)
         ]
         raise RigtwinError(
-            f"--without {name}: the twin has none to take out; it has {', '.join(there) or 'none'}"
+            f"cannot take out {name}: the twin has none of it; it has {', '.join(there) or 'none'}"
         )
     return with_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
 
@@ -103,7 +103,7 @@ def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configu
         name, equals, values = text.partition("=")
         if not equals:
             raise RigtwinError(
-                f"--effect {text}: expected KIND@COMPONENT=VALUE, such as coulomb@rail=80"
+                f"effect {text}: expected KIND@COMPONENT=VALUE, such as coulomb@rail=80"
             )
         if name == "setting@controller":
             key, _, value = values.partition(":")
@@ -116,7 +116,7 @@ def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configu
             key, _, value = item.partition("=")
             if key not in effect.kind.parameters:
                 raise RigtwinError(
-                    f"--effect {text}: {effect.name} has "
+                    f"effect {text}: {effect.name} has "
                     f"{', '.join(effect.kind.parameters)}, not {key!r}"
                 )
             changes[key] = value

@@ -64,18 +64,12 @@ class JoinedReplays:
                 f"free = {str(free)[:40]!r}: expected a list of joints that nothing prescribes",
             )
             return None
+        if unknown := [joint for joint in dict.fromkeys(free) if joint not in known]:
+            self._note_no_joints(where, unknown, known)
+            return None
         for joint in dict.fromkeys(free):
-            if joint not in known:
-                self._mistakes.note(where, f"free: {joint!r} is no joint; {near(joint, known)}")
-            elif free.count(joint) > 1:
+            if free.count(joint) > 1:
                 self._mistakes.note(where, f"free: {joint} stands there twice")
-        for tie in self._mechanism.ties():
-            if tie.joint in free and tie.to in free:
-                self._mistakes.note(
-                    where,
-                    f"free: an equality ties {tie.joint} to {tie.to}, so it goes with that; "
-                    f"leave {tie.joint} out",
-                )
         held = []
         for mover in movers:
             if types[mover] not in MOVERS:
@@ -94,13 +88,22 @@ class JoinedReplays:
                     self._mistakes.note(where, f"moved_by {mover}: it {said}{wrong}")
                 held.append(joint)
         moving = {*free, *held}
-        moving |= {tie.joint for tie in self._mechanism.ties() if tie.to in moving}
+        self._check_ties(where, free, held)
+        moving |= {tie.joint for tie in self._mechanism.ties_of(moving)[0]}
         for row in rows:
             if row.kind == "command" or not {j for j, _ in found[row.name].acts_on} & moving:
                 self._mistakes.note(
                     where,
                     f"{row.name} cannot be observed; expected sensors of "
                     f"{', '.join(sorted(moving))}",
+                )
+        for mover in movers if len(self._mistakes) == before else ():
+            acted = [joint for joint, _ in found[mover].acts_on]
+            if types[mover] in PUSHING and acted and not moving.intersection(acted):
+                self._mistakes.note(
+                    where,
+                    f"moved_by {mover}: it pushes {', '.join(acted)}, which stands still; expected "
+                    f"a joint that moves: {', '.join(sorted(moving))}",
                 )
         if "band" in table:
             self._mistakes.note(where, "band is for joints that all move as measured")
@@ -115,6 +118,37 @@ class JoinedReplays:
             joints=[*free, *held],
             free=tuple(free),
         )
+
+    def _note_no_joints(self, where: str, unknown: list[str], known: list[str]) -> None:
+        """Notes names that are no joints, once for all that follows from them."""
+        components = [name for name in unknown if name in self._components.found]
+        said = ", ".join(map(repr, unknown))
+        joints = {name: self._components.found[name].joint for name in components}
+        of = ", ".join(f"{joint} (of {name})" for name, joint in joints.items() if joint)
+        hint = f"expected joints of the MJCF: {of}" if of else near(unknown[0], known)
+        what = "components" if len(components) == len(unknown) else "no joints"
+        if len(unknown) == 1:
+            what = "a component" if components else "no joint"
+        self._mistakes.note(
+            where, f"free: {said} {'is' if len(unknown) == 1 else 'are'} {what}; {hint}"
+        )
+
+    def _check_ties(self, where: str, free: Sequence[str], held: Sequence[str]) -> None:
+        """Notes free joints that equalities tie to another joint that moves anyway."""
+        moving: list[str] = [*filter(None, held)]
+        # The joint that the MJCF makes dependent is the one to leave out.
+        dependent = {tie.joint for tie in self._mechanism.ties()}
+        for joint in sorted(dict.fromkeys(free), key=dependent.__contains__):
+            ordered, _ = self._mechanism.ties_of(moving)
+            led = {tie.joint: tie.to for tie in ordered}
+            if joint in led:
+                self._mistakes.note(
+                    where,
+                    f"free: an equality ties {joint} to {led[joint]}, so it goes with that; "
+                    f"leave {joint} out",
+                )
+            else:
+                moving.append(joint)
 
     def _put_together(
         self,

@@ -4,8 +4,9 @@ recordings replay them."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,7 @@ class Machine:
     that says its value; experiments: Python module that has them, or tables of the description;
     limits: settings of what ends a test, a NamedTuple;
     next_tests: those that a diagnosis may propose; overlooked: what of the MJCF is not taken into
-    account, a line each.
+    account, a line each; excluded: names of effects that are not searched for.
     """
 
     name: str
@@ -144,6 +145,7 @@ class Machine:
     limits: Any = field(default_factory=Nothing)
     next_tests: tuple[str, ...] = ()
     overlooked: tuple[str, ...] = ()
+    excluded: frozenset[str] = frozenset()
 
     @property
     def physics(self) -> Physics:
@@ -208,7 +210,7 @@ class Machine:
 
     def effects(self) -> Iterator[Effect]:
         """All effects that this machine can have. A computer's delay is only told from an
-        actuator's where there are several."""
+        actuator's where there are several, and is none where no controller is described."""
         movers = {
             mover
             for replay in self.replays
@@ -216,11 +218,42 @@ class Machine:
             if (channel := self.components[mover].channel) and channel[0] == "/command"
         }
         for effect in candidates(self.plant):
-            if effect.group == "computer" and len(movers) < 2:
+            if effect.group == "computer" and (len(movers) < 2 or self.control is None):
+                continue
+            if effect.name in self.excluded:
                 continue
             known = self.components.get(effect.group)
             if known is None or known.kinds is None or effect.kind.name in known.kinds:
                 yield effect
+
+    def excluding(self, names: Iterable[str]) -> Machine:
+        """The same machine, some of whose effects are not searched for.
+
+        Parameters
+        ----------
+        names
+            Effects such as `delay@motor`, or kinds such as `delay` at every component.
+
+        Raises
+        ------
+        RigtwinError
+            For a name that no effect of the machine has.
+        """
+        effects = list(self.effects())
+        known = {effect.name for effect in effects}
+        excluded = set(self.excluded)
+        for name in names:
+            meant = {e.name for e in effects if name in (e.name, e.kind.name)}
+            if not meant:
+                kinds = {effect.kind.name for effect in effects}
+                close = get_close_matches(name, [*sorted(known), *sorted(kinds)], 1)
+                hint = f"did you mean {close[0]!r}? " if close else ""
+                raise RigtwinError(
+                    f"cannot exclude {name!r}: {self.name} has no such effect; {hint}"
+                    f"there are {', '.join(sorted(known))}"
+                )
+            excluded |= meant
+        return replace(self, excluded=frozenset(excluded))
 
     def tolerance_of(self, group: str, parameter: str) -> Tolerance | None:
         """The declared tolerance of a parameter, or of one that means the same, if there is one."""

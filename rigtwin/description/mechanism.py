@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from rigtwin.description.actuator_law import (
+    find_obstacle,
+    lies_at_command,
+    read_timing,
+    rest_position,
+)
 from rigtwin.description.machine import Joint
 from rigtwin.description.model_checks import check_text, check_values
 from rigtwin.errors import RigtwinError
@@ -48,6 +54,10 @@ class Tie(NamedTuple):
     ratio: float
     apart: float
     number: int
+
+    def turned(self) -> Tie:
+        """The same with both joints exchanged; its ratio must not be zero."""
+        return Tie(self.to, self.joint, 1.0 / self.ratio, -self.apart / self.ratio, self.number)
 
 
 MASSLESS = 1e-6
@@ -90,7 +100,7 @@ class Mechanism:
         count = {
             "body": self.model.nbody,
             "joint": self.model.njnt,
-            "actuator": self.model.nu,
+            "actuator": self.model.nactuator,
             "sensor": self.model.nsensor,
             "tendon": self.model.ntendon,
             "contact": self.model.npair,
@@ -140,7 +150,19 @@ class Mechanism:
 
     def positions(self, name: str) -> bool:
         """Whether an actuator takes a position as its command."""
-        return float(self.model.actuator_biasprm[self.number("actuator", name), 1]) != 0.0
+        return lies_at_command(self.model, self.number("actuator", name))
+
+    def actuator_timing(self, name: str) -> dict[str, float]:
+        """Delay and lag of an actuator's command, s, as far as the MJCF gives them."""
+        return read_timing(self.model, self.number("actuator", name))
+
+    def rest_position(self, name: str) -> dict[str, float]:
+        """Gain and offset of a position actuator's rest position, where it is not its command."""
+        return rest_position(self.model, self.number("actuator", name))
+
+    def actuator_obstacle(self, name: str, kind: str) -> str | None:
+        """What of an actuator a component of this type cannot express; None for nothing."""
+        return find_obstacle(self.model, self.number("actuator", name), kind)
 
     def command_limits(self, name: str) -> tuple[float, float]:
         """Between which an actuator takes its command (infinite if there are none)."""
@@ -168,7 +190,7 @@ class Mechanism:
         model, number = self.model, self.number("actuator", name)
         gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
         affine = int(model.actuator_biastype[number]) == mujoco.mjtBias.mjBIAS_AFFINE
-        same = np.isclose(bias[1], -gain) and float(bias[0]) == 0.0
+        same = np.isclose(bias[1], -gain) and gain != 0.0
         if not affine or not same or float(model.actuator_gear[number, 0]) != 1.0:
             return None
         found = {"position_gain": gain, "damping_gain": max(-float(bias[2]), 0.0)}
@@ -226,6 +248,35 @@ class Mechanism:
             apart = here + float(polynomial[0]) - ratio * there
             found.append(Tie(self.joint_name(tied), self.joint_name(to), ratio, apart, number))
         return tuple(found)
+
+    def ties_of(self, moving: Iterable[str]) -> tuple[tuple[Tie, ...], tuple[Tie, ...]]:
+        """The ties that make further joints move with some joints, whatever the order in which the
+        MJCF has them: a chain is followed link by link, and a tie is turned round where the joint
+        that it names second is the one that moves along.
+
+        Parameters
+        ----------
+        moving
+            Joints that move by themselves.
+
+        Returns
+        -------
+        tuple
+            Ties in an order in which each one's `to` is known before, and the ties between two
+            joints that move anyway.
+        """
+        known, rest = set(moving), list(self.ties())
+        ordered: list[Tie] = []
+        while True:
+            ahead = next((t for t in rest if (t.joint in known) != (t.to in known)), None)
+            if ahead is None:
+                break
+            rest.remove(ahead)
+            if ahead.joint in known and ahead.ratio == 0.0:
+                continue
+            ordered.append(ahead if ahead.to in known else ahead.turned())
+            known.add(ordered[-1].joint)
+        return tuple(ordered), tuple(t for t in rest if t.joint in known and t.to in known)
 
     def turns(self, joint: str) -> bool:
         """Whether a joint is a hinge."""

@@ -3,6 +3,7 @@ stays as it is, to the letter."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,6 +14,8 @@ import mujoco
 import numpy as np
 
 from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo
+from rigtwin.components.quantity import UNLIMITED
+from rigtwin.components.servo import PUSHERS
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -171,13 +174,13 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
         raise RigtwinError(f"{path} is the machine's own model; name another output")
     document, left = Document(machine.model), []
     for change in changes:
-        if not _apply(document, machine, change):
+        if not _apply(document, machine, change, changes):
             left.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
     write_whole(path, document.text())
     return tuple(left)
 
 
-def _apply(document: Document, machine: Machine, change: Change) -> bool:
+def _apply(document: Document, machine: Machine, change: Change, changes: Sequence[Change]) -> bool:
     """Whether the change has a place in the document, which then has it."""
     component = machine.components.get(change.component)
     if component is None:
@@ -195,22 +198,64 @@ def _apply(document: Document, machine: Machine, change: Change) -> bool:
         return True
     if isinstance(nominal, Mass) and change.parameter == "mass" and nominal.mass > 0.0:
         return _scale_mass(document, component, change.value / nominal.mass)
-    if isinstance(nominal, ForceActuator) and change.parameter == "gain":
-        model = Mechanism(machine.model)
-        number = model.number("actuator", component.mjcf)
-        _scale_gear(document, model.model, number, component, change.value / nominal.gain)
-        return True
+    if component.element == "actuator":
+        return _apply_to_actuator(document, machine, component, change, changes)
     return False
 
 
-def _scale_gear(
-    document: Document, model: mujoco.MjModel, number: int, component: Component, share: float
-) -> None:
-    gear = np.array(model.actuator_gear[number])
-    gear[0] *= share
-    last = int(np.max(np.nonzero(gear)[0], initial=0)) + 1
+def _apply_to_actuator(
+    document: Document,
+    machine: Machine,
+    component: Component,
+    change: Change,
+    changes: Sequence[Change],
+) -> bool:
+    """Whether an actuator's parameter has a place in the document, which then has it."""
+    nominal = getattr(machine.plant, change.component)
+    compiled = Mechanism(machine.model)
+    model, number = compiled.model, compiled.number("actuator", component.mjcf)
     tag = document.find("actuator", component.mjcf)
-    document.set(tag, "gear", " ".join(_number(each) for each in gear[:last]))
+    pushes = isinstance(nominal, ForceActuator)
+    if change.parameter == "delay":
+        _set_delay(document, tag, model, number, change.value)
+    elif change.parameter == "lag" and isinstance(nominal, Servo) and tag.name == "position":
+        document.set(tag, "timeconst", _number(change.value))
+    elif change.parameter == "lag" and isinstance(nominal, PUSHERS) and tag.name == "general":
+        document.set(tag, "dyntype", "filterexact" if change.value > 0.0 else "none")
+        document.set(tag, "dynprm", _number(change.value))
+    elif change.parameter in ("gain", "force_limit") and pushes:
+        said = {each.parameter: each.value for each in changes if each.component == component.name}
+        gear = np.array(model.actuator_gear[number])
+        gear[0] *= said.get("gain", nominal.gain) / nominal.gain
+        last = int(np.max(np.nonzero(gear)[0], initial=0)) + 1
+        if "gain" in said:
+            document.set(tag, "gear", " ".join(_number(each) for each in gear[:last]))
+        # MuJoCo limits the force before the gear; the limit stays where it was behind it.
+        limit = said.get("force_limit", nominal.force_limit)
+        _set_force_limit(document, tag, limit / abs(float(gear[0])), limit)
+    elif change.parameter == "force_limit" and isinstance(nominal, Servo):
+        _set_force_limit(document, tag, change.value, change.value)
+    else:
+        return False
+    return True
+
+
+def _set_delay(
+    document: Document, tag: Tag, model: mujoco.MjModel, number: int, delay: float
+) -> None:
+    """A delay, and a history that is long enough for it."""
+    samples = delay / float(model.opt.timestep)
+    kept = max(math.ceil(samples - 1e-9) + 1, int(model.actuator_history[number, 0]))
+    document.set(tag, "delay", _number(delay))
+    document.set(tag, "nsample", str(kept))
+    if abs(samples - round(samples)) > 1e-6 and model.actuator_history[number, 1] == 0:
+        document.set(tag, "interp", "linear")
+
+
+def _set_force_limit(document: Document, tag: Tag, limit: float, force: float) -> None:
+    if force < UNLIMITED:
+        document.set(tag, "forcelimited", "true")
+        document.set(tag, "forcerange", f"{_number(-limit)} {_number(limit)}")
 
 
 def _scale_mass(document: Document, component: Component, share: float) -> bool:

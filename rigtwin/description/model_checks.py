@@ -77,6 +77,7 @@ def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
         text = path.read_bytes()
     except OSError:
         return  # MuJoCo says what it misses, and finds files elsewhere too.
+    _check_encoding(path, text)
     nested, parser = [copies], expat.ParserCreate()
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
@@ -106,6 +107,19 @@ def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
         parser.Parse(text, True)
     except expat.ExpatError:
         return  # MuJoCo has a reader of its own, and says what it minds.
+
+
+def _check_encoding(path: Path, text: bytes) -> None:
+    """MuJoCo takes a file's bytes as they are, whatever encoding its first line declares, and its
+    names have to be UTF-8."""
+    try:
+        text.decode()
+    except UnicodeDecodeError as error:
+        line = text.count(b"\n", 0, error.start) + 1
+        raise RigtwinError(
+            f"model {path}, line {line}: byte {text[error.start]:#04x} is not UTF-8 "
+            "(Latin-1 or UTF-16?); expected a file saved as UTF-8"
+        ) from None
 
 
 def _copies(tag: str, attributes: dict[str, str]) -> int:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from rigtwin.description.machine import Component, ReplayOf
-from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mechanism import Mechanism, Tie
 
 ELEMENTS = (("free", mujoco.mjtJoint.mjJNT_FREE), ("ball", mujoco.mjtJoint.mjJNT_BALL))
 """Joints that no replay moves."""
@@ -34,14 +34,33 @@ def overlooked(
         A line each.
     """
     model = mechanism.model
-    free = any(replay.free for replay in replays)
-    ties = mechanism.ties() if free else ()
+    ties = _followed_ties(mechanism, components, replays)
     return (
         *_joints(model, components, replays, {tie.joint for tie in ties}),
         *_dissipation(model, components),
         *_constraints(model, {tie.number for tie in ties}),
-        *_actuators(model),
+        *_actuators(model, components),
     )
+
+
+def _followed_ties(
+    mechanism: Mechanism, components: Mapping[str, Component], replays: Sequence[ReplayOf]
+) -> tuple[Tie, ...]:
+    """Equalities that a replay with free joints takes into account."""
+    free = [joint for replay in replays for joint in replay.free]
+    if not free:
+        return ()
+    movers = [components[name] for replay in replays for name in replay.moved_by]
+    held = [each.joint for each in movers if each.element != "actuator"]
+    led = {tie.joint for tie in mechanism.ties_of([*free, *held])[0]}
+    acted = [each.joint for each in movers if each.joint and each.joint not in led]
+    return mechanism.ties_of([*free, *held, *acted])[0]
+
+
+def _moving(components: Mapping[str, Component], replays: Sequence[ReplayOf]) -> set[str]:
+    """Joints that the replays move."""
+    moving = {joint for replay in replays for joint in replay.free}
+    return moving | {components[name].joint for replay in replays for name in replay.moved_by}
 
 
 def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
@@ -54,8 +73,7 @@ def _joints(
     replays: Sequence[ReplayOf],
     tied: set[str],
 ) -> Iterator[str]:
-    moved = {components[name].joint for replay in replays for name in replay.moved_by}
-    moved |= {joint for replay in replays for joint in replay.free}
+    moved = _moving(components, replays)
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         for said, kind in ELEMENTS:
@@ -97,19 +115,16 @@ def _constraints(model: mujoco.MjModel, kept: set[int]) -> Iterator[str]:
         yield "plugins"
 
 
-def _actuators(model: mujoco.MjModel) -> Iterator[str]:
-    for number in range(model.nu):
+def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
+    """Force laws of actuators that are no component, and forces that are limited on one side more
+    than on the other."""
+    described = {each.mjcf for each in components.values() if each.element == "actuator"}
+    for number in range(model.nactuator):
         name = _name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number)
-        if model.actuator_gaintype[number] == mujoco.mjtGain.mjGAIN_MUSCLE:
-            yield f"actuator {name}: it is a muscle"
-        elif model.actuator_dyntype[number] != mujoco.mjtDyn.mjDYN_NONE:
-            yield f"actuator {name}: its activation dynamics"
         bias = model.actuator_biasprm[number]
-        if model.actuator_biastype[number] != mujoco.mjtBias.mjBIAS_NONE and not bias[1]:
-            if bias[0]:
-                yield f"actuator {name}: its constant force {bias[0]:g}"
-            if bias[2]:
-                yield f"actuator {name}: its force by velocity, {bias[2]:g}"
+        pushes = model.actuator_biastype[number] != mujoco.mjtBias.mjBIAS_NONE and bias[:3].any()
+        if name not in described and pushes:
+            yield f"actuator {name}: it is no component, so the force that it has without a command"
         low, high = model.actuator_forcerange[number]
         if model.actuator_forcelimited[number] and not np.isclose(low, -high):
             yield f"actuator {name}: its forcerange's lower end {low:g}; taken as {-high:g}"

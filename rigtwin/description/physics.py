@@ -63,6 +63,8 @@ class Physics(ABC):
         Whether the model fits a recording equally well when time runs backwards.
     lacks_stops : bool
         Whether the model leaves out the stops at the ends of the joints' ranges.
+    has_contacts : bool
+        Whether the model has the contacts of the MJCF.
     longest_delay : float
         Largest sampling delay of an observed signal, s.
     card : Path or None
@@ -77,6 +79,7 @@ class Physics(ABC):
     compares_controller: ClassVar[bool] = True
     reversible: ClassVar[bool] = False
     lacks_stops: ClassVar[bool] = False
+    has_contacts: ClassVar[bool] = False
     longest_delay: ClassVar[float] = math.inf
 
     @property

@@ -11,6 +11,8 @@ import numpy as np
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.diagnosis.contacts import find_contacts
+from rigtwin.diagnosis.copies import digest
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
@@ -18,6 +20,11 @@ from rigtwin.diagnosis.residual import Residual, compute_residual
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, white_noise
+
+STILL = 0.1
+"""Share of its noise floor below which a signal does not change."""
+NOTHING = 1e-30
+"""SI units; no sensor reads so little."""
 
 
 @dataclass(frozen=True)
@@ -63,11 +70,36 @@ def compare(
     """
     configuration = configuration or machine.configuration_of(recording)
     faults = require_fit(machine, recording, configuration)
-    notes = (*recording.notes, *(fault.message for fault in faults))
+    messages = [fault.message for fault in faults]
+    notes = (*recording.notes, *messages, *find_contacts(machine, recording))
     evidence = Evidence(machine, [recording], [configuration])
+    notes = (*notes, *_still_signals(evidence))
     gap = gap_level(evidence, configuration.plant)
     replays, left_out = machine.physics.residuals(evidence, progress)
     return Comparison(replays, left_out, notes, gap)
+
+
+def _still_signals(evidence: Evidence) -> list[str]:
+    """Notes on signals that neither change nor should, whose ratio says nothing.
+
+    Raises
+    ------
+    RigtwinError
+        If no signal of the first recording changes.
+    """
+    lines, predicted = evidence.lines[0], evidence.predict(evidence.plant)[0]
+    still = [
+        row.name
+        for n, row in enumerate(evidence.machine.rows)
+        if max(np.std(lines.measured[n]), np.std(predicted[n])) < STILL * float(lines.noise[n])
+        or np.ptp(evidence.recordings[0].column(*row.channel)) < NOTHING
+    ]
+    if len(still) == len(evidence.machine.rows):
+        raise RigtwinError(
+            f"{evidence.recordings[0].path}: there is no signal to compare: {', '.join(still)} "
+            "stand still; expected a test that moves the machine"
+        )
+    return [f"{name}: there is no signal to compare, its ratio says nothing" for name in still]
 
 
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
@@ -107,6 +139,8 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
         A line each; empty if they were asked the same.
     """
     notes = []
+    if digest(first) == digest(second):
+        notes.append("both hold the same data, so no difference says anything")
     if first.experiment != second.experiment:
         notes.append(f"different experiments: {first.experiment} and {second.experiment}")
     settings = {*first.controller, *second.controller}
@@ -167,6 +201,7 @@ def compare_recordings(
     if ticks < SHORTEST:
         raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")
     results: dict[str, Residual] = {}
+    still: list[str] = []
     sensors = [
         each
         for each in machine.components.values()
@@ -181,6 +216,8 @@ def compare_recordings(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
             difference = remove_mains(one - other, first.period, machine.plant.mains.frequency)
+            if np.ptp(one) == 0.0 and np.ptp(other) == 0.0:
+                still.append(sensor.name)
             results[sensor.name] = compute_residual(
                 difference,
                 math.hypot(white_noise(one), white_noise(other)),
@@ -189,4 +226,9 @@ def compare_recordings(
             )
     if not results:
         raise RigtwinError(f"{first.path} and {second.path} share no sensor")
+    if len(still) == len(results):
+        raise RigtwinError(
+            f"{first.path} and {second.path}: there is no signal to compare: {', '.join(still)} "
+            "stand still in both"
+        )
     return results

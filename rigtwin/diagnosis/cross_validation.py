@@ -50,8 +50,9 @@ def power(evidence: Evidence, plant: Plant) -> list[Array]:
     for each recording."""
     found = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
-        relative = (lines.measured - predicted) / lines.noise[:, None]
-        found.append(np.mean(relative**2, axis=0))
+        with np.errstate(over="ignore"):
+            relative = (lines.measured - predicted) / lines.noise[:, None]
+            found.append(np.mean(relative**2, axis=0))
     return found
 
 

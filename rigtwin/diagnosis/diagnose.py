@@ -16,6 +16,7 @@ from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
+from rigtwin.diagnosis.contacts import find_contacts
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
@@ -143,11 +144,11 @@ def diagnose(
         the same as those of the fit.
     """
     started = time.perf_counter()
-    recordings, copies = drop_copies(recordings)
+    recordings, notes = drop_copies(recordings)
     refuse_copies(held_out, recordings)
     recordings, short = drop_short(recordings)
     held_out, short_held_out = drop_short(held_out)
-    left_out = [*copies, *short, *short_held_out]
+    notes += [*short, *short_held_out]
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
         if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
@@ -155,6 +156,12 @@ def diagnose(
         others = [machine.configuration_of(recording, base) for recording in held_out]
         for recording, configuration in zip(held_out, others, strict=True):
             require_fit(machine, recording, configuration, least_ticks(held_out))
+
+        notes += [
+            f"{recording.path.name}: {line}"
+            for recording in recordings
+            for line in find_contacts(machine, recording)
+        ]
 
         def diagnose_part(part: Machine) -> Diagnosis:
             evidence = Evidence(part, recordings, configurations)
@@ -171,10 +178,10 @@ def diagnose(
 
         found = [diagnose_part(part) for part in machine.physics.split(machine)]
         if len(found) == 1:
-            return _with_notes(found[0], left_out)
+            return _with_notes(found[0], notes)
         apart = Evidence(machine, held_out, others) if held_out else None
         joined = join(Evidence(machine, recordings, configurations), apart, found, started)
-        return _with_notes(joined, left_out)
+        return _with_notes(joined, notes)
 
 
 def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:

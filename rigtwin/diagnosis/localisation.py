@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigtwin.components.effect import Motion
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Place
+from rigtwin.diagnosis.units import find_unit, spell
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import band
 
@@ -50,9 +52,9 @@ def distance_since_reversal(position: Array) -> Array:
     return found
 
 
-def region(difference: Array, motion: Motion, period: float) -> str:
+def region(difference: Array, motion: Motion, period: float, unit: str = "m") -> str:
     """The operating region in which a difference, shape (ticks,), is concentrated, or
-    `throughout`."""
+    `throughout`. unit: of the motion's position, m or rad."""
     speed, force, power = motion.speed, motion.force, difference**2
     total = float(np.sum(power))
     if total <= 0.0:
@@ -80,7 +82,8 @@ def region(difference: Array, motion: Motion, period: float) -> str:
     near = np.sort(after)[
         np.searchsorted(np.cumsum(power[np.argsort(after)]), MOST * total).clip(0, len(power) - 1)
     ]
-    regions[f"within {1e3 * near:.2g} mm after a reversal"] = after <= near
+    factor, shown = find_unit(unit, float(near))
+    regions[f"within {spell(factor * float(near), 2)} {shown} after a reversal"] = after <= near
     best, name = 0.0, "throughout"
     for label, inside in regions.items():
         share = float(np.sum(power[inside])) / total
@@ -92,6 +95,15 @@ def region(difference: Array, motion: Motion, period: float) -> str:
         if share > LEAST and concentration > threshold and concentration / threshold > best:
             best, name = concentration / threshold, label
     return name
+
+
+def _unit_of_way(machine: Machine, name: str) -> str:
+    """Unit of the coordinate along which a component moves."""
+    component = machine.components.get(name)
+    if component is not None and component.acts_on:
+        return "rad" if component.turns else "m"
+    turns = [replay.joint.turns for replay in machine.replays]
+    return "rad" if turns and all(turns) else "m"
 
 
 def locate(
@@ -107,7 +119,7 @@ def locate(
     longest = int(np.argmax([d.shape[1] for d in differences]))
     difference, recording = differences[longest][row], evidence.recordings[longest]
     motion = evidence.models[longest].motion(component, evidence.plant)
-    where = region(difference, motion, recording.period)
+    where = region(difference, motion, recording.period, _unit_of_way(evidence.machine, component))
     low, high = band(difference, recording.period)
     return Place(
         component, share, (low, high), where, words or f"most of it seen by {evidence.names[row]}"

@@ -19,7 +19,7 @@ from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.finding import Answer, Finding
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.text import against_nominal
+from rigtwin.diagnosis.text import against_nominal, largest_left
 from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.units import write as write_size
 from rigtwin.diagnosis.words import name_part
@@ -172,6 +172,11 @@ def html(diagnosis: Diagnosis) -> str:
         say=say,
         against_nominal=against_nominal,
         write=write_size,
+        largest={
+            unit: max(max(each.before, each.noise) for each in overlays if each.unit == unit)
+            for unit in {each.unit for each in overlays}
+        },
+        largest_left=largest_left(answer),
         recordings=[Path(each).name for each in answer.recordings],
         title=diagnosis.described.title,
         components=list(diagnosis.evidence.machine.components)

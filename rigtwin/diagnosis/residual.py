@@ -41,7 +41,7 @@ def combine_residuals(
     outputs: dict[str, Residual], differences: dict[str, Array], period: float
 ) -> Residual:
     """Several outputs as one, each in units of its own noise floor."""
-    ratio = math.sqrt(sum(output.ratio**2 for output in outputs.values()) / len(outputs))
+    ratio = math.hypot(*(output.ratio for output in outputs.values())) / math.sqrt(len(outputs))
     loudest = max(outputs, key=lambda name: outputs[name].ratio)
     return Residual(ratio, 1.0, ratio, "1", band(differences[loudest], period), outputs)
 
@@ -50,7 +50,8 @@ def rounding(recorded: Array) -> float:
     """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit
     for a column of zeros."""
     largest = float(np.max(np.abs(recorded)))
-    if largest == 0.0:
+    # Eight digits below that the smallest numbers of a computer begin.
+    if largest < 1e-290:
         return 1e-12
     return float(
         10.0 ** (math.floor(math.log10(largest)) + 1 - SIGNIFICANT_DIGITS) / math.sqrt(12.0)

@@ -68,9 +68,11 @@ def describe(diagnosis: Answer) -> str:
         )
     if diagnosis.steps:
         lines.append("  what is left, rms, as effects are found one after another:")
+        largest = largest_left(diagnosis)
         for step in diagnosis.steps:
             amounts = ", ".join(
-                f"{name} {write(value, diagnosis.units[name])}" for name, value in step.left.items()
+                f"{name} {write(value, diagnosis.units[name], largest[name])}"
+                for name, value in step.left.items()
             )
             values = ", ".join(
                 f"{name} {write(each.value, each.unit)}" for name, each in step.values.items()
@@ -108,6 +110,16 @@ def describe(diagnosis: Answer) -> str:
     lines += [f"  note: {note}" for note in diagnosis.notes]
     lines.append(f"  {diagnosis.seconds:.1f} s")
     return "\n".join(lines)
+
+
+def largest_left(diagnosis: Answer) -> dict[str, float]:
+    """Signal → greatest rms that any step leaves of it, by which all steps are written in one
+    unit."""
+    names = {name for step in diagnosis.steps for name in step.left}
+    return {
+        name: max(step.left[name] for step in diagnosis.steps if name in step.left)
+        for name in names
+    }
 
 
 def _list_rivals(effect: Finding) -> str:

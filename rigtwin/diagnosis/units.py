@@ -46,15 +46,17 @@ def shorten(unit: str, *values: float) -> tuple[float, str]:
     return find_unit(unit, largest)
 
 
-def say(value: float, unit: str) -> str:
-    """A size of a signal with its unit, three digits."""
-    factor, shown = find_unit(unit, abs(value))
+def say(value: float, unit: str, largest: float | None = None) -> str:
+    """A size of a signal with its unit, three digits. largest: greatest value of its table, which
+    the unit suits; by default the value itself."""
+    factor, shown = find_unit(unit, abs(value) if largest is None else largest)
     return f"{spell(factor * value, 3)} {shown}".rstrip()
 
 
-def write(value: float, unit: str) -> str:
-    """A value with its unit, four digits."""
-    factor, shown = shorten(unit, value)
+def write(value: float, unit: str, largest: float | None = None) -> str:
+    """A value with its unit, four digits. largest: greatest value of its table, which the unit
+    suits; by default the value itself."""
+    factor, shown = shorten(unit, value if largest is None else largest)
     return f"{spell(factor * value, 4)} {shown}".rstrip()
 
 

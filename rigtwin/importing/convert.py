@@ -28,6 +28,7 @@ from rigtwin.importing.timing import (
     drop_repeats,
     find_period,
     require_even_ticks,
+    require_plausible,
     resample,
 )
 from rigtwin.importing.units import is_unit, unit_of
@@ -288,6 +289,7 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
         report += _notes(columns, inputs)
+        report += _time_notes(columns, wanted)
         time = _time(columns, wanted, signals)
         time, signals = drop_repeats(time, signals, report)
         taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
@@ -297,6 +299,8 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
             )
         time, signals = time[taken], {name: values[taken] for name, values in signals.items()}
         period = wanted.period or find_period(time)
+        if wanted.period is None:
+            require_plausible(period, not _times_without_unit(columns, wanted))
         _require_numbers(columns, inputs, time, signals)
         if wanted.resample is not None:
             time, signals = resample(time, signals, period, wanted.resample, report)
@@ -373,6 +377,21 @@ def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:
                 f"other; if it begins again there, say wrap = {wrap:.0f} in the map"
             )
     return found
+
+
+def _times_without_unit(columns: Columns, wanted: Map) -> list[str]:
+    """Return the columns of time whose unit neither the map nor the file states."""
+    if wanted.time_unit is not None:
+        return []
+    names = [_named(columns, name) for name in wanted.time]
+    return [name for name in names if name not in columns.units]
+
+
+def _time_notes(columns: Columns, wanted: Map) -> list[str]:
+    return [
+        f"time: no unit is said of column {name!r}; taken as s"
+        for name in _times_without_unit(columns, wanted)
+    ]
 
 
 def _time(columns: Columns, wanted: Map, signals: Signals) -> Array:

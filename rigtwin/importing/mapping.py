@@ -224,7 +224,7 @@ def _map(document: Mapping[str, Any]) -> Map:
         _number("[time] resample", time["resample"], 1e-6, 10.0) if "resample" in time else None
     )
     if "unit" in time and unit_of(str(time["unit"]))[0] != "s":
-        raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, min or h")
+        raise RigtwinError(f"[time] unit {time['unit']!r}: expected s, ms, us, ns, min, h or d")
     episode, episodes = _episodes(document.get("episodes", {}))
     channels = document.get("channels")
     if not isinstance(channels, Mapping) or not channels:

@@ -7,10 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from rigtwin.errors import RigtwinError
+from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
 JITTER = 0.5
 """Share of the period by which a time stamp may be off."""
+PLAUSIBLE = (1e-5, 0.1)
+"""s; periods that a time column without a unit may have in seconds."""
+POSSIBLE = (1e-6, 10.0)
+"""s; periods that a recording may have."""
+COLUMN_UNITS = ("d", "h", "min", "ms", "us", "ns")
+"""Units that a time column may be in, apart from seconds."""
 Signals = Mapping[str, Array]
 """Name → shape (rows,)."""
 
@@ -56,6 +63,41 @@ def find_period(time: Array) -> float:
         ):
             return rounded
     return period
+
+
+def require_plausible(period: float, said: bool) -> None:
+    """Refuse a period that no test has, or that a unit explains which nobody stated.
+
+    Parameters
+    ----------
+    period
+        Period of the time column, s.
+    said
+        Whether the file or the map states the column's unit.
+
+    Raises
+    ------
+    RigtwinError
+        Naming the units in which the period would be plausible.
+    """
+    low, high = POSSIBLE if said else PLAUSIBLE
+    if low <= period <= high:
+        return
+    factors = {unit: unit_of(unit)[1] for unit in COLUMN_UNITS}
+    fits = [
+        f'"{unit}" (a step of {factor * period:.3g} s)'
+        for unit, factor in factors.items()
+        if PLAUSIBLE[0] <= factor * period <= PLAUSIBLE[1]
+    ]
+    if said:
+        hint = "is the unit right?"
+    else:
+        hint = "say [time] unit in the map" + (f", such as {' or '.join(fits)}" if fits else "")
+        hint += '; "s" if it is in seconds' if POSSIBLE[0] <= period <= POSSIBLE[1] else ""
+    raise RigtwinError(
+        f"the time column's step is {period:.4g} s{'' if said else ' if it is in seconds'}; "
+        f"expected {low:g} to {high:g} s; {hint}"
+    )
 
 
 def require_even_ticks(time: Array, period: float, report: list[str]) -> None:

@@ -83,6 +83,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "ns": ("s", 1e-9),
     "min": ("s", 60.0),
     "h": ("s", 3600.0),
+    "d": ("s", 86_400.0),
     "1": ("1", 1.0),
     "%": ("1", 1e-2),
 }
@@ -137,6 +138,10 @@ _SPELLINGS = {
     "sec": "s",
     "seconds": "s",
     "second": "s",
+    "hours": "h",
+    "minutes": "min",
+    "day": "d",
+    "days": "d",
     "msec": "ms",
     "millis": "ms",
     "microseconds": "us",

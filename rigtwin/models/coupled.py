@@ -28,7 +28,7 @@ from rigtwin.components import (
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.guide import Friction, friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.components.servo import Push, push, push_law
@@ -328,7 +328,7 @@ class CoupledModel(Model[Plant]):
         size = self._bodies.coordinates
         return Contacts(
             guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
-            dry=np.array(dry, float).reshape(len(guides), -1),
+            dry=np.array(dry, float).reshape(len(guides), len(Friction._fields)),
             along=np.array([self._along[name] for name in self._guides]).reshape(-1, size),
             zero=np.array([self._zero[name] for name in self._guides]),
             springs=springs,

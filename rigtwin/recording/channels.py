@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from controllers import Commands, Measurements
+from machines import DEFAULT_MACHINE
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,37 @@ SESSION = (
 reads it."""
 
 
-def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
-    """The channels that a recording holds, those of the table first, with unit and meaning.
+def channels_of(
+    columns: Mapping[str, Mapping[str, object]],
+    machine: str = DEFAULT_MACHINE,
+    units: Mapping[str, str] | None = None,
+) -> list[Channel]:
+    """List the channels that a recording holds, those of the rig's table first.
 
-    Then whatever else there is. Where none of the rig's sensors is, names of its table that
-    another machine has too mean something else there.
+    Parameters
+    ----------
+    columns
+        Topic → field → values, as recordings have them.
+    machine
+        Name of the machine; names of the rig's table mean something else on another machine.
+    units
+        `/topic.field` → unit, of channels that the rig's table does not have.
+
+    Returns
+    -------
+    list of Channel
+        Channels with unit and meaning, empty where they are unknown.
     """
     there = [(topic, name) for topic, names in columns.items() for name in names]
-    rig = any(topic == "/sensor" and name in Measurements._fields for topic, name in there)
+    rig = machine == DEFAULT_MACHINE and any(
+        topic == "/sensor" and name in Measurements._fields for topic, name in there
+    )
     known = [c for c in CHANNELS if rig and (c.topic, c.name) in there]
     named = {(channel.topic, channel.name) for channel in known}
     return known + [
-        Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named
+        Channel(topic, name, (units or {}).get(f"{topic}.{name}", ""), "")
+        for topic, name in there
+        if (topic, name) not in named
     ]
 
 

@@ -35,7 +35,7 @@ def export(recording: Recording, path: Path) -> None:
 
 
 def _csv(recording: Recording) -> bytes:
-    there = channels_of(recording.columns)
+    there = channels_of(recording.columns, recording.machine)
     names = ["time", *(f"{channel.topic[1:]}.{channel.name}" for channel in there)]
     units = ["s", *(channel.unit for channel in there)]
     table = np.column_stack([recording.time, *(recording.column(c.topic, c.name) for c in there)])
@@ -62,7 +62,7 @@ def _mat(recording: Recording) -> bytes:
         content[topic[1:]] = dict(values)
     units = {
         f"{channel.topic[1:]}_{channel.name}": channel.unit
-        for channel in channels_of(recording.columns)
+        for channel in channels_of(recording.columns, recording.machine)
     }
     content["units"] = {name: unit for name, unit in units.items()}
     written = BytesIO()

@@ -14,12 +14,23 @@ from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.reader import Gathered, Recording
-from rigtwin.recording.records import DAMAGE, Lost, take_apart
+from rigtwin.recording.records import (
+    CHUNK_HEAD,
+    DAMAGE,
+    PRIVATE,
+    Lost,
+    find_chunk,
+    is_opcode,
+    length_of,
+    take_apart,
+)
 
 _PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
 READ = 2**18
 """Bytes that are read of a file at a time."""
+LONGEST = 2**26
+"""Bytes that a record may have; a longer one is damage."""
 
 
 class GrowingRecording:
@@ -33,7 +44,9 @@ class GrowingRecording:
         self.path = path
         self._window = window
         self._gathered = Gathered()
-        self._read, self._rest, self._begun = 0, b"", False
+        self._read, self._begun, self._over = 0, False, False
+        self._buffer, self._at = bytearray(), 0
+        self._lost, self._searched = False, 0
         self.ended = False
 
     @property
@@ -66,14 +79,14 @@ class GrowingRecording:
                 if file.seek(0, io.SEEK_END) < self._read:
                     raise RigtwinError(f"{self.path} was replaced while it was read")
                 file.seek(self._read)
-                while self.latest < until:
+                while self.latest < until and not self._over:
                     if self._take_one():
                         continue
                     added = file.read(READ)
-                    if not added:
+                    if not added and not self._skip_damage():
                         break
                     self._read += len(added)
-                    self._rest += added
+                    self._append(added)
         except OSError as error:
             raise RigtwinError(f"cannot read {self.path}: {error.strerror}") from None
         self._gathered.forget(self.latest - self._window)
@@ -84,33 +97,88 @@ class GrowingRecording:
         """What was kept of it. Raises RigtwinError if it is no recording or has no ticks yet."""
         return self._gathered.build(self.path)
 
+    def _append(self, added: bytes) -> None:
+        """Adds bytes of the file to those that wait, without what was taken."""
+        del self._buffer[: self._at]
+        self._searched = max(self._searched - self._at, 0)
+        self._at = 0
+        self._buffer += added
+
     def _take_one(self) -> bool:
         """Takes the next record, if all of it was read."""
+        waiting = len(self._buffer) - self._at
         if not self._begun:
-            if not self._rest.startswith(MCAP0_MAGIC[: len(self._rest)]):
+            if not MCAP0_MAGIC.startswith(self._buffer[: len(MCAP0_MAGIC)]):
                 raise RigtwinError(f"{self.path} is not an MCAP file")
-            if len(self._rest) < len(MCAP0_MAGIC):
+            if waiting < len(MCAP0_MAGIC):
                 return False
-            self._begun, self._rest = True, self._rest[len(MCAP0_MAGIC) :]
-        if len(self._rest) < _PREFIX.size or self._rest.startswith(MCAP0_MAGIC):
+            self._begun, self._at = True, len(MCAP0_MAGIC)
+            return True
+        if self._lost:
+            return self._find_chunk()
+        if self._buffer.startswith(MCAP0_MAGIC, self._at):
+            self._over = True
             return False
-        end = _PREFIX.size + _PREFIX.unpack_from(self._rest)[1]
-        if end > len(self._rest):
+        if waiting < _PREFIX.size:
             return False
-        record, self._rest = self._rest[:end], self._rest[end:]
-        self._add(record)
+        opcode, length = _PREFIX.unpack_from(self._buffer, self._at)
+        if not is_opcode(opcode) or length > LONGEST:
+            self._note_damage()
+            return True
+        end = self._at + _PREFIX.size + length
+        if end > len(self._buffer):
+            return False
+        if self._add(bytes(memoryview(self._buffer)[self._at : end])):
+            self._at = end
+        else:
+            # Its length may be what is damaged: the next chunk may lie within it.
+            self._note_damage()
         return True
 
-    def _add(self, record: bytes) -> None:
-        if record[0] in (Opcode.FOOTER, Opcode.DATA_END, Opcode.MESSAGE_INDEX):
-            return
+    def _note_damage(self) -> None:
+        self._gathered.add(Lost())
+        self._lost, self._searched = True, self._at + 1
+
+    def _find_chunk(self) -> bool:
+        """Goes on at the next chunk behind damage; False if it has not been read yet."""
+        found = find_chunk(self._buffer, self._searched)
+        if found is None:
+            self._at = self._searched = max(len(self._buffer) - CHUNK_HEAD, self._searched)
+            return False
+        self._lost, self._at = False, found
+        return True
+
+    def _skip_damage(self) -> bool:
+        """At the end of the file: whether a record that seems to go on has a later chunk within it,
+        so that its length is damaged; reading then goes on at that chunk."""
+        if self._lost or not self._begun:
+            return False
+        found = find_chunk(self._buffer, max(self._searched, self._at + 1))
+        self._searched = max(len(self._buffer) - CHUNK_HEAD, self._at)
+        if found is None:
+            return False
+        self._gathered.add(Lost())
+        self._at = found
+        return True
+
+    def _add(self, record: bytes) -> bool:
+        """Takes a record; False if it is damaged."""
+        if record[0] >= PRIVATE or record[0] in (
+            Opcode.FOOTER,
+            Opcode.DATA_END,
+            Opcode.MESSAGE_INDEX,
+        ):
+            return True
         reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
         try:
             whole = next(reader.records)
+            if isinstance(whole, Chunk) and length_of(whole) != len(record) - _PREFIX.size:
+                return False
             parts = take_apart(whole) if isinstance(whole, Chunk) else [whole]
             for part in parts:
                 self._gathered.add(part)
         except InvalidMagic:
             raise RigtwinError(f"{self.path} is not an MCAP file") from None
         except DAMAGE:
-            self._gathered.add(Lost())
+            return False
+        return True

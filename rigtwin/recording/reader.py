@@ -40,6 +40,10 @@ from rigtwin.recording.schema import (
 if TYPE_CHECKING:
     import pandas
 
+WRONG_PERIOD, DOUBTFUL_PERIOD = 0.02, 1e-3
+"""Shares by which the spacing of time stamps may differ from the declared period: above the first a
+recording is refused, above the second it has a note."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -401,10 +405,8 @@ def _period(path: Path, about: Mapping[str, str]) -> float:
         period = float(about.get("period", ""))
     except ValueError:
         period = math.nan
-    if not 0.0 < period < 10.0:
-        raise RigtwinError(
-            f"{path}: period {about.get('period')!r}; expected seconds above 0 and below 10"
-        )
+    if not 1e-6 <= period <= 10.0:
+        raise RigtwinError(f"{path}: period {about.get('period')!r}; expected 1e-6 to 10 seconds")
     return period
 
 
@@ -460,10 +462,21 @@ def _align(
 
 
 def _look_at_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
-    spacing = float(np.median(np.diff(time))) if len(time) > 1 else period
-    if abs(spacing - period) > 0.1 * period:
+    steps = np.diff(time)
+    # Stamps may be rounded: their mean says more than any of them, gaps apart.
+    typical = float(np.median(steps)) if len(steps) else period
+    regular = steps[steps < 1.5 * max(typical, period)]
+    spacing = float(np.mean(regular)) if len(regular) else typical
+    off = abs(spacing - period) / period
+    if off > WRONG_PERIOD:
         raise RigtwinError(
-            f"{path}: its period is said to be {period:g} s, but messages come every {spacing:g} s"
+            f"{path}: its period is said to be {period:g} s, but messages come every "
+            f"{spacing:.4g} s; expected time stamps within {100 * WRONG_PERIOD:g} % of the period"
+        )
+    if off > DOUBTFUL_PERIOD:
+        notes.append(
+            f"messages come every {spacing:.6g} s, {100.0 * off:.2g} % off the period of "
+            f"{period:g} s, which is what ticks are taken for"
         )
     gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
     if len(gaps):

@@ -36,8 +36,12 @@ DAMAGE = (
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
 """How a chunk names its compression, and where that stands in it."""
 _PLACE = 37
+CHUNK_HEAD = _PLACE + len(_COMPRESSION)
+"""Bytes by which the beginning of a chunk is known."""
 FEW = 8
 """Turns of the same channels below which it is not worth while to take them at once."""
+_KNOWN, PRIVATE = frozenset(int(opcode) for opcode in Opcode), 0x80
+"""Kinds of record of the format, and the first of those that programs may define."""
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 """Of a record: its kind and length; of a message: its channel, number and two times."""
@@ -70,7 +74,25 @@ class _Reader(StreamReader):
         if opcode == Opcode.MESSAGE_INDEX:
             self._stream.read(length)
             return None
-        return super()._read_record(opcode, length)
+        if not is_opcode(opcode):
+            raise McapError(f"no record is of kind {opcode}")
+        record = super()._read_record(opcode, length)
+        if isinstance(record, Chunk) and length_of(record) != length:
+            # What follows within the wrong length would be passed over in silence.
+            raise McapError(f"chunk of {length_of(record)} bytes says {length}")
+        return record
+
+
+def is_opcode(number: int) -> bool:
+    """Whether a byte says the kind of a record: one of the format's, or one that programs may
+    define."""
+    return number in _KNOWN or number >= PRIVATE
+
+
+def length_of(chunk: Chunk) -> int:
+    """Bytes of a chunk's record by its content: times 8 + 8, size 8, checksum 4, the name of its
+    compression behind its length 4, and the data behind their length 8."""
+    return 40 + len(chunk.compression) + len(chunk.data)
 
 
 def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
@@ -217,10 +239,28 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
 def _find_chunk(file: BinaryIO, start: int) -> int | None:
     """Where the next compressed chunk begins; None if there is none."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        at = data.find(_COMPRESSION, start + _PLACE)
-        while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
-            at = data.find(_COMPRESSION, at + 1)
-        return at - _PLACE if at >= 0 else None
+        return find_chunk(data, start)
+
+
+def find_chunk(data: bytearray | mmap.mmap, start: int) -> int | None:
+    """Find the beginning of a compressed chunk.
+
+    Parameters
+    ----------
+    data
+        Bytes of an MCAP file.
+    start
+        Place from which chunks are looked for.
+
+    Returns
+    -------
+    int or None
+        Place of its first byte; None if no chunk begins at or behind `start`.
+    """
+    at = data.find(_COMPRESSION, start + _PLACE)
+    while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
+        at = data.find(_COMPRESSION, at + 1)
+    return at - _PLACE if at >= 0 else None
 
 
 def seal(values: Mapping[str, str]) -> dict[str, str]:

@@ -53,6 +53,7 @@ class SuspensionRig(Physics):
     declares_limits = False
     delays_effects = True
     compares_controller = False
+    has_contacts = True
     # What answers to a command is late against it: one delay for each sensor is enough.
     longest_delay = 1e-3
 

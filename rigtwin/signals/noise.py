@@ -72,7 +72,8 @@ def smallest_step(signal: Array) -> float:
 
 def rms(signal: Array) -> float:
     """Root mean square, mean included."""
-    return float(np.sqrt(np.mean(signal**2)))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(signal**2)))
 
 
 def remove_mains(signal: Array, period: float, frequency: float) -> Array:

@@ -7,7 +7,9 @@ motions at once, can never be told from them: only what they do together is know
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +64,8 @@ class Identifiability:
     sums : tuple of mappings
         Base parameters of bodies and rotors of joints that act on each other, however far they
         move: parameter → its coefficient (`find_base_parameters`).
+    untried : tuple of str
+        Effects for which the allowed time did not suffice.
     """
 
     seen: tuple[str, ...]
@@ -69,15 +73,28 @@ class Identifiability:
     alike: Mapping[str, tuple[str, ...]]
     motions: tuple[str, ...]
     sums: tuple[Mapping[str, float], ...] = ()
+    untried: tuple[str, ...] = ()
 
 
-def find_identifiable(machine: Machine) -> Identifiability:
+class _OutOfTime(Exception):
+    """The time that was allowed is over."""
+
+
+def find_identifiable(
+    machine: Machine,
+    seconds: float = math.inf,
+    progress: Callable[[str], object] = lambda _: None,
+) -> Identifiability:
     """What the sensors of a machine can show of its effects, and what they never can.
 
     Parameters
     ----------
     machine
         Its description.
+    seconds
+        Time that the work may take, s; effects that it does not suffice for are `untried`.
+    progress
+        Called with the name of what is worked out next.
 
     Returns
     -------
@@ -90,33 +107,51 @@ def find_identifiable(machine: Machine) -> Identifiability:
     RigtwinError
         If one of its own experiments cannot be run.
     """
+    until = time.monotonic() + seconds
+    searched = [effect for effect in machine.effects() if effect.searched]
+    progress("made-up motions")
     sums = machine.physics.base_parameters(machine)
     recordings = list(machine.physics.excite(machine))
     if not recordings:
         return Identifiability((), (), {}, (), sums)
-    tried = _Tried(machine, recordings)
-    responses = {e.name: tried.response(e) for e in machine.effects() if e.searched}
-    unseen = [name for name, own in responses.items() if own is None]
-    shapes = {name: own for name, own in responses.items() if own is not None}
-    effects = {e.name: e for e in machine.effects() if e.name in shapes}
-    alike = {}
-    for name, own in shapes.items():
+    motions = tuple(str(recording.experiment) for recording in recordings)
+    responses: dict[str, Array | None] = {}
+    try:
+        tried = _Tried(machine, recordings, until)
+        for number, effect in enumerate(searched, 1):
+            progress(f"{effect.name}, {number} of {len(searched)}")
+            responses[effect.name] = tried.response(effect)
+    except _OutOfTime:
+        untried = tuple(each.name for each in searched if each.name not in responses)
+        unseen = tuple(name for name, shape in responses.items() if shape is None)
+        seen = tuple(name for name, shape in responses.items() if shape is not None)
+        return Identifiability((), unseen, {}, motions, sums, (*seen, *untried))
+    unseen = tuple(name for name, shape in responses.items() if shape is None)
+    shapes = {name: shape for name, shape in responses.items() if shape is not None}
+    effects = {each.name: each for each in searched if each.name in shapes}
+    alike: dict[str, tuple[str, ...]] = {}
+    untried: tuple[str, ...] = ()
+    for number, (name, shape) in enumerate(shapes.items(), 1):
+        progress(f"rivals of {name}, {number} of {len(shapes)}")
         rivals = {n: s for n, s in shapes.items() if not _shares(effects[n], effects[name])}
-        for others in _propose(own, rivals):
-            if tried.stands_for([effects[n] for n in others], effects[name]):
-                alike[name] = others
-                break
-    seen = [name for name in responses if name not in unseen and name not in alike]
-    return Identifiability(
-        tuple(seen), tuple(unseen), alike, tuple(str(r.experiment) for r in recordings), sums
-    )
+        try:
+            for others in _propose(shape, rivals):
+                if tried.stands_for([effects[n] for n in others], effects[name]):
+                    alike[name] = others
+                    break
+        except _OutOfTime:
+            untried = (*untried, name)
+    known = {*unseen, *alike, *untried}
+    seen = tuple(name for name in responses if name not in known)
+    return Identifiability(seen, unseen, alike, motions, sums, untried)
 
 
 class _Tried:
     """A machine's model under made-up motions."""
 
-    def __init__(self, machine: Machine, recordings: Sequence[Recording]) -> None:
-        self._machine, self.plant = machine, machine.plant
+    def __init__(self, machine: Machine, recordings: Sequence[Recording], until: float) -> None:
+        """until: moment at which the time is over, as `time.monotonic` has it."""
+        self._machine, self.plant, self._until = machine, machine.plant, until
         self._period = recordings[0].period
         self._models: list[Model[Any]] = [
             machine.physics.model(
@@ -139,6 +174,8 @@ class _Tried:
         self._here = self._predict(self.plant)
 
     def _predict(self, plant: Plant) -> Array:
+        if time.monotonic() > self._until:
+            raise _OutOfTime
         rows = np.concatenate([model.predict(plant) for model in self._models], axis=1)
         return rows / self._size
 

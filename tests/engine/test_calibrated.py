@@ -10,11 +10,14 @@ from typing import Any
 import pytest
 
 from rigtwin.components import Computer, find
-from rigtwin.description.machine import Structure
+from rigtwin.description.physics import Physics
 from rigtwin.diagnosis.calibrated import format_changes, save, toml
 from rigtwin.errors import RigtwinError
+from rigtwin.joints.physics import PrescribedJoints
+from rigtwin.rig.physics import SuspensionRig
 from tests.engine.linear import PLANT
 
+RIG = SuspensionRig()
 DELAYED = PLANT.structure_cylinder._replace(delay=0.006, gain=1.1)
 CORRECTED = PLANT._replace(
     rail=PLANT.rail._replace(coulomb=61.25),
@@ -44,7 +47,7 @@ def finding(kind: str, component: str, **values: tuple[float, float, float]) -> 
     return SimpleNamespace(name=name, parameters=parameters, confidence=confidence)
 
 
-def diagnosis_of(plant: Any, effects: list[Any], structure: Any = Structure.QUARTER_CAR) -> Any:
+def diagnosis_of(plant: Any, effects: list[Any], physics: Physics = RIG) -> Any:
     answer = SimpleNamespace(
         verdict="explained", sentence="It rubs.", recordings=["a.mcap"], effects=effects
     )
@@ -54,7 +57,7 @@ def diagnosis_of(plant: Any, effects: list[Any], structure: Any = Structure.QUAR
     )
     return SimpleNamespace(
         answer=answer,
-        described=SimpleNamespace(plant=PLANT, structure=structure),
+        described=SimpleNamespace(plant=PLANT, physics=physics),
         machine=SimpleNamespace(plant=plant),
         effects=effects,
         otherwise=[(other, 0.04)],
@@ -99,7 +102,7 @@ def test_without_effects_there_is_no_posterior_and_without_changes_no_table():
 
 
 def test_only_the_suspension_rigs_controller_is_told_of_its_plates():
-    table = tomllib.loads(toml(diagnosis_of(CORRECTED, [], Structure.MOVED)))
+    table = tomllib.loads(toml(diagnosis_of(CORRECTED, [], PrescribedJoints())))
     assert "controller" not in table
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rigtwin.models.choose import model_of
 
 from rigtwin.components import Guide
 from rigtwin.components.guide import friction
@@ -85,7 +84,9 @@ def test_coupled_joints_count_their_actuators_force(tmp_path: Path):
     columns = {"/command": {"push": push}, "/sensor": {"x_one": still, "x_two": still}}
     recording = Recording(Path("two"), "two", "", PERIOD, TIME, columns, {})
     plant = machine.plant._replace(two=GUIDE)
-    model = model_of(machine, recording, machine.configuration._replace(plant=plant), 2)
+    model = machine.physics.model(
+        machine, recording.inputs, machine.configuration._replace(plant=plant), 2
+    )
     found = model.predict(plant)
     acceleration = (40.0 - 2.0 * 6.0 - COULOMB - MU * 40.0) / 2.0
     np.testing.assert_allclose(found[1], 0.5 * acceleration * TIME**2, atol=5e-3 * found[1, -1])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rigtwin.models.choose import model_of
 
 from rigtwin.components import Guide, Mass, Rotor
 from tests.helpers.described import TOML, described, recording_of
@@ -25,7 +24,9 @@ def test_a_pushed_joint_accelerates_its_mass_and_its_rotor(tmp_path, mass, rotor
     if mass is not None:
         plant = plant._replace(mass=Mass(mass))
     recording = recording_of(machine, np.full(len(TIME), 6.0), np.zeros(len(TIME)))
-    model = model_of(machine, recording, machine.configuration._replace(plant=plant), 4)
+    model = machine.physics.model(
+        machine, recording.inputs, machine.configuration._replace(plant=plant), 4
+    )
     expected = 0.5 * 6.0 / ((mass or 2.0) + rotor) * TIME**2
     np.testing.assert_allclose(model.predict(plant)[0], expected, atol=2e-3 * expected[-1])
 

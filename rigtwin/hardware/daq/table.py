@@ -11,6 +11,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date
+from difflib import get_close_matches
+from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar
 
@@ -142,10 +144,32 @@ class ChannelTable:
         )
 
 
+def find_table(path: Path) -> Path:
+    """Find a channel table: a file, or one that is shipped, by its name with or without `.toml`.
+
+    Raises
+    ------
+    RigtwinError
+        If there is neither; the message lists the shipped ones.
+    """
+    if path.exists():
+        return path
+    folder = Path(str(files("machines"))) / "cards"
+    shipped = {each.stem.replace("_", "-"): each for each in sorted(folder.glob("*.toml"))}
+    name = path.name.removesuffix(".toml").replace("_", "-")
+    if path == Path(path.name) and name in shipped:
+        return shipped[name]
+    close = get_close_matches(name, shipped, 1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    raise RigtwinError(
+        f"channel table {path} does not exist; {hint}shipped ones: {', '.join(shipped)}"
+    )
+
+
 def load_table(path: Path, signals: Signals = RIG) -> ChannelTable:
     """Reads the channel table of a machine with these signals. Raises RigtwinError naming file and
     fault."""
-    return read_toml(path, lambda tables: parse_table(tables, signals))
+    return read_toml(find_table(path), lambda tables: parse_table(tables, signals))
 
 
 def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTable:

@@ -1,0 +1,172 @@
+"""The force law that an MJCF gives an actuator: its delay and its filter, and what of it no
+component can express."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+FIXED = int(mujoco.mjtGain.mjGAIN_FIXED)
+AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_AFFINE)
+DC_MOTOR = int(mujoco.mjtGain.mjGAIN_DCMOTOR)
+NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
+NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)
+FILTERS = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
+"""Activation dynamics that are a first-order lag of the command."""
+ENOUGH = 1e-9
+"""Share of a timestep by which a history may be too short for its delay."""
+EXPECTED = "expected <motor>, <position>, or <general> with a fixed gain"
+
+
+def lies_at_command(model: mujoco.MjModel, number: int) -> bool:
+    """Whether an actuator's force grows with its distance from a commanded position."""
+    affine = int(model.actuator_biastype[number]) == AFFINE
+    return affine and float(model.actuator_biasprm[number, 1]) != 0.0
+
+
+def read_timing(model: mujoco.MjModel, number: int) -> dict[str, float]:
+    """Delay and lag of an actuator's command.
+
+    Parameters
+    ----------
+    model
+        Compiled MJCF.
+    number
+        Index of the actuator.
+
+    Returns
+    -------
+    dict of str to float
+        `delay`, s, and `lag`, s, where the MJCF gives them; empty for an actuator without both.
+    """
+    timing: dict[str, float] = {}
+    if model.actuator_delay[number] > 0.0:
+        timing["delay"] = float(model.actuator_delay[number])
+    if int(model.actuator_dyntype[number]) in FILTERS:
+        timing["lag"] = float(model.actuator_dynprm[number, 0])
+    return timing
+
+
+def rest_position(model: mujoco.MjModel, number: int) -> dict[str, float]:
+    """Gain and offset of the joint's rest position against the command of a position actuator:
+    gear · position = (gain · command + bias₀) / −bias₁.
+
+    Returns
+    -------
+    dict of str to float
+        `gain`, 1, and `offset`, m or rad, where the joint does not rest at its command.
+    """
+    gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
+    gear = float(model.actuator_gear[number, 0])
+    if not lies_at_command(model, number) or gear == 0.0:
+        return {}
+    share, offset = -gain / float(bias[1]) / gear, -float(bias[0]) / float(bias[1]) / gear
+    found = {} if np.isclose(share, 1.0) else {"gain": share}
+    return found | ({} if offset == 0.0 else {"offset": offset})
+
+
+def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
+    """What of an actuator a component of this type cannot express.
+
+    Parameters
+    ----------
+    model
+        Compiled MJCF.
+    number
+        Index of the actuator.
+    kind
+        Type of the component: force actuator, servo or position actuator.
+
+    Returns
+    -------
+    str or None
+        What is wrong and what was expected; None where the component says all of it.
+    """
+    if model.actuator_ctrlnum[number] != 1:
+        return f"it takes {model.actuator_ctrlnum[number]} commands; expected one"
+    obstacle = _find_in_timing(model, number)
+    if obstacle is not None:
+        return obstacle
+    if kind == "position actuator":
+        return None
+    for values, attribute in (
+        (model.actuator_damping, "damping"),
+        (model.actuator_armature, "armature"),
+    ):
+        if values[number] != 0.0:
+            return (
+                f"its {attribute} is {values[number]:g}; expected 0, and the {attribute} at the "
+                "joint that it moves"
+            )
+    return _find_in_gain(model, number) or _find_in_bias(model, number, kind)
+
+
+def _find_in_timing(model: mujoco.MjModel, number: int) -> str | None:
+    delay, samples = float(model.actuator_delay[number]), int(model.actuator_history[number, 0])
+    needed = delay / float(model.opt.timestep)
+    if samples < needed - ENOUGH:
+        return (
+            f"its nsample {samples} holds {samples * model.opt.timestep:g} s of its delay of "
+            f"{delay:g} s; expected nsample at least {int(np.ceil(needed - ENOUGH))}"
+        )
+    dynamics = int(model.actuator_dyntype[number])
+    if dynamics in FILTERS and model.actuator_actlimited[number]:
+        low, high = model.actuator_actrange[number]
+        return f"its actrange {low:g} {high:g} limits a filtered command; expected ctrlrange alone"
+    if dynamics in (NO_DYNAMICS, *FILTERS) or int(model.actuator_gaintype[number]) == DC_MOTOR:
+        return None
+    name = mujoco.mjtDyn(dynamics).name.removeprefix("mjDYN_").lower()
+    return f"its activation dynamics are dyntype {name}; expected none, filter or filterexact"
+
+
+def _find_in_gain(model: mujoco.MjModel, number: int) -> str | None:
+    gain = int(model.actuator_gaintype[number])
+    if gain == DC_MOTOR:
+        return _dc_motor(model, number)
+    speaks = model.actuator_gainprm[number, 1:3].any()
+    if gain == FIXED or (gain == AFFINE_GAIN and not speaks):
+        return None
+    name = mujoco.mjtGain(gain).name.removeprefix("mjGAIN_").lower()
+    how = "by position and speed" if gain == AFFINE_GAIN else "by a law of its own"
+    return f"its gaintype is {name}, force per command {how}; {EXPECTED}"
+
+
+def _dc_motor(model: mujoco.MjModel, number: int) -> str:
+    """MuJoCo's DC motor at a constant voltage u, steady: force = gear · K/R · u − (gear · K)²/R ·
+    speed, where R is gainprm₀ and K is gainprm₁."""
+    resistance, constant = (float(value) for value in model.actuator_gainprm[number, :2])
+    gear = float(model.actuator_gear[number, 0])
+    said = "it is a <dcmotor>, whose force falls with speed"
+    plain = (
+        resistance > 0.0
+        and not model.actuator_gainprm[number, 2:].any()
+        and not model.actuator_biasprm[number].any()
+        and not model.actuator_dynprm[number].any()
+    )
+    if not plain:
+        return f"{said}; {EXPECTED}"
+    return (
+        f'{said}; expected <motor gear="{gear * constant / resistance:.6g}"> with '
+        f"{(gear * constant) ** 2 / resistance:.6g} more damping at its joint (the back-EMF)"
+    )
+
+
+def _find_in_bias(model: mujoco.MjModel, number: int, kind: str) -> str | None:
+    bias_type, bias = int(model.actuator_biastype[number]), model.actuator_biasprm[number]
+    if bias_type == NO_BIAS or (bias_type == AFFINE and not bias[:3].any()):
+        return None
+    if bias_type != AFFINE:
+        name = mujoco.mjtBias(bias_type).name.removeprefix("mjBIAS_").lower()
+        return f"its biastype is {name}; {EXPECTED}"
+    if bias[0] != 0.0:
+        return f"its constant force is {bias[0]:g} (biasprm); expected 0"
+    if kind == "servo":
+        said = f"its force by speed is {bias[2]:g} (biasprm); expected none, or against the speed"
+        return said if bias[2] > 0.0 else None
+    if bias[1] != 0.0:
+        return f'its force depends on position, {bias[1]:g} (biasprm); expected type = "servo"'
+    gear = float(model.actuator_gear[number, 0])
+    return (
+        f"its force depends on speed, {bias[2]:g} (biasprm, as <velocity> has it); expected "
+        f"<motor> with {-bias[2] * gear * gear:g} more damping at its joint"
+    )

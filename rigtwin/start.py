@@ -1,0 +1,22 @@
+"""Where the program begins: until the packages are imported Ctrl-C ends it in silence, as it ends a
+program that is not written in Python."""
+
+from __future__ import annotations
+
+import _signal  # pyright: ignore[reportMissingImports]
+import sys
+
+# Python's own handler would print the import that was under way; `signal` itself imports more.
+if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+    _signal.signal(_signal.SIGINT, _signal.SIG_DFL)
+
+
+def main() -> int:
+    """Run the command line. Returns the exit code, as `rigtwin.cli.main`."""
+    from rigtwin import cli
+
+    return cli.main()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
