@@ -32,7 +32,11 @@ from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.loop import run, run_compiled
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
+from rigtwin.studies.stability.compensated import (
+    with_exact_plate,
+    with_cylinder_delay,
+    with_filters,
+)
 from rigtwin.studies.stability.sampled_loop import decay
 
 PERIOD, FAST, LATE = 1e-3, 2e-3, 8e-3
@@ -85,7 +89,7 @@ def test_what_a_controller_is_told_is_the_cylinder_as_it_is():
     plant = configuration(VEHICLES["truck"]).plant
     cylinder = plant.structure_cylinder._replace(gain=1.1, lag=0.002, delay=0.003, a3=170.0)
     plant = plant._replace(structure_cylinder=cylinder, computer=Computer(delay=0.002))
-    found = told(tell_plate(Configuration(plant=plant)).controller)
+    found = told(with_exact_plate(Configuration(plant=plant)).controller)
     assert found == closed_loop(cylinder)._replace(delay=0.005)
 
 

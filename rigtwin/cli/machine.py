@@ -84,9 +84,9 @@ def _print_never(machine: Machine) -> None:
         print("never identifiable: not worked out; give its joints a range")
     for name in can.unseen:
         print(f"never identifiable: {name}; nothing that is recorded changes with it")
-    for name, others in can.alike.items():
+    for name, others in can.confounded.items():
         print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
-    if can.motions and not can.unseen and not can.alike:
+    if can.motions and not can.unseen and not can.confounded:
         print("never identifiable: none; what a recording does not excite, its diagnosis says")
     for each in can.sums:
         print(f"seen of bodies and rotors: {_write_sum(each)}")

@@ -1,8 +1,8 @@
-"""What a machine's sensors can never show, whatever it does: before there are any data.
+"""Structural identifiability: the effects a machine's sensors can reveal, before any data exist.
 
-Every effect is given to the machine's model under made-up rich motions. One that changes nothing
-that is recorded can never be seen. One whose changes are those of others, in every one of these
-motions at once, can never be told from them: only what they do together is known.
+The machine's model is simulated under synthetic rich motions, with one effect after another. An
+effect that changes no recorded signal is unobservable. An effect whose changes equal a combination
+of other effects' changes, in all motions at once, is confounded with them: only their sum is known.
 """
 
 from __future__ import annotations
@@ -38,105 +38,106 @@ from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.base_parameters import find_base_parameters
 
 SECONDS = 8.0
-"""Of each made-up motion."""
+"""Duration of each synthetic motion, in s."""
 REACHES = (0.3, 0.08)
-"""rms of the made-up motions, in shares of half a joint's range."""
+"""RMS of the synthetic motions, as shares of half a joint's range."""
 BAND = (0.15, 12.0)
-"""Hz, of the made-up motions."""
+"""Frequency band of the synthetic motions, in Hz."""
 SLOPE = 1.0
-"""Their amplitudes fall with this power of the frequency."""
-NOTHING = 1e-7
-"""rms of a change, in units of the signals' own rms, below which an effect does nothing."""
-LEFT = 0.01
-"""Share of an effect's change that others have to leave at most for it not to be told from
-them."""
+"""Power of the frequency with which the amplitudes of the synthetic motions fall."""
+NO_CHANGE = 1e-7
+"""RMS of a change, relative to the signals' own RMS, below which an effect is unobservable."""
+UNEXPLAINED = 0.01
+"""Share of an effect's change that a combination of other effects may leave unexplained while the
+effect still counts as confounded with them."""
 NEAR = 0.1
-"""The same of what a little of it changes, from which it is tried whether they do."""
+"""Same share for the linearised change; a combination below it is tested at full size."""
 TOGETHER = 3
-"""Others that may have to act together."""
+"""Maximum number of effects in a confounded combination."""
 BASIC = ("coulomb", "viscous")
-"""Kinds that others refine."""
+"""Kinds of effect that other kinds refine."""
 FORCELESS = 1e-9
-"""N, rms, below which no force is predicted at all."""
+"""RMS of predicted forces, in N, below which a machine counts as free of forces."""
 RANK = 1e-10
-"""Of a set of changes: what is smaller is rounding."""
+"""Relative singular value below which a direction of a set of changes is rounding."""
 EVALUATIONS = 12
-"""Of a fit of others to what an effect does."""
+"""Maximum number of evaluations when effects are fitted to another effect's change."""
 SPARSE = 4e-3
-"""s, from tick to tick of joints that are moved as measured."""
+"""Period of synthetic motions of joints with prescribed motion, in s."""
 STEPS = 4
-"""Of integration a tick."""
+"""Number of integration steps per tick."""
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What made-up motions say of a machine's effects.
+    """Observable, unobservable and confounded effects of a machine.
 
     Parameters
     ----------
     seen : tuple of str
-        Effects that leave a trace of their own.
+        Effects that can be told from all others.
     unseen : tuple of str
-        Those that change nothing that is recorded.
-    alike : mapping
-        Effect → others that together do what it does.
+        Effects that change no recorded signal.
+    confounded : mapping
+        Effect → effects that together produce the same change.
     motions : tuple of str
-        What it was tried on; empty where nothing says how far the machine may move.
+        Synthetic motions used. Empty if the description does not limit the machine's motion.
     sums : tuple of mappings
-        Base parameters of bodies and rotors of joints that act on each other, however far they
-        move: parameter → its coefficient (`find_base_parameters`).
+        Base parameters of bodies and rotors whose joints act on each other: parameter →
+        coefficient (see `find_base_parameters`). They do not depend on the range of motion.
     """
 
     seen: tuple[str, ...]
     unseen: tuple[str, ...]
-    alike: Mapping[str, tuple[str, ...]]
+    confounded: Mapping[str, tuple[str, ...]]
     motions: tuple[str, ...]
     sums: tuple[Mapping[str, float], ...] = ()
 
 
 def find_identifiable(machine: Machine) -> Identifiability:
-    """What the sensors of a machine can show of its effects, and what they never can.
+    """Return which effects of a machine its sensors can identify.
 
     Parameters
     ----------
     machine
-        Its description.
+        Machine under study.
 
     Returns
     -------
     Identifiability
-        Of all effects that are searched for; empty but for its sums where the description does not
-        say how far the machine may move: its joints need a range, or it needs an experiment.
+        Result for all effects that a diagnosis searches. Only `sums` is filled if the description
+        does not limit the motion: joints need a range, or the machine needs an experiment.
 
     Raises
     ------
     RigtwinError
-        If one of its own experiments cannot be run.
+        If an experiment of the machine cannot be simulated.
     """
     sums = find_base_parameters(machine)
     recordings = list(_make_up(machine))
     if not recordings:
         return Identifiability((), (), {}, (), sums)
-    tried = _Tried(machine, recordings)
-    responses = {e.name: tried.response(e) for e in machine.effects() if e.searched}
-    unseen = [name for name, own in responses.items() if own is None]
-    shapes = {name: own for name, own in responses.items() if own is not None}
+    trial = _Trial(machine, recordings)
+    responses = {e.name: trial.response(e) for e in machine.effects() if e.searched}
+    unseen = [name for name, response in responses.items() if response is None]
+    shapes = {name: response for name, response in responses.items() if response is not None}
     effects = {e.name: e for e in machine.effects() if e.name in shapes}
-    alike = {}
-    for name, own in shapes.items():
+    confounded = {}
+    for name, shape in shapes.items():
+        # Two effects that set the same parameter are the same change by construction.
         rivals = {n: s for n, s in shapes.items() if not _shares(effects[n], effects[name])}
-        for others in _propose(own, rivals):
-            if tried.stands_for([effects[n] for n in others], effects[name]):
-                alike[name] = others
+        for combination in _propose(shape, rivals):
+            if trial.reproduces([effects[n] for n in combination], effects[name]):
+                confounded[name] = combination
                 break
-    seen = [name for name in responses if name not in unseen and name not in alike]
+    seen = [name for name in responses if name not in unseen and name not in confounded]
     return Identifiability(
-        tuple(seen), tuple(unseen), alike, tuple(str(r.experiment) for r in recordings), sums
+        tuple(seen), tuple(unseen), confounded, tuple(str(r.experiment) for r in recordings), sums
     )
 
 
 def _make_up(machine: Machine) -> Iterator[Recording]:
-    """Rich motions within the machine's limits, without noise where it can be had without."""
+    """Yield rich motions within the machine's limits, without noise where the twin allows it."""
     if machine.structure is Structure.QUARTER_CAR:
         for name in machine.next_tests[:1]:
             test = find_experiment(machine, name)
@@ -148,11 +149,11 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
         return
     timing = machine.configuration.timing._replace(duration=SECONDS)
     if machine.structure is Structure.MOVED:
-        # Nothing is integrated from tick to tick.
+        # Prescribed motion is evaluated point by point, not integrated, so long steps suffice.
         timing = timing._replace(period=max(timing.period, SPARSE))
-    # What its sensors can show does not depend on where a test would have to end.
-    nothing: Any = Nothing()
-    configuration = machine.configuration._replace(timing=timing, safety=nothing)
+    # Safety limits would end a motion early without changing what the sensors can show.
+    unlimited: Any = Nothing()
+    configuration = machine.configuration._replace(timing=timing, safety=unlimited)
     time = np.arange(configuration.ticks) * timing.period
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         for number, reach in enumerate(REACHES, 1):
@@ -162,6 +163,7 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
                 size = _reach(machine, (topic, field))
                 if size is None:
                     return
+                # A fifth of the sampling rate keeps the highest sine well below Nyquist.
                 highest = min(BAND[1], 0.2 / timing.period)
                 wave = multisine(
                     time,
@@ -183,18 +185,20 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
 
 
 def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
-    """(middle, half) of what a channel may demand; None if nothing says it."""
+    """Return (middle, half) of a demanded channel's range, or None if it is unlimited."""
     if machine.structure in (Structure.MOVED, Structure.COUPLED):
         mechanism = Mechanism(machine.model)
         moved = next((c for c in machine.components.values() if c.channel == channel), None)
         if moved is None:
-            # What a controller is told: how far that may go is not said.
+            # The demand is an input of the controller, whose range the description does not state.
             return None
         joint = mechanism.joint(moved.joint or moved.acts_on[0][0])
         middle, half = _range(joint)
         if not isinstance(getattr(machine.plant, moved.name), ForceActuator):
             return middle, half
         constant = getattr(machine.plant, moved.name).constant
+        # Half the force that lifts the joint where gravity loads it, otherwise the force that moves
+        # its inertia to and fro at 1 Hz.
         lifts = 0.5 * max(np.abs(joint.gravity))
         return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
     for replay in machine.replays:
@@ -206,21 +210,25 @@ def _reach(machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | 
             constant = getattr(getattr(machine.plant, mover.name), "constant", None)
             if constant is None:
                 return middle, half
-            # What moves it to and fro once a second; half of what lifts it, where it hangs.
+            # As above: half the weight, or the force of a motion at 1 Hz.
             lifts = 0.5 * max(np.abs(joint.gravity))
             return 0.0, (lifts or joint.inertia * (2.0 * math.pi) ** 2 * half) / constant
     return None
 
 
 def _range(joint: Joint) -> tuple[float, float]:
-    """(middle, half) of where a joint goes: its rest, if that lies well inside."""
+    """Return (middle, half) of a joint's range, centred on its rest position if that is inside."""
     low, high = joint.positions[0], joint.positions[-1]
     middle = min(max(joint.rest, low), high)
+    # A rest position near a stop would allow no motion: at least a quarter of the range is used.
     return middle, max(min(high - middle, middle - low), 0.25 * (high - low))
 
 
-class _Tried:
-    """A machine's model under made-up motions."""
+class _Trial:
+    """Model of a machine under the synthetic motions.
+
+    Predictions are divided by the RMS of each signal, so that all signals weigh the same.
+    """
 
     def __init__(self, machine: Machine, recordings: Sequence[Recording]) -> None:
         self._machine, self.plant = machine, machine.plant
@@ -234,14 +242,14 @@ class _Tried:
         moved = self._predict(self.plant)
         rms = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
         self._size = np.maximum(rms, 1e-12)
-        # Refinements of friction do nothing where there is none.
+        # Refinements of dry friction have no effect without it, so friction is added first.
         for effect in machine.effects():
             if effect.kind.name in BASIC and not any(effect.nominal(machine.plant).values()):
                 values = self._starts(effect).values
                 self.plant = with_values(
                     self.plant, (effect,), (min(v for v in values if v[0] > 0.0),)
                 )
-        self._here = self._predict(self.plant)
+        self._baseline = self._predict(self.plant)
 
     def _predict(self, plant: Plant) -> Array:
         rows = np.concatenate([model.predict(plant) for model in self._models], axis=1)
@@ -255,7 +263,7 @@ class _Tried:
             if row.kind == "force"
         ]
         force = max(forces, default=0.0)
-        # A guide that nothing is known of bears no force; then any unit of it will do.
+        # Without any predicted force the scale is arbitrary, because effects are compared in shape.
         return Scales.of(motion, force if force > FORCELESS else 1.0, self._period)
 
     def _starts(self, effect: Effect) -> Starts:
@@ -263,21 +271,50 @@ class _Tried:
         return effect.starts(self.plant, swing, lambda: self._scales(effect.group))
 
     def response(self, effect: Effect) -> Array | None:
-        """What a little of an effect changes, of length 1, all signals one after another; if that
-        is nothing, what the smallest size does that does anything; None if none does."""
+        """Return the change of all signals by a small effect, normalised to length 1.
+
+        If a small effect changes nothing, the smallest start that changes anything is used. None
+        if no start does.
+        """
         if not is_possible((effect,), self.plant):
             return None
-        there = tuple(effect.nominal(self.plant).values())
+        nominal = tuple(effect.nominal(self.plant).values())
         starts = self._starts(effect)
-        sizes = sorted(starts.values, key=lambda values: abs(values[0] - there[0]))
-        little = (there[0] + starts.steps[0], *sizes[0][1:])
+        sizes = sorted(starts.values, key=lambda values: abs(values[0] - nominal[0]))
+        little = (nominal[0] + starts.steps[0], *sizes[0][1:])
         for values in (little, *sizes):
-            if values == there:
+            if values == nominal:
                 continue
-            change = self._predict(with_values(self.plant, (effect,), (values,))) - self._here
-            if float(np.sqrt(np.mean(change**2))) > NOTHING:
+            change = self._predict(with_values(self.plant, (effect,), (values,))) - self._baseline
+            if float(np.sqrt(np.mean(change**2))) > NO_CHANGE:
                 return np.ravel(change) / float(np.linalg.norm(change))
         return None
+
+    def reproduces(self, combination: Sequence[Effect], effect: Effect) -> bool:
+        """Return whether a combination of effects reproduces an effect of medium size.
+
+        Linear dependence of small changes is not enough: a delay equals a lag only while small.
+        """
+        nominal = tuple(effect.nominal(self.plant).values())
+        sizes = sorted(self._starts(effect).values, key=lambda values: abs(values[0] - nominal[0]))
+        target = self._predict(with_values(self.plant, (effect,), (sizes[len(sizes) // 2],)))
+        change = float(np.linalg.norm(target - self._baseline))
+        rest = [tuple(e.nominal(self.plant).values()) for e in combination]
+        steps = np.array([self._starts(e).steps[0] for e in combination])
+        quantities = [e.quantities()[e.kind.parameters[0]] for e in combination]
+
+        def residual(point: Array) -> Array:
+            # The search starts at 1, not 0, because the solver's difference steps are relative.
+            moved = point - 1.0
+            values = [
+                (min(max(start[0] + step * by, q.low), q.high), *start[1:])
+                for start, step, by, q in zip(rest, steps, moved, quantities, strict=True)
+            ]
+            return np.ravel(target - self._predict(with_values(self.plant, combination, values)))
+
+        start = np.ones(len(combination))
+        fit = least_squares(residual, start, diff_step=1.0, max_nfev=EVALUATIONS)
+        return change > 0.0 and float(np.linalg.norm(fit.fun)) < UNEXPLAINED * change
 
     def stands_for(self, others: Sequence[Effect], effect: Effect) -> bool:
         """Whether others can do what a good deal of an effect does, not only what a little does:
@@ -303,26 +340,30 @@ class _Tried:
         return change > 0.0 and float(np.linalg.norm(fit.fun)) < LEFT * change
 
 
-def _shares(one: Effect, other: Effect) -> bool:
-    """Whether both are values of one parameter."""
-    common = set(one.kind.parameters) & set(other.kind.parameters)
-    return one.group == other.group and bool(common)
+def _shares(first: Effect, second: Effect) -> bool:
+    """Return whether two effects set the same parameter."""
+    common = set(first.kind.parameters) & set(second.kind.parameters)
+    return first.group == second.group and bool(common)
 
 
-def _propose(shape: Array, others: Mapping[str, Array]) -> Iterator[tuple[str, ...]]:
-    """Others that may do the same together, the fewest first: of all of them, the one that is
-    missed least is left out, one after another."""
-    names, columns = list(others), np.array(list(others.values()))
+def _propose(shape: Array, rivals: Mapping[str, Array]) -> Iterator[tuple[str, ...]]:
+    """Propose combinations of rivals that may reproduce a shape, the smallest first.
+
+    Backward elimination: starting from all rivals, the one whose removal raises the residual least
+    is removed in each round, while the residual stays below NEAR.
+    """
+    names, columns = list(rivals), np.array(list(rivals.values()))
+    # All shapes have length 1, so every projection follows from the Gram matrix alone.
     gram, shared = columns @ columns.T, columns @ shape
 
-    def left(chosen: list[int]) -> float:
-        part, own = gram[np.ix_(chosen, chosen)], shared[chosen]
-        return 1.0 - float(own @ np.linalg.lstsq(part, own, rcond=RANK)[0])
+    def residual(chosen: list[int]) -> float:
+        part, target = gram[np.ix_(chosen, chosen)], shared[chosen]
+        return 1.0 - float(target @ np.linalg.lstsq(part, target, rcond=RANK)[0])
 
     chosen = list(range(len(names)))
-    found: list[tuple[str, ...]] = []
-    while chosen and left(chosen) < NEAR**2:
+    combinations: list[tuple[str, ...]] = []
+    while chosen and residual(chosen) < NEAR**2:
         if len(chosen) <= TOGETHER:
-            found.append(tuple(names[n] for n in chosen))
-        chosen.remove(min(chosen, key=lambda n: left([c for c in chosen if c != n])))
-    yield from reversed(found)
+            combinations.append(tuple(names[n] for n in chosen))
+        chosen.remove(min(chosen, key=lambda n: residual([c for c in chosen if c != n])))
+    yield from reversed(combinations)

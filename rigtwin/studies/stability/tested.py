@@ -12,7 +12,11 @@ from rigtwin.components import Carriage, RigPlant, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.simulation.runner import without_limits
-from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
+from rigtwin.studies.stability.compensated import (
+    with_cylinder_delay,
+    with_exact_plate,
+    with_filters,
+)
 from rigtwin.studies.stability.sampled_loop import decay
 from rigtwin.studies.stability.vehicle import QuarterCar
 
@@ -81,7 +85,7 @@ def set_for_compensation(
     """The same with the settings of a compensated test: the plate's delay taken away by what is
     told of the cylinder as it is, short filters, a firm force loop, and the motor's friction
     observed and taken away, which a loop with the plate's delay does not bear."""
-    short = with_filters(tell_plate(configuration), FILTER)
+    short = with_filters(with_exact_plate(configuration), FILTER)
     controller = short.controller._replace(
         compensator=Compensator.OBSERVER,
         kp=KP,
