@@ -21,7 +21,7 @@ from rigtwin.components import RigPlant
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.ideal import simulate_ideal
-from rigtwin.studies.stability.tested import rig_as, set_for_compensation, sized
+from rigtwin.studies.stability.tested import configure_vehicle, set_for_compensation, sized
 
 TESTS = ("drop", "road1.6", "road10")
 SECONDS, SEED = 10.0, 1
@@ -67,7 +67,7 @@ def configure(vehicle: str, test: str) -> Configuration:
     """That vehicle in that test, on a rig that is strong enough."""
     base = find(test).configuration
     timing = base.timing._replace(duration=SECONDS)
-    return sized(rig_as(find_vehicle(vehicle)))._replace(road=base.road, timing=timing)
+    return sized(configure_vehicle(find_vehicle(vehicle)))._replace(road=base.road, timing=timing)
 
 
 def run(configuration: Configuration, test: str, compensated: bool) -> Errors:

@@ -16,7 +16,7 @@ from rigtwin.components import Carriage, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
-from rigtwin.studies.stability.tested import rig_as, set_for_compensation
+from rigtwin.studies.stability.tested import configure_vehicle, set_for_compensation
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 TABLE_6_2 = "quarter-car"
@@ -46,7 +46,7 @@ VEHICLES = {
 def configuration(vehicle: Vehicle) -> Configuration:
     """The rig set up as that vehicle, its spring carrying 90 % of the static load at the start so
     that the body drops."""
-    return rig_as(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
+    return configure_vehicle(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
 
 
 COMPENSATED = "-compensated"

@@ -33,8 +33,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.simulation.loop import run, run_compiled
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.stability.compensated import (
-    with_exact_plate,
     with_cylinder_delay,
+    with_exact_plate,
     with_filters,
 )
 from rigtwin.studies.stability.sampled_loop import decay

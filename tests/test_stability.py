@@ -344,7 +344,7 @@ class TestMapping:
     def test_bad_input(self, tmp_path):
         axis = around("tau", CHOSEN, 0.01, 4)
         with pytest.raises(
-            RigtwinError, match="unknown parameter 'mass'; there are tyre_stiffness"
+            RigtwinError, match="unknown parameter 'mass'; expected one of tyre_stiffness"
         ):
             around("mass", CHOSEN, 0.01)
         with pytest.raises(RigtwinError, match="two different parameters"):

@@ -316,29 +316,6 @@ class _Trial:
         fit = least_squares(residual, start, diff_step=1.0, max_nfev=EVALUATIONS)
         return change > 0.0 and float(np.linalg.norm(fit.fun)) < UNEXPLAINED * change
 
-    def stands_for(self, others: Sequence[Effect], effect: Effect) -> bool:
-        """Whether others can do what a good deal of an effect does, not only what a little does:
-        as far as a delay is a lag at low frequencies."""
-        there = tuple(effect.nominal(self.plant).values())
-        sizes = sorted(self._starts(effect).values, key=lambda values: abs(values[0] - there[0]))
-        wanted = self._predict(with_values(self.plant, (effect,), (sizes[len(sizes) // 2],)))
-        change = float(np.linalg.norm(wanted - self._here))
-        rest = [tuple(each.nominal(self.plant).values()) for each in others]
-        steps = np.array([self._starts(each).steps[0] for each in others])
-        quantities = [each.quantities()[each.kind.parameters[0]] for each in others]
-
-        def left(point: Array) -> Array:
-            # About 1, since the solver's steps are shares of where it stands.
-            moved = point - 1.0
-            values = [
-                (min(max(own[0] + step * by, q.low), q.high), *own[1:])
-                for own, step, by, q in zip(rest, steps, moved, quantities, strict=True)
-            ]
-            return np.ravel(wanted - self._predict(with_values(self.plant, others, values)))
-
-        fit = least_squares(left, np.ones(len(others)), diff_step=1.0, max_nfev=EVALUATIONS)
-        return change > 0.0 and float(np.linalg.norm(fit.fun)) < LEFT * change
-
 
 def _shares(first: Effect, second: Effect) -> bool:
     """Return whether two effects set the same parameter."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.stability.loop import Loop, Roots, bound, delay_function, instant, order
-from rigtwin.studies.stability.vehicle import checked_time
+from rigtwin.studies.stability.vehicle import check_time
 
 MIN_NODES, MAX_NODES = 20, 160
 """Range of the number of Chebyshev nodes over the longest delay, less one. The minimum provides
@@ -31,7 +31,7 @@ def rightmost_delay_root(loop: Loop, delay: float) -> complex:
     delay
         Delay of one power of z, in s.
     """
-    checked_time("delay", delay)
+    check_time("delay", delay)
     span = delay * order(loop)
     nodes = int(min(MIN_NODES + 0.5 * bound(loop) * span, MAX_NODES))
     eigenvalues = _generator_eigenvalues(loop, delay, nodes)
