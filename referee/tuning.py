@@ -25,7 +25,7 @@ from rigtwin.console import table
 from rigtwin.description.posterior import Posterior, load_posterior
 from rigtwin.studies.sweep import run_jobs
 from rigtwin.studies.tuning.bench import Bench
-from rigtwin.studies.tuning.evaluation import Comparison, compare
+from rigtwin.studies.tuning.evaluation import SettingsComparison, compare
 from rigtwin.studies.tuning.result import BEFORE, TUNED_NOMINAL, find_settings
 from rigtwin.studies.tuning.run import Run, figures
 from rigtwin.studies.tuning.scenario import APART, NOMINAL, Scenario, calibrated_rig
@@ -48,7 +48,7 @@ class Case:
         Which rig.
     defect, found : str
         What was withheld, and the diagnosis' sentence.
-    against_nominal, against_before : Comparison
+    against_nominal, against_before : SettingsComparison
         The settings tuned on the calibrated twin compared on the rig with those tuned on the
         nominal one, and with the baseline.
     """
@@ -56,8 +56,8 @@ class Case:
     number: int
     defect: str
     found: str
-    against_nominal: Comparison
-    against_before: Comparison
+    against_nominal: SettingsComparison
+    against_before: SettingsComparison
 
 
 @dataclass(frozen=True)
@@ -238,7 +238,7 @@ def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
     """All cases for other programs."""
     name = study.goals.minimise[0].name
 
-    def describe(comparison: Comparison) -> dict[str, object] | None:
+    def describe(comparison: SettingsComparison) -> dict[str, object] | None:
         if not comparison.changes:
             return None
         return asdict(replace(comparison.of(name), measure=None))  # type: ignore[arg-type]

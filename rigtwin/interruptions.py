@@ -28,7 +28,7 @@ def deferred() -> Iterator[None]:
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
+def block_sigint() -> Iterator[None]:
     """Keeps interruptions back. A process that is started meanwhile never gets one, not even while
     it imports its packages; this one gets it behind."""
     # What is kept back is a thread's own: another thread may take it, and the first one handles it.

@@ -73,7 +73,7 @@ def test_a_measure_is_its_formula_over_what_counts(formula: str, of: str, value:
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ({"formula": "speed"}, "measures.m.formula: unknown 'speed'; there are time, reference"),
+        ({"formula": "speed"}, "measures.m.formula: unknown 'speed'; expected time, reference"),
         ({"formula": "1 + 2"}, "expected a channel in it"),
         ({"formula": "position +"}, "measures.m.formula: "),
         ({"of": "rms"}, "measures.m.formula = None: expected text"),
@@ -110,7 +110,7 @@ def test_a_rig_s_measures_are_not_another_machine_s() -> None:
         "minimise": "ride",
         "parameters": {"controller.kp": [1, 2]},
     }
-    with pytest.raises(rigtwin.RigtwinError, match=r"unknown 'ride'; there are none; \[measures"):
+    with pytest.raises(rigtwin.RigtwinError, match=r"unknown 'ride'; expected none; \[measures"):
         parse_study("s", tables, find("emps"))
 
 

@@ -20,7 +20,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.evaluation import compare
 from rigtwin.studies.tuning.run import LIMITS, TRIP, rig_trial
@@ -93,9 +93,9 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     said: list[Case] = []
     with Store(tmp_path / "s.sqlite") as store:
         study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
-        found = check(Bench(study, store, Here()), 1, 4, show=said.append)
+        found = check(Bench(study, store, SerialExecutor()), 1, 4, show=said.append)
         made = len(store)
-        again = check(Bench(study, store, Here()), 1, 4)
+        again = check(Bench(study, store, SerialExecutor()), 1, 4)
         assert len(store) == made
     assert found == said == again
     (case,) = found

@@ -20,7 +20,7 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, iterate_results, open_workers, run_jobs
 from rigtwin.studies.sweep.cluster import _run_if_same
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from tests.helpers.jobs import always_deadly, deadly, faulty, process, slow, square
 
 VALUES = {
@@ -101,8 +101,8 @@ def test_what_was_done_is_not_done_again(tmp_path):
 
     steps: list[int] = []
     with Store(tmp_path / "s.sqlite") as store:
-        run_jobs(store, Here(), counted, ((str(n), n) for n in range(5)))
-        run_jobs(store, Here(), counted, ((str(n), n) for n in range(8)), steps.append)
+        run_jobs(store, SerialExecutor(), counted, ((str(n), n) for n in range(5)))
+        run_jobs(store, SerialExecutor(), counted, ((str(n), n) for n in range(8)), steps.append)
         assert [store[str(n)] for n in range(8)] == [-n for n in range(8)]
     assert ran == list(range(8))
     assert sum(steps) == 8
@@ -218,7 +218,9 @@ def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
     with Store(path) as store:
         kept = set(store.keys())
         ran: list[int] = []
-        run_jobs(store, Here(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40)))
+        run_jobs(
+            store, SerialExecutor(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40))
+        )
         assert len(kept) + len(ran) == 40
         assert [store[str(n)] for n in range(40)] == list(range(40))
 

@@ -55,7 +55,7 @@ def test_a_map_of_the_rig_as_it_runs_has_its_decay() -> None:
         found = stability_map(model, car, 0.01, across, up)
         heavy = car._replace(sprung_mass=200.0, suspension_stiffness=float(up.values[0]))
         assert found.rightmost[0, 1] == pytest.approx(-judge(heavy), rel=1e-9)
-    with pytest.raises(RigtwinError, match="it has the rig's own lags"):
+    with pytest.raises(RigtwinError, match="the model has the rig's own lags"):
         stability_map("sampled", car, 0.01, around("tau", car, 0.01, 2), up)
 
 

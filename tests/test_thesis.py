@@ -18,7 +18,7 @@ from experiments.thesis.study import Conclusion, Drawing, Study, sheet
 from experiments.thesis.work import done
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 
 
 @pytest.mark.parametrize(
@@ -116,11 +116,13 @@ def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, l
 def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
     study, ran = counting(set(), monkeypatch)
     steps: list[tuple[int, int]] = []
-    first = done([study], 3, tmp_path, Here(), lambda count, total: steps.append((count, total)))
+    first = done(
+        [study], 3, tmp_path, SerialExecutor(), lambda count, total: steps.append((count, total))
+    )
     assert sorted(ran) == ["job/0", "job/1", "job/2"]
     assert steps[0] == (0, 3)
     assert steps[-1] == (3, 3)
-    again = done([study], 4, tmp_path, Here())
+    again = done([study], 4, tmp_path, SerialExecutor())
     assert sorted(ran) == ["job/0", "job/1", "job/2", "job/3"]
     assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
 
@@ -128,16 +130,18 @@ def test_finished_jobs_are_not_done_again(tmp_path, monkeypatch):
 def test_a_broken_run_goes_on_where_it_was(tmp_path, monkeypatch):
     study, ran = counting({"job/2"}, monkeypatch)
     with pytest.raises(RigtwinError, match="job/2 failed"):
-        done([study], 3, tmp_path, Here())
+        done([study], 3, tmp_path, SerialExecutor())
     assert ran == ["job/0", "job/1", "job/2"]
     whole, ran = counting(set(), monkeypatch)
-    assert len(done([whole], 3, tmp_path, Here())["counted"]) == 3
+    assert len(done([whole], 3, tmp_path, SerialExecutor())["counted"]) == 3
     assert ran == ["job/2"]
 
 
 def test_text_document_and_page_say_the_same(tmp_path, monkeypatch):
     study, _ = counting(set(), monkeypatch)
-    chapters = [Chapter(study, study.conclude(done([study], 3, tmp_path, Here())["counted"]))]
+    chapters = [
+        Chapter(study, study.conclude(done([study], 3, tmp_path, SerialExecutor())["counted"]))
+    ]
     plain = text(chapters, every=True)
     assert "1 of 1 entries agree" in plain
     assert "[1] a note" in plain

@@ -26,21 +26,21 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.sweep import Store
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench, Score, quantile
 from rigtwin.studies.tuning.evaluation import compare, median_interval
 from rigtwin.studies.tuning.measures import MEASURES, Trial
-from rigtwin.studies.tuning.parameter import Parameter, values_at
+from rigtwin.studies.tuning.parameter import TuningParameter, values_at
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, rig_trial, run
 from rigtwin.studies.tuning.scenario import (
     APART,
     NOMINAL,
-    Rig,
     Scenario,
+    UncertainRig,
     calibrated_rig,
     draw_scenarios,
 )
-from rigtwin.studies.tuning.search import Candidate, Search, bound_of, find_best, find_front
+from rigtwin.studies.tuning.search import Candidate, TuningSearch, bound_of, find_best, find_front
 from rigtwin.studies.tuning.study import Constraint, Study
 from rigtwin.studies.tuning.study_file import parse_study
 from tests.helpers.browser import BROWSER, looked_at
@@ -79,7 +79,7 @@ def read(tables: dict[str, object]) -> Study:
     return parse_study("s", tables, find(DEFAULT_MACHINE))
 
 
-def draw_frictions(study: Study, rig: Rig, count: int) -> np.ndarray:
+def draw_frictions(study: Study, rig: UncertainRig, count: int) -> np.ndarray:
     """The motor's dry friction in scenarios, N."""
     return np.array([each.plant.motor.coulomb for each in draw_scenarios(study, rig, count, 0)])
 
@@ -184,7 +184,7 @@ def test_errors_are_those_of_the_thesis_tables():
 
 @pytest.mark.parametrize("logarithmic", [False, True])
 def test_a_parameter_goes_there_and_back(logarithmic):
-    parameter = Parameter("controller.ki", 2.0, 300.0, logarithmic, "1/s")
+    parameter = TuningParameter("controller.ki", 2.0, 300.0, logarithmic, "1/s")
     assert parameter.value(0.0) == 2.0
     assert parameter.value(1.0) == 300.0
     for share in np.linspace(0, 1, 11):
@@ -207,7 +207,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         for parameter in study.parameters:
             there = getattr(study.baseline_settings, parameter.name)
             assert parameter.low <= there <= parameter.high, parameter.key
-        bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), Here())
+        bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), SerialExecutor())
         short = override(study.search_configuration, {"timing": {"duration": 1.0}})
         scenario = Scenario(0, short.plant)
         assert run(replace(bench.plan(short, study.baseline_settings, scenario), first=0.0))
@@ -218,7 +218,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
     [
         ({"nothing": 1}, "unknown 'nothing'"),
         ({"experiment": "moon"}, "unknown experiment"),
-        ({"minimise": "beauty"}, "unknown 'beauty'; there are ride"),
+        ({"minimise": "beauty"}, "unknown 'beauty'; expected ride"),
         ({"minimise": ["ride", "heave", "travel"]}, "one objective, or two"),
         ({"minimise": 3}, "expected names of"),
         ({"parameters": {}}, "expected settings with bounds"),
@@ -381,10 +381,12 @@ class Known(Bench):
         return found
 
 
-def make_search(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> Search:
+def make_search(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> TuningSearch:
     parameters = {"controller.skyhook_damping": [50.0, 1500.0], "controller.kp": [0.1, 2.0]}
     study = read({**TABLES, "parameters": parameters, "evaluations": 400, **tables})
-    return Search(Known(study, Store(tmp_path / "s.sqlite"), Here(), progress), [], 1)
+    return TuningSearch(
+        Known(study, Store(tmp_path / "s.sqlite"), SerialExecutor(), progress), [], 1
+    )
 
 
 def test_the_best_is_found(tmp_path):
@@ -437,7 +439,7 @@ def test_parameters_that_do_nothing_are_said(tmp_path):
 
     study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match="skyhook_damping make no difference in active"):
-        find_best(Search(Deaf(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(TuningSearch(Deaf(study, Store(tmp_path / "s.sqlite"), SerialExecutor()), [], 1))
 
 
 def test_what_is_not_a_number_is_not_allowed(tmp_path):
@@ -448,7 +450,7 @@ def test_what_is_not_a_number_is_not_allowed(tmp_path):
 
     study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match="the nearest fails at trips"):
-        find_best(Search(Lost(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(TuningSearch(Lost(study, Store(tmp_path / "s.sqlite"), SerialExecutor()), [], 1))
 
 
 @pytest.mark.parametrize("evaluations", [5, 20, 100])
@@ -491,7 +493,7 @@ def test_a_search_goes_the_same_way_again(tmp_path):
     assert one == again
 
 
-def _all(search: Search) -> dict[tuple[float, ...], Candidate]:
+def _all(search: TuningSearch) -> dict[tuple[float, ...], Candidate]:
     find_best(search)
     return search.candidates
 
@@ -542,7 +544,9 @@ def test_a_change_of_nothing_is_in_its_unit():
         return [{"travel": value, TRIP: 0.0, LIMITS: 0.1} for value in values]
 
     one, other = rows([0.0] * 6), rows([0.1] * 6)
-    change = compare((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).of("travel")
+    change = compare((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).change_of(
+        "travel"
+    )
     assert not change.relative
     assert change.median == pytest.approx(0.1)
 

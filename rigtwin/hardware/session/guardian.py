@@ -27,7 +27,7 @@ from rigtwin.hardware.session.guardian_settings import (
     split_memory,
 )
 from rigtwin.hardware.supervisor import Transition
-from rigtwin.interruptions import held_back
+from rigtwin.interruptions import block_sigint
 from rigtwin.system import monotonic
 
 STARTED = 30.0
@@ -51,7 +51,7 @@ class Guardian:
         arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
-            with held_back():
+            with block_sigint():
                 self._process.start()
             theirs.close()
             if not self._pipe.poll(STARTED):
