@@ -222,8 +222,8 @@ def text(study: Study, cases: list[Case]) -> str:
             said = f"trips on nominal / calibrated / before: {' / '.join(map(percent, trips))}"
             rows.append((name, case.defect, said, "", "", "", ""))
             continue
-        one = case.against_nominal.of(objective.name)
-        begun = case.against_before.of(objective.name)
+        one = case.against_nominal.change_of(objective.name)
+        begun = case.against_before.change_of(objective.name)
         better, worse = better + one.improved, worse + (one.low > 0.0)
         spreads, unit = (one.before, one.after), objective.unit
         medians = [f"{number_text(each.median)} {unit}" for each in spreads]
@@ -241,7 +241,7 @@ def document(study: Study, cases: list[Case]) -> list[dict[str, object]]:
     def describe(comparison: SettingsComparison) -> dict[str, object] | None:
         if not comparison.changes:
             return None
-        return asdict(replace(comparison.of(name), measure=None))  # type: ignore[arg-type]
+        return asdict(replace(comparison.change_of(name), measure=None))  # type: ignore[arg-type]
 
     return [
         {
