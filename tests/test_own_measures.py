@@ -52,7 +52,7 @@ COLUMNS = {
 def figure(formula: str, **more: object) -> float:
     emps = find("emps")
     measure = parse_measure("m", {"formula": formula, **more}, list_channels(emps))
-    return pickle.loads(pickle.dumps(measure)).of(Trial(emps.configuration, COLUMNS, 500))
+    return pickle.loads(pickle.dumps(measure)).compute(Trial(emps.configuration, COLUMNS, 500))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_every_statistic_of_nothing_is_none() -> None:
     channels = list_channels(find("emps"))
     for name in STATISTICS:
         measure = parse_measure("m", {"formula": "position", "of": name}, channels)
-        assert measure.of(Trial(find("emps").configuration, still)) == 0.0
+        assert measure.compute(Trial(find("emps").configuration, still)) == 0.0
 
 
 def test_a_machine_without_settings_has_nothing_to_tune() -> None:

@@ -102,7 +102,7 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     assert case.found == "more friction"
     assert case.against_nominal.runs == 6
     both = (case.against_nominal, case.against_before)
-    assert len({each.of("force_error").after for each in both}) == 1
+    assert len({each.change_of("force_error").after for each in both}) == 1
     assert "1 of 1" in text(study, found) or "0 of 1" in text(study, found)
 
 

@@ -107,7 +107,7 @@ def rig_run(
 
 
 def figure(name: str, test: Trial) -> float:
-    return MEASURES[name].of(test)
+    return MEASURES[name].compute(test)
 
 
 def test_measures_of_sines():
@@ -531,7 +531,7 @@ def test_a_comparison_is_paired_and_leaves_trips_out():
     found = compare(measures, "rig", ("before", before), ("tuned", after))
     assert found.runs == 3
     assert found.trips == (0.25, 0.0)
-    ride, margin = found.of("ride"), found.of("stability_margin")
+    ride, margin = found.change_of("ride"), found.change_of("stability_margin")
     assert ride.median == pytest.approx(-50.0)
     assert ride.better == 1.0
     assert margin.median == pytest.approx(0.5)

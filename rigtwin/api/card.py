@@ -20,7 +20,7 @@ from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
 from rigtwin.files import write_whole
 from rigtwin.hardware.daq.calibration import (
-    Still,
+    RestReading,
     correct_signs,
     set_spans,
     set_zeros,
@@ -52,7 +52,7 @@ class TableCheck:
     what was changed, a line each."""
 
     table: ChannelTable
-    rest: tuple[Still, ...]
+    rest: tuple[RestReading, ...]
     said: tuple[str, ...]
 
 
@@ -166,7 +166,7 @@ def check_card(
     ask: Callable[[str], int] | None = None,
     virtual: str | Path | None = None,
     stop: Callable[[], str | None] | None = None,
-    show: Callable[[tuple[Still, ...]], object] = lambda _: None,
+    show: Callable[[tuple[RestReading, ...]], object] = lambda _: None,
 ) -> TableCheck:
     """Finds zero, span and signs of a channel table on the rig as it stands.
 
@@ -237,7 +237,7 @@ def check_card(
         return ask(output)
 
     said: tuple[str, ...] = ()
-    still: tuple[Still, ...] = ()
+    still: tuple[RestReading, ...] = ()
     found = table
     if signs:
         if wiring is None and not arm():

@@ -33,7 +33,7 @@ from rigtwin.simulation.loop import BLOCK
 from rigtwin.system import kill_process, leave_terminal, monotonic, raise_priority, watch_process
 
 if TYPE_CHECKING:
-    from rigtwin.hardware.daq.failsafe import LastResort
+    from rigtwin.hardware.daq.failsafe import FailsafeOutputs
 
 WRITE = 0.1
 """s between two blocks of the recording."""
@@ -131,7 +131,7 @@ class _GuardianKeeper:
         self._pipe, self._settings, self._view = pipe, settings, view
         self._last: Transition | None = None
         self._reason: str | None = None
-        self._resort: LastResort | None = None
+        self._resort: FailsafeOutputs | None = None
         self._cause = Cause("process", "")
         self._time, self._said = 0.0, False
         self.done = threading.Event()
@@ -168,9 +168,9 @@ class _GuardianKeeper:
     def make_ready(self) -> None:
         """Everything that takes time, before there is anything to guard."""
         if self._settings.table is not None:
-            from rigtwin.hardware.daq.failsafe import LastResort
+            from rigtwin.hardware.daq.failsafe import FailsafeOutputs
 
-            self._resort = LastResort(self._settings.table)
+            self._resort = FailsafeOutputs(self._settings.table)
 
     def _prepare(self) -> None:
         if self._resort is not None:

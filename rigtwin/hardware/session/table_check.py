@@ -14,7 +14,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,
-    Still,
+    RestReading,
     fit_responses,
     measure_rest,
     plan_bumps,
@@ -53,7 +53,7 @@ def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     return card
 
 
-def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Still, ...]:
+def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[RestReading, ...]:
     """What every input reads while nothing moves.
 
     Raises

@@ -16,7 +16,7 @@ from rigtwin.description.machine import OWN, Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.machine_terminals import MachineTerminals
 from rigtwin.hardware.daq.signals import reach_of
-from rigtwin.hardware.daq.table import Alive, ChannelTable, require_ranges, require_reach
+from rigtwin.hardware.daq.table import ChannelTable, StuckLimit, require_ranges, require_reach
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.machine_operation import MachineOperation
 from rigtwin.hardware.rig_operation import RigOperation, Update
@@ -205,7 +205,7 @@ class MachineTest:
             demands=demanded,
             outputs=outputs,
             command=command,
-            stuck=alive.stuck if isinstance(alive, Alive) else 0.0,
+            stuck=alive.stuck if isinstance(alive, StuckLimit) else 0.0,
         )
 
     def terminals(self) -> MachineTerminals:
