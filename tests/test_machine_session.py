@@ -19,7 +19,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.signals import signals_of
 from rigtwin.hardware.daq.table import load_table, to_toml
 from rigtwin.hardware.daq.wired import WiredTwin
-from rigtwin.hardware.session.record import open_virtual_card, record_at_leisure
+from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.test import MachineTest
 from tests.test_commanding import lqr
 from tests.test_commanding import machine as upright
@@ -59,8 +59,8 @@ def test_a_session_is_the_run_but_for_noise_and_bits(tmp_path: Path) -> None:
 def test_on_the_virtual_card_it_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     test = pushes(tmp_path / "card.toml")
     card, device = open_virtual_card(test)
-    record_at_leisure(card, test, tmp_path / "card.mcap")
-    record_at_leisure(WiredTwin(test.terminals(), test.table), test, tmp_path / "twin.mcap")
+    record_unpaced(card, test, tmp_path / "card.mcap")
+    record_unpaced(WiredTwin(test.terminals(), test.table), test, tmp_path / "twin.mcap")
     ours, theirs = (rigtwin.load(tmp_path / f"{name}.mcap") for name in ("card", "twin"))
     for channel in CHANNELS:
         assert np.array_equal(ours[channel], theirs[channel])
@@ -71,7 +71,7 @@ def test_on_the_virtual_card_it_is_the_same_to_the_last_bit(tmp_path: Path) -> N
 def test_the_session_itself_is_recorded(tmp_path: Path) -> None:
     test = pushes(tmp_path / "card.toml")
     assert test.layout.session == SESSION
-    record_at_leisure(WiredTwin(test.terminals(), test.table), test, tmp_path / "s.mcap")
+    record_unpaced(WiredTwin(test.terminals(), test.table), test, tmp_path / "s.mcap")
     from mcap.reader import make_reader
 
     with (tmp_path / "s.mcap").open("rb") as file:
@@ -123,7 +123,7 @@ def test_what_ends_a_session_leaves_no_force_and_no_power(tmp_path: Path) -> Non
     ):
         card, device = open_virtual_card(each)
         asked = iter([None] * 300)
-        ended = record_at_leisure(
+        ended = record_unpaced(
             card,
             each,
             tmp_path / "s.mcap",
@@ -136,10 +136,10 @@ def test_what_ends_a_session_leaves_no_force_and_no_power(tmp_path: Path) -> Non
 
 
 def plan_own(test: MachineTest, make: Callable[[object], object]) -> MachineTest:
-    from rigtwin.hardware.session.own_controller import own_controller
+    from rigtwin.hardware.session.custom_controller import custom_controller
 
     nothing = {"aim": np.zeros(test.ticks)}
-    return replace(test, own=own_controller(make), demands=nothing)  # type: ignore[arg-type]
+    return replace(test, controller=custom_controller(make), demands=nothing)  # type: ignore[arg-type]
 
 
 def test_it_is_not_armed_outside_its_limits(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, sleep_until
 from rigtwin.hardware.session import permission
-from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger
+from rigtwin.hardware.session.dry_run import add_dry_run, digest, has_passed, ledger
 from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import record_in_real_time
 from rigtwin.hardware.session.test import Test
@@ -143,8 +143,8 @@ def test_another_setting_is_another_session(tmp_path):
     assert key(base) == key(session())
     path = tmp_path / "card.toml"
     assert not has_passed(path, keys[0])
-    enter(path, keys[0], {"experiment": "imposed"})
-    enter(path, keys[1], {"experiment": "imposed"})
+    add_dry_run(path, keys[0], {"experiment": "imposed"})
+    add_dry_run(path, keys[1], {"experiment": "imposed"})
     assert has_passed(path, keys[0])
     assert has_passed(path, keys[1])
     assert not has_passed(path, keys[2])

@@ -1,1 +1,1 @@
-"""Faults put into a session on the virtual card: is the rig stopped in time and rightly?"""
+"""Fault injection: sessions on the virtual card with a fault, to test that the rig stops in time."""
