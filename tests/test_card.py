@@ -388,7 +388,7 @@ def test_through_a_socket_it_is_the_same_card():
             for card in (far, near):
                 card.power(True)
                 card.write(Commands(0.0, -1e-5 * tick, 0.0, 0.01 * tick))
-        with pytest.raises(RigtwinError, match="taken"):
+        with pytest.raises(RigtwinError, match="in use"):
             serve(device, port)
         # The owner dies without a word: its tasks are left, and are freed by name.
         with pytest.raises(CardFault, match="rigtwin card release"):
@@ -478,5 +478,5 @@ def test_a_port_that_is_taken_at_one_address_is_taken():
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
-        with pytest.raises(RigtwinError, match="is taken"):
+        with pytest.raises(RigtwinError, match="is in use"):
             serve(device, other.getsockname()[1])

@@ -20,12 +20,12 @@ import pytest
 
 import rigtwin
 from rigtwin.looking import Look, Slider
-from rigtwin.looking.given import read_answer
 from rigtwin.looking.knob import knob_of
 from rigtwin.looking.local_server import HOST, open_server, stop_server
 from rigtwin.looking.page import Page
 from rigtwin.looking.scale import shorten
-from rigtwin.looking.shapes import Body
+from rigtwin.looking.shapes import PosedMachine
+from rigtwin.looking.starting_point import read_diagnosis
 from rigtwin.looking.traces import BUCKETS, mark, thin
 from tests.helpers.browser import BROWSER
 from tests.helpers.described import NOISY, described
@@ -265,7 +265,7 @@ def found(effect: str, look: Look, values: tuple[float, ...]) -> dict[str, objec
 def test_it_begins_with_what_was_diagnosed(look, tmp_path):
     path = tmp_path / "why.json"
     path.write_text(json.dumps(answer_of(look, EFFECT, (TRUE,))))
-    given = read_answer(path, look)
+    given = read_diagnosis(path, look)
     assert given.values == {EFFECT: (TRUE,)}
     assert given.beside == ("setting@controller",)
     with rigtwin.show_look(look, diagnosis=path) as page:
@@ -359,7 +359,7 @@ def test_a_time_is_marked_from_bottom_to_top():
 @pytest.mark.parametrize("name", rigtwin.machines())
 def test_every_machine_can_be_drawn_and_posed(name):
     machine = rigtwin.machine(name)
-    body = Body(machine)
+    body = PosedMachine(machine)
     shapes = body.shapes()
     assert any(shape.moves for shape in shapes)
     assert all(len(shape.faces) and shape.faces.max() < len(shape.vertices) for shape in shapes)

@@ -19,7 +19,7 @@ MISSED = 3.0
 """Maximum number of ticks missed in a row."""
 COURSE = Course(LOOKING, armed=0.0, ramp=0.0, settling=0.0, hold=0.0)
 """Course of a session. The controller takes over at once, because a machine with power but without
-a controller would fall. For the same reason power is removed with the controller, and brakes hold."""
+a controller would fall. For the same reason power ends with the controller, and brakes hold."""
 
 
 class MachineOperation:

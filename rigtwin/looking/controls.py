@@ -1,4 +1,4 @@
-"""Ticks and sliders of the candidate effects on a page."""
+"""Check boxes and sliders of the candidate effects on a page."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rigtwin.looking.knob import Knob, knob_of
 from rigtwin.looking.look import Look
 
 FEW = 8
-"""Sliders of a machine up to which all folders are open."""
+"""Number of sliders up to which all folders are open."""
 
 
 class Controls:
-    """Which effects are in the twin, and their values. Every tab shows the same."""
+    """Selection of the twin's effects, and their values. Every browser tab shows the same."""
 
     def __init__(
         self,
@@ -24,7 +24,19 @@ class Controls:
         first: Iterable[str],
         changed: Callable[[], object],
     ) -> None:
-        """first: effects that come before the others; changed: called when somebody moves one."""
+        """Build the controls.
+
+        Parameters
+        ----------
+        server
+            Server of the page.
+        look
+            Look at the recording.
+        first
+            Effects listed before all others.
+        changed
+            Function called when a user moves a control.
+        """
         self._look, self._changed = look, changed
         self._lock = threading.RLock()
         self._ticked: dict[str, None] = {}
@@ -37,6 +49,7 @@ class Controls:
         }
         self._ticks: dict[str, viser.GuiCheckboxHandle] = {}
         self._handles: dict[str, list[viser.GuiSliderHandle[float]]] = {}
+        # A slider has finitely many positions: values start on the nearest one.
         for name, knobs in self._knobs.items():
             self._values[name] = [
                 knob.value(knob.position(value))
@@ -45,12 +58,12 @@ class Controls:
         for title, names, opened in self._folders(tuple(first)):
             with server.gui.add_folder(title, expand_by_default=opened):
                 for name in names:
-                    # In its component's folder an effect's kind says all.
+                    # The folder is named after the component, so the effect's kind is enough.
                     full = title != look.effects[name].component
                     self._add(server, name, name if full else look.effects[name].kind.name)
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
-        """Titles, effects, and whether they are open."""
+        """Return each folder's title, effects, and whether it is open."""
         folders = [("found", list(first), True)] if first else []
         by_component: dict[str, list[str]] = {}
         for name, effect in self._look.effects.items():
@@ -83,12 +96,12 @@ class Controls:
 
     @property
     def values(self) -> dict[str, tuple[float, ...]]:
-        """Of the effects that are in the twin."""
+        """Values of the effects that are in the twin."""
         with self._lock:
             return {name: tuple(self._values[name]) for name in self._ticked}
 
     def set(self, values: Mapping[str, Iterable[float]]) -> None:
-        """Takes these effects into the twin, and all others out of it."""
+        """Put these effects into the twin, and take all others out."""
         with self._lock:
             for name in [name for name in self._ticked if name not in values]:
                 self._untick(name)
@@ -102,15 +115,17 @@ class Controls:
                     handle.label = knob.label(value)
 
     def lock(self, locked: bool) -> None:
-        """Lets nobody move anything, or everybody again."""
+        """Lock or unlock all controls."""
         for name, tick in self._ticks.items():
             tick.disabled = locked
             for handle in self._handles[name]:
                 handle.disabled = locked
 
     def _tick(self, name: str) -> None:
-        for other in self._look.clashing(name, [each for each in self._ticked if each != name]):
-            self._untick(other)
+        # Two effects that set the same parameter exclude each other.
+        active = [effect for effect in self._ticked if effect != name]
+        for rival in self._look.clashing(name, active):
+            self._untick(rival)
         self._ticked[name] = None
         self._ticks[name].value = True
 
@@ -120,7 +135,7 @@ class Controls:
 
     def _on_tick(self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
         if event.client_id is None:
-            return  # set here, not by somebody
+            return  # set by the program, not by a user
         with self._lock:
             (self._tick if event.target.value else self._untick)(name)
         self._changed()

@@ -28,7 +28,7 @@ class FaultKind:
     name : str
         Name of the kind.
     place : str
-        Place of the fault: sensor, actuator, controller, loop, card, recording, operator or process.
+        Place: sensor, actuator, controller, loop, card, recording, operator or process.
     meaning : str
         Description of what breaks.
     causes : tuple of str
