@@ -13,7 +13,7 @@ import pytest
 
 import rigtwin
 from rigtwin.cli import main
-from rigtwin.interruptions import block_sigint, deferred
+from rigtwin.interruptions import block_sigint, defer_sigint
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
@@ -82,7 +82,7 @@ def test_a_referee_that_still_records_says_nothing_of_an_interruption(tmp_path, 
 def test_an_interruption_comes_behind_what_it_would_spoil() -> None:
     done = []
 
-    @deferred()
+    @defer_sigint()
     def work() -> None:
         signal.raise_signal(signal.SIGINT)
         done.append("all of it")

@@ -267,7 +267,7 @@ def test_it_begins_with_what_was_diagnosed(look, tmp_path):
     path.write_text(json.dumps(answer_of(look, EFFECT, (TRUE,))))
     given = read_diagnosis(path, look)
     assert given.values == {EFFECT: (TRUE,)}
-    assert given.beside == ("setting@controller",)
+    assert given.without_slider == ("setting@controller",)
     with rigtwin.show_look(look, diagnosis=path) as page:
         assert page.values == given.values
 

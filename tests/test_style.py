@@ -41,8 +41,8 @@ def test_text_of_a_papers_figure_stays_text(recording, tmp_path):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (["--style", "papers"], "unknown style 'papers'; there are screen, paper, paper-wide"),
-        (["--panel", "tyre"], "no panel 'tyre'; there are 'ground, mm'"),
+        (["--style", "papers"], "unknown style 'papers'; expected screen, paper, paper-wide"),
+        (["--panel", "tyre"], "no panel 'tyre'; expected one of 'ground, mm'"),
     ],
 )
 def test_what_there_is_not_is_said(recording, tmp_path, capsys, given, said):

@@ -18,7 +18,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import Machine, Structure
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.hardware.daq.calibration import (
     RestReading,
     correct_signs,
@@ -257,7 +257,7 @@ def check_card(
 
 def write_table(table: ChannelTable, path: str | Path) -> None:
     """Writes a channel table. Raises RigtwinError if it cannot."""
-    write_whole(Path(path), to_toml(table))
+    atomic_write(Path(path), to_toml(table))
 
 
 def _require_values(values: Mapping[str, float], option: str, table: ChannelTable) -> None:

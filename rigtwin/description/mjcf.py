@@ -16,7 +16,7 @@ from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 
 ATTRIBUTES: dict[type, dict[str, str]] = {
     Guide: {"coulomb": "frictionloss", "viscous": "damping", "stiffness": "stiffness"},
@@ -173,7 +173,7 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
     for change in changes:
         if not _apply(document, machine, change):
             left.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
-    write_whole(path, document.text())
+    atomic_write(path, document.text())
     return tuple(left)
 
 

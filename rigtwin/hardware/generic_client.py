@@ -3,10 +3,10 @@
 
 A client connects by TCP. Its first message has 11 integers of 32 bits: the numbers of
 displacements, velocities, accelerations, forces and times it sends, the same numbers it wants back,
-and the length of a message. Messages of that many doubles follow, in the computer's byte order. The first number
-is the request: 3 a trial response (displacements from the second number on), 10 the force, which is
-answered, 99 the end. Requests 12 to 15 ask for a stiffness, damping or mass, which the rig does not
-have (OpenSees, SRC/element/genericClient; OpenFresco, simApplicationClient).
+and the length of a message. Messages of that many doubles follow, in the computer's byte order. The
+first number is the request: 3 a trial response (displacements from the second number on), 10 the
+force, which is answered, 99 the end. Requests 12 to 15 ask for a stiffness, damping or mass, which
+the rig does not have (OpenSees, SRC/element/genericClient; OpenFresco, simApplicationClient).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, recordable, written_whole
+from rigtwin.files import atomic_path, forbid_overwriting, recordable
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.mapping import Column, Map, Source, load
@@ -58,7 +58,7 @@ def convert(data: Sequence[Path], map_path: Path, out: Path) -> list[str]:
     RigtwinError
         Before anything is written.
     """
-    recordable(keep_apart(out, *data, map_path))
+    recordable(forbid_overwriting(out, *data, map_path))
     wanted = load(map_path)
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one, they are told by it")
@@ -242,7 +242,7 @@ def _write(out: Path, wanted: Map, period: float, channels: Channels) -> None:
     ticks = len(next(iter(channels.values())))
     names = {topic: tuple(each) for topic, each in fields.items()}
     with (
-        written_whole(out) as beside,
+        atomic_path(out) as beside,
         Writer(
             beside, wanted.experiment, period, wanted.controller, wanted.machine, names
         ) as writer,

@@ -81,8 +81,9 @@ def open_server(port: int, label: str) -> LocalServer:
 def _for_its_own_pages() -> Iterator[None]:
     """Make a server that is started inside this context answer only its own pages.
 
-    Otherwise another page in the same browser could read the recording and press buttons (cross-site
-    WebSocket hijacking). viser has no option for this, so its WebSocket server is replaced.
+    Otherwise another page in the same browser could read the recording and press buttons, by
+    cross-site WebSocket hijacking. viser has no option for this, so its WebSocket server is
+    replaced.
     """
     plain = sockets.serve
 

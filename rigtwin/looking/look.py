@@ -17,7 +17,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, write_whole
+from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.looking.motions import find_positions, predicts_motion
 from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
@@ -253,8 +253,8 @@ class Look:
         """
         tables = calibrated.format_changes(self.machine.plant, self.plant(values))
         head = [f"# from {self.recording.path}, effects as set by hand or fitted"]
-        out = keep_apart(path, self.recording.path, *self.machine.files)
-        write_whole(out, "\n".join([*head, *tables]) + "\n")
+        out = forbid_overwriting(path, self.recording.path, *self.machine.files)
+        atomic_write(out, "\n".join([*head, *tables]) + "\n")
         return Path(path)
 
 

@@ -1,6 +1,6 @@
-"""The channels of a recording: topic, field, unit, meaning.
+"""Channels of a recording: topic, field, unit and meaning.
 
-Defined once; the file format and every table follow them.
+They are defined here once; the file format and all tables follow them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from controllers import Commands, Measurements
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of a recording."""
+    """Column of a recording."""
 
     topic: str
     name: str
@@ -52,27 +52,27 @@ SESSION = (
     Channel("/session", "late", "s", "by which the tick began after it was due"),
     Channel("/session", "missed", "tick", "that passed unread before this one"),
 )
-"""Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis
-reads it."""
+"""Channels of a supervised session: every tick from arming to rest, including the test's. No
+diagnosis reads them."""
 
 
 def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
-    """The channels that a recording holds, those of the table first, with unit and meaning.
+    """Return the channels of a recording with unit and meaning.
 
-    Then whatever else there is. Where none of the rig's sensors is, names of its table that
-    another machine has too mean something else there.
+    Channels of the table come first. Units and meanings are given only if a sensor of the
+    suspension rig is present, because another machine may use the same names for other signals.
     """
-    there = [(topic, name) for topic, names in columns.items() for name in names]
-    rig = any(topic == "/sensor" and name in Measurements._fields for topic, name in there)
-    known = [c for c in CHANNELS if rig and (c.topic, c.name) in there]
+    present = [(topic, name) for topic, names in columns.items() for name in names]
+    rig = any(topic == "/sensor" and name in Measurements._fields for topic, name in present)
+    known = [c for c in CHANNELS if rig and (c.topic, c.name) in present]
     named = {(channel.topic, channel.name) for channel in known}
     return known + [
-        Channel(topic, name, "", "") for topic, name in there if (topic, name) not in named
+        Channel(topic, name, "", "") for topic, name in present if (topic, name) not in named
     ]
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:
-    """Field names of a topic, in order."""
+    """Return the field names of a topic in order."""
     return tuple(channel.name for channel in (*CHANNELS, *SESSION) if channel.topic == topic)
 
 

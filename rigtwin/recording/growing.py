@@ -1,4 +1,4 @@
-"""A recording that somebody else is still writing."""
+"""Reader of a recording that another program is still writing."""
 
 from __future__ import annotations
 
@@ -13,42 +13,46 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.reader import Gathered, Recording
+from rigtwin.recording.reader import FileContent, Recording
 from rigtwin.recording.records import DAMAGE, Lost, take_apart
 
 _PREFIX = struct.Struct("<BQ")
 """Opcode and length of a record."""
 READ = 2**18
-"""Bytes that are read of a file at a time."""
+"""Number of bytes read from a file at a time."""
 
 
 class GrowingRecording:
-    """The last seconds of a file that grows, or of one that is whole already.
+    """The last seconds of a file that grows, or of a complete one.
 
-    ended: whether the file says that its test is over.
+    Attributes
+    ----------
+    path
+        Path of the file.
+    ended
+        Whether the file says that its test is over.
     """
 
     def __init__(self, path: Path, window: float) -> None:
-        """window: s, what is kept of it."""
+        """Prepare to read a file, keeping a window of its last seconds."""
         self.path = path
         self._window = window
-        self._gathered = Gathered()
+        self._content = FileContent()
         self._read, self._rest, self._begun = 0, b"", False
         self.ended = False
 
     @property
     def latest(self) -> float:
-        """Time of the last tick read, s."""
-        return self._gathered.latest
+        """Time of the last tick read, in s."""
+        return self._content.latest
 
     def read(self, until: float = float("inf")) -> bool:
-        """Takes what was added to the file since the last call.
+        """Read what was added to the file since the last call.
 
         Parameters
         ----------
         until
-            s; a test that goes on longer is taken up to there or a little later, the rest by the
-            next calls.
+            Time in s at which reading pauses, at once or a little later. The next calls continue.
 
         Returns
         -------
@@ -76,16 +80,16 @@ class GrowingRecording:
                     self._rest += added
         except OSError as error:
             raise RigtwinError(f"cannot read {self.path}: {error.strerror}") from None
-        self._gathered.forget(self.latest - self._window)
-        self.ended = self._gathered.ended
+        self._content.forget(self.latest - self._window)
+        self.ended = self._content.ended
         return self.latest > before
 
     def recording(self) -> Recording:
-        """What was kept of it. Raises RigtwinError if it is no recording or has no ticks yet."""
-        return self._gathered.build(self.path)
+        """Return the window. Raise RigtwinError if there is no recording or no tick yet."""
+        return self._content.build(self.path)
 
     def _take_one(self) -> bool:
-        """Takes the next record, if all of it was read."""
+        """Process the next record if it is complete. Return whether it was."""
         if not self._begun:
             if not self._rest.startswith(MCAP0_MAGIC[: len(self._rest)]):
                 raise RigtwinError(f"{self.path} is not an MCAP file")
@@ -93,6 +97,7 @@ class GrowingRecording:
                 return False
             self._begun, self._rest = True, self._rest[len(MCAP0_MAGIC) :]
         if len(self._rest) < _PREFIX.size or self._rest.startswith(MCAP0_MAGIC):
+            # The magic bytes come again at the end of a complete file; nothing follows them.
             return False
         end = _PREFIX.size + _PREFIX.unpack_from(self._rest)[1]
         if end > len(self._rest):
@@ -102,6 +107,7 @@ class GrowingRecording:
         return True
 
     def _add(self, record: bytes) -> None:
+        """Add a record of the file, with the messages in it."""
         if record[0] in (Opcode.FOOTER, Opcode.DATA_END, Opcode.MESSAGE_INDEX):
             return
         reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
@@ -109,8 +115,8 @@ class GrowingRecording:
             whole = next(reader.records)
             parts = take_apart(whole) if isinstance(whole, Chunk) else [whole]
             for part in parts:
-                self._gathered.add(part)
+                self._content.add(part)
         except InvalidMagic:
             raise RigtwinError(f"{self.path} is not an MCAP file") from None
         except DAMAGE:
-            self._gathered.add(Lost())
+            self._content.add(Lost())

@@ -1,1 +1,1 @@
-"""Fault injection: sessions on the virtual card with a fault, to test that the rig stops in time."""
+"""Fault injection: sessions with a fault on the virtual card, which must stop the rig in time."""

@@ -155,7 +155,7 @@ class FaultyBench:
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 
     def peak_share(self, limits: Safety, since: int) -> float:
-        """Return the largest true position, travel or force from a tick on, relative to its limit."""
+        """Return the largest true position, travel or force relative to its limit, from a tick on."""
         last = min(self.tick, len(self.truth))
         bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])
         return float(np.max(np.abs(self.truth[since:last]) / bounds)) if last > since else 0.0

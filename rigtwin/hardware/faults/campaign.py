@@ -102,7 +102,7 @@ class FaultResult:
 
     @property
     def ok(self) -> bool:
-        """Whether the rig was stopped within 5 ticks and 1.1 times every limit, for the true cause."""
+        """Whether the rig stopped within 5 ticks and 1.1 times every limit, for the true cause."""
         in_time = self.late is None or self.late <= 5
         return in_time and self.exceeded <= 1.1 and self.right and self.readable
 

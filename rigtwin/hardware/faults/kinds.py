@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SIGNALS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
-# A broken sensor first shows as a contradiction to another one; which of them depends on the motion.
+# A broken sensor first shows as a contradiction to another; which one depends on the motion.
 _IMPLAUSIBLE = (
     "jump",
     "wheel",

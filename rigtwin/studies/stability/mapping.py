@@ -14,7 +14,7 @@ from matplotlib.colors import SymLogNorm
 from matplotlib.figure import Figure
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.numerics.arrays import Array
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
@@ -211,7 +211,7 @@ def draw(stability: StabilityMap, out: Path) -> None:
     axes.legend(loc="upper right", fontsize=9)
     image = BytesIO()
     figure.savefig(image, dpi=120, format=out.suffix[1:].lower())
-    write_whole(out, image.getvalue())
+    atomic_write(out, image.getvalue())
 
 
 def _draw_limit(axes: Axes, stability: StabilityMap) -> None:
