@@ -81,6 +81,7 @@ def late(figures: Mapping[str, str]) -> str:
 
 def finite(document: object) -> object:
     """Return a document with null in place of numbers that are not finite, which JSON lacks."""
+    # Recursion covers documents of nested tables and lists.
     if isinstance(document, float):
         return document if math.isfinite(document) else None
     if isinstance(document, dict):

@@ -66,6 +66,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     try:
         yield beside
         if target.exists():
+            # The new file keeps the old one's permissions.
             shutil.copymode(target, beside)
         beside.replace(target)
     except BaseException as error:
@@ -129,6 +130,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     TOML's integers have 64 bits. Python parses longer ones, but cannot print thousands of digits.
     """
     document = tomllib.loads(text)
+    # A loop instead of recursion: nesting may be deeper than Python's stack.
     waiting: list[object] = [document]
     while waiting:
         value = waiting.pop()

@@ -107,8 +107,10 @@ class GenericClientServer:
             if asked == TRIAL:
                 if not np.isfinite(message[1]):
                     raise RigtwinError("a client gave a displacement that is not a number")
+                # The model is closed once the rig's loop has ended.
                 if not self._model.give(self._start + float(message[1])):
                     return
+                # The rig may start only after a target exists.
                 self._begun.set()
             elif asked == FORCE:
                 force = self._model.take_force()

@@ -104,6 +104,7 @@ class MachineOperation:
             value = measured[place]
             if not math.isfinite(value):
                 return Cause("not_a_number", f"trip: {signal.name} is not a finite number")
+            # Equal readings are normal for a quantised sensor at rest, so the check is optional.
             if self._stuck:
                 repeated = value == self._before[place]
                 self._repeats[place] = self._repeats[place] + 1 if repeated else 1

@@ -64,6 +64,7 @@ class Pacer:
         now = monotonic()
         if self._next == 0.0:
             self._next = now
+        # Deadlines that have passed are skipped, so that ticks stay on the original grid.
         behind = int((now - self._next) / self.period) if now > self._next else 0
         self._next += behind * self.period
         if behind == 0:
@@ -100,6 +101,7 @@ class Lateness:
                 figures |= {
                     f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()
                 }
+        # A histogram keeps rare delays that a mean or a percentile would hide.
         counts, _ = np.histogram(self._late[: self._count], bins=[-np.inf, *EDGES, np.inf])
         figures["histogram"] = json.dumps({"edges": EDGES, "counts": counts.tolist()})
         return figures
@@ -136,6 +138,7 @@ def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
     gc.freeze()
     # Other Python threads must give the interpreter back within 0.1 ms instead of 5 ms.
     sys.setswitchinterval(1e-4)
+    # Priority is the last request: everything before it may take its time.
     before = raise_priority(PRIORITY) if fifo else Grant(SCHEDULING, "not asked for")
     grants.append(before)
     try:

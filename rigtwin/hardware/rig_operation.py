@@ -122,6 +122,7 @@ def _start_of(configuration: Configuration, demands: Array) -> Commands:
     """Return the commands at the start of a test: the controller's, unless motion is imposed."""
     settings = configuration.controller
     ground, structure, force = demands[0].tolist()
+    # In a model-in-the-loop test only the ground is imposed; the rest starts from the settings.
     if settings.mode != Mode.IMPOSED:
         structure, force = settings.start, settings.preload
     return Commands(ground, structure, force, force / MOTOR_CONSTANT)

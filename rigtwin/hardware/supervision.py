@@ -141,6 +141,7 @@ class _Session:
         before = (course.looking, course.armed, course.ramp, course.settling)
         # Time zero is the start of the test, so that ticks before it have negative times.
         self._clock = -round(sum(before) / self._period)
+        # The last commands, which the stop state holds, and whether there is power.
         self._held, self._power = operation.rest, False
         self._unread = self._signals.sample(*[math.nan] * len(self._signals.inputs))
         self._ticks_noted = self._done_before = 0
@@ -208,6 +209,7 @@ class _Session:
         refused = self._operation.look(measured)
         if refused is not None:
             raise RigtwinError(f"not armed: {refused}")
+        # Commands equal to the present position: arming must not move anything.
         rest = self._held = self._operation.rest
         for _ in range(max(round(self._course.looking / self._period), 1)):
             self._rig.write(rest)
@@ -241,6 +243,7 @@ class _Session:
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
+        # Settling ends when the clock reaches the start, whatever ticks were missed in the ramp.
         while self._clock < 0:
             cause = self._tick(lambda _: self._operation.target)
             if cause is not None:
@@ -283,6 +286,7 @@ class _Session:
             measured = self._rig.read()
         except Exception as error:
             return self._halt(_cause_of(error))
+        # The work is timed from the sample on; waiting for it is no work.
         begun = monotonic()
         # A missed tick counts as passed: the demands belong to times, not to readings.
         self._clock += self._rig.missed
@@ -366,6 +370,7 @@ class _Session:
         if cause == COMPLETED:
             later = self._ramp_out(rest)
             cause = later or cause
+        # Positions are held under power for a while, unless a cylinder may be at fault.
         holds = self._operation.holds_after(cause)
         for _ in range(round(self._course.hold / self._period) if holds else 0):
             if not self._power or not self._hold():
@@ -402,6 +407,7 @@ class _Session:
 
     def _beat(self) -> None:
         """Tell the recorder that the loop is alive, and which outputs are safe now."""
+        # The guardian would write these values if the loop died in this tick.
         safe = self._operation.stop_state(self._held)
         self._recorder.beat(self._signals.to_write(safe))
 
@@ -419,6 +425,7 @@ class _Session:
         self._done += not math.isnan(tick)
         self._clock += 1
         self._ticks_noted += 1
+        # Progress is reported once a block, because a call per tick would cost time.
         if self._ticks_noted % BLOCK == 0:
             self._progress(self._done - self._done_before)
             self._done_before = self._done
@@ -426,6 +433,7 @@ class _Session:
 
 def _cosine_shares(duration: float, period: float) -> Iterator[float]:
     """Yield shares from 0 to 1, by a cosine without a jump in velocity."""
+    # A raised cosine starts and ends at rest.
     ticks = max(1, round(duration / period))
     for tick in range(1, ticks + 1):
         yield 0.5 - 0.5 * math.cos(math.pi * tick / ticks)

@@ -99,5 +99,7 @@ class Supervisor:
             )
         transition = Transition(time, self.phase, phase, cause)
         self.phase = phase
+        # The state changes before anybody is informed, so that a failing observer cannot hold it
+        # back.
         self.transitions.append(transition)
         self._on_transition(transition)

@@ -38,6 +38,7 @@ class Controls:
             Function called when a user moves a control.
         """
         self._look, self._changed = look, changed
+        # viser calls handlers on threads of its own; `set` runs on the predicting thread.
         self._lock = threading.RLock()
         self._ticked: dict[str, None] = {}
         self._values = {
@@ -103,6 +104,7 @@ class Controls:
     def set(self, values: Mapping[str, Iterable[float]]) -> None:
         """Put these effects into the twin, and take all others out."""
         with self._lock:
+            # A copy of the names: unticking changes the dictionary.
             for name in [name for name in self._ticked if name not in values]:
                 self._untick(name)
             for name, numbers in values.items():
@@ -152,6 +154,7 @@ class Controls:
         with self._lock:
             value = knob.value(event.target.value)
             self._values[name][number] = value
+            # On a logarithmic scale only the label shows the value itself.
             event.target.label = knob.label(value)
             self._tick(name)
         self._changed()

@@ -55,6 +55,7 @@ class Knob:
 
     def position(self, value: float) -> float:
         """Return the position of a value; values out of range are at an end."""
+        # A value without a nominal, such as an absent limit, is shown at the lower end.
         if math.isnan(value):
             return self.low
         inside = min(max(value, self.slider.low), self.slider.high)
@@ -73,6 +74,7 @@ def knob_of(slider: Slider) -> Knob:
     A wide positive range has a logarithmic scale. Long numbers are shown in thousandths, or other
     powers of the unit.
     """
+    # A logarithm needs positive values, and pays only over a wide range.
     if slider.low > 0.0 and slider.high > WIDE * slider.low:
         low, high = math.log10(slider.low), math.log10(slider.high)
         unit = "" if slider.unit == "1" else slider.unit

@@ -82,6 +82,7 @@ class LivePage:
         self._report, self._last_message = report, ""
         self.watch: Watch | None = None
         self._page: Page | None = None
+        # Guards `_closed`, and wakes whoever waits for the page.
         self._wake = threading.Condition()
         self._closed = False
         self._over = threading.Event()
@@ -180,10 +181,12 @@ class LivePage:
             return
         if self._scene is None:
             self._build(watch, gap.time)
+        # The model may use every other tick only; its grid is the gap's.
         period = float(gap.time[1] - gap.time[0])
         measured = find_positions(watch.machine, recording, period)
         predicted = find_positions(watch.machine, recording, period, gap.predicted)
         self._positions = gap.time, measured, predicted
+        # At the first alarm the plot shows its signal; afterwards the user's choice stays.
         if watch.alarm is not None and not self._alarmed:
             self._alarmed, self._sensor.value = True, watch.alarm.signal
         self.watch = watch
@@ -250,6 +253,8 @@ class LivePage:
             # New data may come late or all at once: then the picture jumps.
             if not end - LATE <= self._now <= end:
                 self._now = min(max(self._now, end - BEHIND), end)
+            # The positions come in one tuple, which the watching thread replaces as a whole: no
+            # lock is needed.
             tick = min(int(np.searchsorted(times, self._now)), len(times) - 1)
             scene.draw(
                 {joint: float(values[tick]) for joint, values in measured.items()},

@@ -65,6 +65,7 @@ def open_server(port: int, label: str) -> LocalServer:
                 f"no page on port {port}: {error.strerror}; 0 takes a free one"
             ) from None
         free = int(probe.getsockname()[1])
+    # viser prints a banner and its address, which belong to no command's output.
     with redirect_stdout(io.StringIO()), _for_its_own_pages():
         server = LocalServer(host=HOST, port=free, label=label, verbose=False)
     if server.get_port() != free:
@@ -102,6 +103,7 @@ def _for_its_own_pages() -> Iterator[None]:
 
         return plain(handler, host, port, process_request=answer, **options)
 
+    # viser looks the function up in its module when it starts.
     sockets.serve = serve
     try:
         yield

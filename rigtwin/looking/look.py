@@ -64,6 +64,7 @@ class Look:
             If the data make a comparison meaningless; the message names every fault.
         """
         configuration = machine.configuration_of(recording, base)
+        # Faults of the data are reported before the model is built, which takes seconds.
         require_fit(machine, recording, configuration)
         self.machine, self.recording = machine, recording
         self._evidence = Evidence(machine, [recording], [configuration])

@@ -37,6 +37,7 @@ def find_positions(
     dict of Array
         Joint → position, in m or rad, shape (ticks,). Joints without a signal are left out.
     """
+    # The model's period is a multiple of the recording's.
     every = round(period / recording.period)
     columns = {
         topic: {name: values[::every] for name, values in names.items()}

@@ -55,6 +55,7 @@ class Page:
         self._job: Callable[[], None] | None = None
         self._moved = True
         self._prediction = look.nominal
+        # Everything is drawn once at the beginning.
         self._stale = {"text", "plots", "scene"}
         self._measured = look.positions()
         self._predicted = self._measured
@@ -90,6 +91,7 @@ class Page:
         self._controls = Controls(self._server, look, values, self._on_moved)
         self._controls.set(values)
         self._timeline = Timeline(self._server, look, self._refresh)
+        # A new tab may have been opened while nothing changed.
         self._server.on_client_connect(lambda _: self._refresh())
 
     @property
@@ -166,6 +168,7 @@ class Page:
                 self._wake.wait_for(lambda: self._moved or self._job or self._closed)
                 if self._closed:
                     return
+                # The flag is cleared before the prediction: a move during it requests the next one.
                 job, self._moved = self._job, False
             # Outside the lock, so that users can go on dragging during a prediction.
             try:
@@ -199,6 +202,7 @@ class Page:
                 seconds = time.monotonic() - begun
                 self._status.content = note(f"fitting {' and '.join(names)}: {seconds:.0f} s")
 
+        # A fit starts from the present values, which must not change meanwhile.
         buttons = (self._fit_button, self._reset_button, self._save_button)
         self._controls.lock(True)
         for button in buttons:
@@ -246,12 +250,14 @@ class Page:
                     self._wake.wait_for(lambda: self._stale or self._closed or self._timeline.plays)
                 if self._closed:
                     return
+                # Taken over at once, so that requests during drawing are kept for the next round.
                 stale, self._stale = self._stale, set()
                 prediction, predicted = self._prediction, self._predicted
             present = time.monotonic()
             if self._timeline.plays:
                 self._timeline.advance(0.0 if last is None else present - last)
                 frame, last = frame + 1, present
+                # Plots cost more than the scene, and their mark may move in larger steps.
                 stale |= {"scene"} if frame % PLOTTED else {"scene", "plots"}
             else:
                 last = None

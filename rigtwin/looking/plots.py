@@ -74,6 +74,7 @@ class Plots:
         self._finer, shown_residual = shorten(largest_residual, unit)
         titles = _title(sensor, shown), _title("residual: measured less predicted", shown_residual)
         for plot, title in zip((self._traces, self._residual), titles, strict=True):
+            # Every assignment is sent to the browsers, so only changes are made.
             if plot.title != title:
                 plot.title = title
 

@@ -58,6 +58,7 @@ def judge(sensors: Sequence[str], lines: Lines, signals: Array) -> Prediction:
         counts = lines.fade[row] > COUNTS
         measured = lines.measured[row][counts]
         residual = measured - signals[row][counts]
+        # A signal that hardly moves is compared with its noise, not with its tiny swing.
         swing = max(float(np.std(measured)) if len(measured) else 0.0, float(lines.noise[row]))
         rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
         percent[sensor] = 100.0 * rms / swing

@@ -71,6 +71,7 @@ class PosedMachine:
 
     def __init__(self, machine: Machine) -> None:
         """Compile the machine's MJCF. Raise RigtwinError if it cannot be compiled."""
+        # The suspension rig is shown in a scene with plates, lights and cameras.
         path = SCENE if machine.structure is Structure.QUARTER_CAR else machine.model
         try:
             self._model = mujoco.MjModel.from_xml_path(str(path))
@@ -89,6 +90,7 @@ class PosedMachine:
             material = int(model.geom_matid[number])
             # As in MuJoCo, a material overrides the geom's own colour.
             rgba = model.geom_rgba[number] if material < 0 else model.mat_rgba[material]
+            # Invisible geoms serve contacts only.
             if rgba[3] <= 0.0:
                 continue
             kind = model.geom_type[number]
@@ -165,6 +167,7 @@ class PosedMachine:
             place = self._data.cam_xpos[0].copy()
             # A MuJoCo camera looks along its negative z axis.
             forward = -self._data.cam_xmat[0].reshape(3, 3)[:, 2]
+            # The camera turns about the point nearest to the machine's centre on its line of sight.
             ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
             return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
         aside = statistic.extent * np.array([0.7, -1.4, 0.7])
@@ -199,6 +202,7 @@ def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
         sides = [2.0 * float(side) if side > 0.0 else PLANE * extent for side in size[:2]]
         return make.box(extents=[*sides, THIN * extent])
     if kind == geom.mjGEOM_MESH:
+        # A model's meshes share one array each for vertices and faces.
         mesh = int(model.geom_dataid[number])
         start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])

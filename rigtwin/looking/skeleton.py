@@ -36,6 +36,7 @@ def draw_bones(model: mujoco.MjModel, body: int) -> trimesh.Trimesh:
         for child in range(1, model.nbody)
         if model.body_parentid[child] == body
     ]
+    # A rod too short would vanish inside the ball.
     for end in (*carried, model.body_ipos[body]):
         if float(np.linalg.norm(end)) > SHORTEST * size:
             drawn += trimesh.creation.cylinder(radius=THICK * size, segment=[np.zeros(3), end])

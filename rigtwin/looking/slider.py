@@ -81,6 +81,7 @@ def sliders_of(
                 effect=effect.name,
                 parameter=parameter,
                 unit=units[number],
+                # The bounds of the search are the last word: beyond them a value has no meaning.
                 low=max(low, least),
                 high=min(high, most),
                 nominal=nominal,

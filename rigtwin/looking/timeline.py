@@ -39,6 +39,7 @@ class Timeline:
 
     def _build(self) -> None:
         look, gui = self._look, self._server.gui
+        # The look begins with the sensor whose gap is largest.
         worst = max(look.nominal.percent, key=lambda name: look.nominal.percent[name])
         start, end = float(look.time[0]), float(look.time[-1])
         self._scrubber = gui.add_slider(
@@ -109,6 +110,7 @@ class Timeline:
         part = _window(look.time, self.now, STRETCHES[self._stretch.value])
         predicted = [nominal[part], prediction.signals[row][part]]
         self._plots.draw(look.time[part], measured[part], predicted, self.now)
+        # The slider follows the playback; while it is dragged, the user sets it.
         if self.plays:
             self._scrubber.value = self.now
 

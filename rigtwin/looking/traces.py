@@ -30,6 +30,7 @@ def thin(time: Array, traces: Sequence[Array]) -> tuple[Array, list[Array]]:
     """
     if len(time) <= 2 * BUCKETS:
         return time, list(traces)
+    # Equal stretches by ticks; both extremes of each are drawn, in no particular order within it.
     edges = np.linspace(0, len(time), BUCKETS + 1).astype(int)
     starts, middles = edges[:-1], (edges[:-1] + edges[1:]) // 2
     times = np.column_stack([time[starts], time[middles]]).ravel()

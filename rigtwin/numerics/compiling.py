@@ -86,6 +86,7 @@ def kernel(function: Function) -> Function:
     compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
     if _CACHE is None:
         return cast(Function, compiled)
+    # numba reads the folder when the cache object is made, so it is set only for that moment.
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     numba.config.CACHE_DIR = str(_CACHE)  # type: ignore[attr-defined]
     try:

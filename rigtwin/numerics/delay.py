@@ -19,6 +19,7 @@ def delay_sample(history: Array, memory: Array, delay: float, sample: float) -> 
 
     `memory[0]` is the index of the next sample in the ring.
     """
+    # The ring is three samples longer than the delay: the present one, and both neighbours.
     length = len(history)
     place = int(memory[0])
     history[place] = sample

@@ -97,6 +97,7 @@ def _json_at_once(data: list[bytes]) -> list[Mapping[str, Any]] | None:
     if not all(item.count(b"{") == 1 == item.count(b"}") for item in data):
         return None
     try:
+        # One call of the JSON parser for all messages instead of one call each.
         rows = json.loads(b"[" + b",".join(data) + b"]")
     except (ValueError, RecursionError):
         return None
@@ -120,6 +121,7 @@ def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
 def _column(path: Path, channel: str, values: list[Any]) -> Array:
     """Return the values as an array. Raise RigtwinError for the first that is no number."""
     for number, value in enumerate(values):
+        # An exact test, because a JSON boolean is an int in Python.
         if type(value) is not float and type(value) is not int:
             shown = "missing" if value is None else f"{value!r:.40}"
             raise RigtwinError(
@@ -140,6 +142,7 @@ def _protobuf(
     """
     try:
         files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+        # A pool of its own: two files may define the same type differently.
         pool = descriptor_pool.DescriptorPool()
         for file in files.file:
             pool.Add(file)

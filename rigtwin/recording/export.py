@@ -46,6 +46,7 @@ def _csv(recording: Recording) -> bytes:
     )
     written = StringIO()
     csv.writer(written, lineterminator="\n").writerows([names, units])
+    # 15 digits are the most that every decimal text survives as a double.
     np.savetxt(written, table, fmt="%.15g", delimiter=",")
     return written.getvalue().encode()
 

@@ -67,6 +67,7 @@ class GrowingRecording:
         before = self.latest
         try:
             with self.path.open("rb") as file:
+                # A file that shrinks was replaced: what was read so far belongs to another test.
                 if file.seek(0, io.SEEK_END) < self._read:
                     raise RigtwinError(f"{self.path} was replaced while it was read")
                 file.seek(self._read)
@@ -118,5 +119,6 @@ class GrowingRecording:
                 self._content.add(part)
         except InvalidMagic:
             raise RigtwinError(f"{self.path} is not an MCAP file") from None
+        # Damage in a growing file is noted like in a complete one, and reading goes on.
         except DAMAGE:
             self._content.add(Lost())

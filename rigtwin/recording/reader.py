@@ -251,6 +251,7 @@ class FileContent:
             read.
         """
         metadata, lost, doubtful = self._metadata, self._lost, self._doubtful
+        # A file without a single readable record is no damaged recording.
         if lost and not metadata and not self._channels:
             raise RigtwinError(f"{path} is not an MCAP file")
         about = metadata.get(RECORD)
@@ -271,6 +272,7 @@ class FileContent:
             )
             raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
         time, columns = _align(tables, notes)
+        # Damage comes first among the notes.
         notes[:0] = _describe_damage(lost, doubtful, time)
         if not len(time):
             raise RigtwinError(
@@ -311,6 +313,8 @@ class FileContent:
                     "expected ns since the start"
                 )
             values = decode_columns(path, channel, self._schemas.get(channel.schema_id), data)
+            # Times stay in whole nanoseconds until topics are aligned: doubles would not compare
+            # equal.
             stamps = np.array(times, np.int64)
             _check_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
@@ -422,6 +426,7 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
 def _check_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
     """Note messages that are out of order. Raise RigtwinError if most of them are."""
     falls = int(np.sum(np.diff(stamps) < 0))
+    # A few messages out of order are normal for several writers; a reversed clock is not.
     if 2 * falls > len(stamps) - 1:
         raise RigtwinError(
             f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
@@ -457,6 +462,7 @@ def _align(
 
 def _check_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
     """Note gaps in time. Raise RigtwinError if the period differs from the recorded one."""
+    # The median ignores gaps, which are noted below.
     spacing = float(np.median(np.diff(time))) if len(time) > 1 else period
     if abs(spacing - period) > 0.1 * period:
         raise RigtwinError(

@@ -97,6 +97,7 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
     InvalidMagic, struct.error
         If the file does not begin as an MCAP file.
     """
+    # A corrupt length must not make the reader allocate more than the file holds.
     size = os.fstat(file.fileno()).st_size
     reader = _Reader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
     known, resumed, begun = 0, -1, False
@@ -117,6 +118,7 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
             return
         # Reading continues at the next chunk, since chunks are self-contained.
         except DAMAGE as error:
+            # The first record fails: this is no MCAP file, rather than a damaged one.
             if not begun and isinstance(error, InvalidMagic | struct.error):
                 raise
             yield Lost()
@@ -196,6 +198,7 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
     count = (len(data) - first) // stride
     if count < FEW:
         return []
+    # One row per repetition, seen as bytes without a copy.
     table = np.frombuffer(data, np.uint8, count * stride, first).reshape(count, stride)
     places: list[tuple[int, int, int]] = []
     regular = np.ones(count, dtype=bool)
@@ -229,6 +232,7 @@ def _find_chunk(file: BinaryIO, start: int) -> int | None:
     """Return the offset of the next compressed chunk; None if there is none."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         at = data.find(_COMPRESSION, start + _PLACE)
+        # The text may also occur in data; a chunk has its opcode at the right distance.
         while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
             at = data.find(_COMPRESSION, at + 1)
         return at - _PLACE if at >= 0 else None

@@ -81,6 +81,8 @@ def descriptor(topic: str, names: Sequence[str]) -> bytes:
     )
     message = file.message_type.add(name=type_name(topic).partition(".")[2])
     for number, name in enumerate(names, start=1):
+        # proto3 omits fields at their default; fixed layouts are possible because every field is
+        # written explicitly.
         message.field.add(
             name=name,
             number=number,
@@ -128,6 +130,7 @@ def encode_rows(values: Array) -> Bytes:
     parts = [np.empty((len(values), 0), np.uint8)]
     for fields, layout, tags in _segments(values.shape[1]):
         part = np.empty((len(values), len(tags)), layout)
+        # Broadcasting repeats the constant tags in every message.
         part["tag"], part["value"] = tags, values[:, fields]
         parts.append(part.view(np.uint8).reshape(len(values), -1))
     return np.hstack(parts)

@@ -151,6 +151,7 @@ class Writer:
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
+        # The controller's settings are what its operator knows; hidden effects are not stored here.
         config = json.dumps({"controller": controller})
         self.add_metadata(
             RECORD,
@@ -276,6 +277,7 @@ class Writer:
             self._file.close()
             return
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
+        # A checksum of 0 means none: each chunk has its own.
         self._put(_encode(DataEnd(data_section_crc=0)))
         start = self._offset
         summary = bytearray()
@@ -304,6 +306,7 @@ class Writer:
     def _register(self, topic: str) -> None:
         """Write schema and channel of a topic, before its first message."""
         number = len(self._topics) + 1
+        # The schema's number 0 means none, so numbers start at 1.
         self._topics[topic] = number
         names = self._fields.get(topic) or topic_fields(topic)
         assert names, f"no channels defined for {topic}"
@@ -320,6 +323,7 @@ class Writer:
     def _put_chunk(self, messages: NDArray[np.void], times: NDArray[np.uint64]) -> None:
         """Write a chunk, and the index of each of its topics."""
         content = messages.tobytes()
+        # The fastest level, because blocks are compressed while a test runs.
         packed = zstandard.ZstdCompressor(level=1).compress(content)
         start = self._offset
         chunk = _encode(
@@ -340,6 +344,7 @@ class Writer:
             places[number] = start + len(chunk) + len(index)
             pairs = np.empty((len(times), 2), "<u8")
             pairs[:, 0] = times
+            # A message's offset within the uncompressed chunk.
             pairs[:, 1] = place + messages.dtype.itemsize * np.arange(len(times))
             index += _message_index(number, pairs.tobytes())
         self._put(chunk + bytes(index))
@@ -400,6 +405,7 @@ class Writer:
         assert self._room is not None
         place, end = self._room
         rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))
+        # The reserved space is used up; the record is lost, but the rig must still be stopped.
         if rest < 0:
             return
         filling = _encode(Metadata(name=_RESERVE, metadata={"": " " * rest}))

@@ -143,6 +143,7 @@ def _browse(folder: Path, *options: str) -> str:
         "--disable-background-networking",
         "--disable-component-update",
         "--no-first-run",
+        # A fresh profile keeps the user's browser, its windows and extensions out of it.
         f"--user-data-dir={folder / 'profile'}",
         f"--virtual-time-budget={SETTLING}",
     ]
@@ -161,6 +162,7 @@ def _browse(folder: Path, *options: str) -> str:
     except OSError as error:
         raise RigtwinError(f"cannot start {command[0]}: {error.strerror}") from None
     if done.returncode:
+        # The last line of the error output is the most specific.
         last = (done.stderr.strip().splitlines() or ["without a word"])[-1]
         raise RigtwinError(f"{command[0]} failed to print the page: {last}")
     return done.stdout

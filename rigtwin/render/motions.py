@@ -35,6 +35,7 @@ def joint_positions(
         Joint → position at every tick, in m or rad: measured, else commanded, else integrated from
         the velocity. Joints without a signal are left out.
     """
+    # The rig measures plate and travel; the wheel's position is their difference.
     if machine.structure is Structure.QUARTER_CAR:
         sensed = columns.get("/sensor", {})
         if not {"structure_lvdt", "suspension_lvdt"} <= set(sensed):
@@ -78,6 +79,7 @@ def _find_signal(component: Component, columns: Mapping[str, Mapping[str, Array]
 
 
 def _smooth(signal: Array, period: float) -> Array:
+    # A filter near or above the Nyquist frequency, or longer than the signal, is not possible.
     if 0.45 / period <= SMOOTHING or len(signal) < 50:
         return signal
     return sosfiltfilt(butter(2, SMOOTHING, fs=1.0 / period, output="sos"), signal)

@@ -155,6 +155,7 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
         raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
+    # Half a period of tolerance includes a last tick that rounding has moved.
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:
         span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
@@ -238,6 +239,7 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
     for axis, (title, traces) in zip(axes, shown, strict=True):
         for trace in traces:
             signal = trace.value(*(recording.column(*channel)[ticks] for channel in trace.needs))
+            # NaN marks missing values; it is no reason to refuse a plot.
             if np.max(np.abs(signal), initial=0.0, where=~np.isnan(signal)) > LARGEST:
                 raise RigtwinError(
                     f"{recording.path}: {title} goes beyond {LARGEST:g}, which cannot be drawn"
@@ -274,6 +276,7 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
 
 def _part(time: Array, signal: Array, period: float) -> tuple[Array, Array]:
     """Return a signal with NaN inserted at gaps, where no line must be drawn."""
+    # NaN interrupts a line in matplotlib.
     gaps = np.nonzero(np.diff(time) > 1.5 * period)[0] + 1
     return np.insert(time, gaps, np.nan), np.insert(signal, gaps, np.nan)
 

@@ -77,6 +77,7 @@ def _paper(width: float) -> Style:
             "ytick.labelsize": 7.0,
             "grid.linewidth": 0.4,
             "pdf.fonttype": 42,
+            # Text stays text in both vector formats.
             "svg.fonttype": "none",
         },
     )

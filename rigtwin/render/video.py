@@ -122,6 +122,7 @@ def film(
                 )
                 if progress is not None:
                     progress(number + 1, len(frames))
+            # Encoding nothing flushes the frames that the encoder has delayed.
             container.mux(stream.encode())
         temporary.replace(out)
     except OSError as error:
@@ -228,11 +229,13 @@ def _renderer(
     camera = camera or (cameras[0] if cameras else "free")
     if camera not in (*cameras, "free"):
         raise RigtwinError(f"unknown camera {camera!r}; expected {', '.join([*cameras, 'free'])}")
+    # The context must be current before MuJoCo uploads its textures and meshes.
     data = mujoco.MjData(model)
     context = _context()
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
     drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
+    # Room for the machine's geoms, a ghost, and the beams.
     scene = mujoco.MjvScene(model, maxgeom=500)
     options, view = mujoco.MjvOption(), mujoco.MjvCamera()
     if camera == "free":
@@ -277,6 +280,7 @@ def _draw_ghost(
     mujoco.mjv_addGeoms(model, data, options, mujoco.MjvPerturb(), moving, scene)
     for number in range(first, scene.ngeom):
         geom = scene.geoms[number]
+        # Without the material its texture would hide the ghost's colour.
         geom.rgba, geom.matid, geom.transparent = GHOST_COLOUR, -1, 1
 
 
@@ -306,6 +310,7 @@ class _Traces:
         time = time[ticks]
         figure = Figure(figsize=(WIDTH / 100, TRACE_HEIGHT / 100), dpi=100)
         canvas = FigureCanvasAgg(figure)
+        # Two axes fit below the scene; a machine with more channels shows the first ones.
         titles = list(dict.fromkeys(curve.axis for curve in curves))[:2]
         axes = figure.subplots(max(len(titles), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, title in zip(axes, titles, strict=False):
@@ -328,6 +333,7 @@ class _Traces:
         canvas.draw()
         self._picture: Image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         box = lower.get_window_extent()
+        # Pixel rows count from the top in a picture, but from the bottom in matplotlib.
         top = upper.get_window_extent()
         self._rows = slice(TRACE_HEIGHT - int(top.y1), TRACE_HEIGHT - int(box.y0))
         self._left, self._width = box.x0, box.width

@@ -306,5 +306,6 @@ def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
         return np.zeros_like(density)
     highest = int(np.nonzero(stands_out)[0][-1])
     gain = np.clip(1.0 - noise / np.maximum(smooth, 1e-300), 0.0, 1.0)
+    # Above the limit single lines stand out by chance; they are noise.
     gain[highest + 1 :] = 0.0
     return gain

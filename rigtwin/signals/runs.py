@@ -74,6 +74,7 @@ def runs_at_ends(signal: Array) -> list[tuple[int, int]]:
 
 def _is_run_into(signal: Array, start: int, stop: int) -> bool:
     """Return whether the signal before and beside a run moves as if it went on beyond."""
+    # Too little lies before the run to tell how the signal reached it.
     if start < BEFORE:
         return False
     before = signal[start - BEFORE : start]

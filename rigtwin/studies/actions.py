@@ -60,6 +60,7 @@ class Schedule:
 
     def __init__(self, bounds: Mapping[str, tuple[float, float]]) -> None:
         self.bounds = dict(bounds)
+        # Bounds are checked against the units' ranges in the settings' annotations.
         known = fields(Settings)
         if not self.bounds:
             raise RigtwinError("actions: expected at least one setting with its bounds")
@@ -120,6 +121,7 @@ def suspension(settings: Settings) -> Schedule:
         Bounds of the suspension's damping, in Ns/m, from 0.2 to 10 times its present value, and
         of its preload, in N, from 0.5 to 1.5 times.
     """
+    # The upper bound of a setting's own range may be lower than the factor allows.
     factors = {"suspension_damping": (0.2, 10.0), "preload": (0.5, 1.5)}
     bounds = {}
     for name, (low, high) in factors.items():

@@ -85,6 +85,7 @@ def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
     sums: dict[str, dict[str, float]] = {}
     for name, column in columns.items():
         size = float(np.linalg.norm(column))
+        # A zero column belongs to a parameter that no force depends on.
         if size == 0.0:
             continue
         before = np.stack([columns[name] for name in chosen], axis=1) if chosen else None
@@ -97,6 +98,7 @@ def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
                     if abs(share) > COUNTS:
                         sums[independent][name] = float(share)
                 continue
+        # An independent column starts a new sum, in which its own coefficient is 1.
         chosen.append(name)
         sums[name] = {name: 1.0}
     return tuple(sums.values())

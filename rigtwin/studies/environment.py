@@ -159,6 +159,7 @@ class Environment(dm_env.Environment):
         self.task = _task(seed)
         self._demands, self._next_seed = demands, seed
         self._controlling = set_up(configuration.controller, configuration.timing.period)
+        # The static force of the tyre is the body's weight; the reward counts deviations from it.
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
         # Static deflection of the suspension spring under the body's weight.
         self._sag = (configuration.controller.preload - self._static) / max(
@@ -242,6 +243,7 @@ class Environment(dm_env.Environment):
         self._state, self._memory = initial_state(self._controlling), empty_memory()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
+        # Before the first tick nothing is measured; the observation shows the known start.
         self._measured = Measurements(
             float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload
         )
@@ -267,6 +269,7 @@ class Environment(dm_env.Environment):
             If the action is out of bounds or not finite.
         """
         twin = self._twin
+        # dm_env's convention: a step after the last one begins a new episode.
         if self._over or twin is None:
             return self.reset()
         # validate() checks shape, type and bounds, but lets NaN pass.
@@ -278,6 +281,7 @@ class Environment(dm_env.Environment):
         cost, first = 0.0, self._tick
         while self._tick < min(first + self.interval, len(self._asked)) and self.trip == Trip.NONE:
             cost += self._advance_tick(twin, action)
+        # An interval cut short by a trip or the test's end has fewer ticks.
         cost /= self._tick - first
         self._over = self.trip != Trip.NONE or self._tick == len(self._asked)
         if self.trip != Trip.NONE:
@@ -311,6 +315,7 @@ class Environment(dm_env.Environment):
             )
         self._measured = measured
         self._tick += 1
+        # The same function judges limits on the twin, the virtual card and the rig.
         number, _ = judge_limits(
             self.configuration.safety, period, self._memory, measured, commands
         )
@@ -330,6 +335,7 @@ class Environment(dm_env.Environment):
             else 0.0
         )
         deflection = np.array([true.ground_lvdt - true.structure_lvdt + true.suspension_lvdt])
+        # The tyre's deflection is ground minus wheel, and the wheel stands at plate minus travel.
         tyre = (
             float(tyre_force(self.configuration.plant.tyre, deflection, np.zeros(1))[0])
             - self._static

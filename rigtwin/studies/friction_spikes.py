@@ -158,6 +158,7 @@ def _close_loop(
     state, velocities, last = REST, NO_VELOCITIES, NO_ERRORS
     motor, integral, filtered, total = 0.0, 0.0, 0.0, 0.0
     period = test.period
+    # Exact discretisation of the first-order lag under a held command.
     stays = np.exp(-period / MOTOR_LAG)
     for tick in range(len(test.travels)):
         # Load cell = motor force minus friction: the loop is linear, so the response to friction
@@ -227,6 +228,7 @@ def detections(
 
 def _without_hum(signal: Array, time: Array) -> Array:
     """Return the signal without its component at mains frequency, fitted by least squares."""
+    # Sine and cosine at the nominal frequency: amplitude and phase follow from a linear fit.
     turn = 2 * np.pi * MAINS * time
     waves = np.column_stack([np.sin(turn), np.cos(turn)])
     return signal - waves @ np.linalg.lstsq(waves, signal - signal.mean(), rcond=None)[0]
@@ -282,13 +284,11 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
         If the recording was made with compensation, has values that are not finite, has too few
         reversals, or its force does not jump at them.
     """
-    # scipy.optimize is imported here because it takes long to load.
-    from scipy.optimize import differential_evolution
-
     _check_recording(recording, settings)
     period = recording.period
     turns, directions, crowded = reversals(recording)
     window = round(WINDOW / period)
+    # A reversal too close to either end has no complete window.
     inside = (turns > window) & (turns < recording.ticks - 3 * window)
     turns, directions = turns[inside], directions[inside]
     if len(turns) < MIN_REVERSALS:
@@ -315,6 +315,30 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     _close_loop(base, False, test, due, steps)
     test = test._replace(rest=errors - due)
 
+    best = _search_settings(base, test, seed)
+    _close_loop(best, True, test, due, steps)
+    # The search minimises the force error alone; detections and false steps only describe the
+    # result.
+    delays, false = _match_steps(steps, ticks, directions, len(envelope), crowded)
+    delay = float(np.median(delays)) * period if delays else float("nan")
+    return Calibration(
+        settings=best,
+        friction=coulomb,
+        envelope=envelope,
+        reversals=len(ticks),
+        detected=len(delays),
+        false=false,
+        delay=delay,
+    )
+
+
+def _search_settings(base: Settings, test: _Test, seed: int) -> Settings:
+    """Return the settings within BOUNDS whose compensator leaves the least force error."""
+    # scipy.optimize is imported here because it takes long to load.
+    from scipy.optimize import differential_evolution
+
+    due, steps = np.empty(len(test.travels)), np.empty(len(test.travels))
+
     def set_values(values: Array) -> Settings:
         changed = base._replace(**dict(zip(BOUNDS, values.tolist(), strict=True)))
         return changed._replace(spike_samples=float(int(changed.spike_samples)))
@@ -333,19 +357,7 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
         polish=False,
         rng=np.random.default_rng(seed),
     )
-    best = set_values(np.asarray(optimum.x))
-    _close_loop(best, True, test, due, steps)
-    delays, false = _match_steps(steps, ticks, directions, len(envelope), crowded)
-    delay = float(np.median(delays)) * period if delays else float("nan")
-    return Calibration(
-        settings=best,
-        friction=coulomb,
-        envelope=envelope,
-        reversals=len(ticks),
-        detected=len(delays),
-        false=false,
-        delay=delay,
-    )
+    return set_values(np.asarray(optimum.x))
 
 
 def _check_recording(recording: Recording, settings: Settings) -> None:
@@ -391,6 +403,7 @@ def _directions(
 ) -> Array:
     """Return the direction of motion at each tick, which changes at every reversal."""
     way = np.empty(count)
+    # Before the first reversal the motion has the opposite direction.
     way[: ticks[0]] = -directions[0]
     for first, last, direction in zip(ticks, [*ticks[1:], count], directions, strict=True):
         way[first:last] = direction
@@ -405,6 +418,8 @@ def _jump(friction: Array, tick: int, way: float, window: int) -> tuple[int, flo
     Means over half a window come from differences of one cumulative sum.
     """
     near = np.arange(max(tick - window, window), tick + window)
+    # The cumulative sum has a leading zero, so that total[b] − total[a] sums the samples a to b −
+    # 1.
     total = np.concatenate([[0.0], np.cumsum(friction)])
     half = window // 2
     after = (total[near + half] - total[near]) / half

@@ -130,6 +130,7 @@ def find_identifiable(machine: Machine) -> Identifiability:
             if trial.reproduces([effects[n] for n in combination], effects[name]):
                 confounded[name] = combination
                 break
+    # All effects that are neither unobservable nor confounded are identifiable.
     seen = [name for name in responses if name not in unseen and name not in confounded]
     return Identifiability(
         tuple(seen), tuple(unseen), confounded, tuple(str(r.experiment) for r in recordings), sums
@@ -143,6 +144,7 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
             test = find_experiment(machine, name)
             timing = test.configuration.timing._replace(duration=0.5 * SECONDS)
             configuration = test.configuration._replace(timing=timing, plant=machine.plant)
+            # Two roads show effects that one road could hide by chance.
             for seed in (1, 2):
                 demands = test.demands(configuration, seed)
                 yield record_on_twin(machine, name, configuration, demands, seed)
@@ -157,6 +159,7 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
     time = np.arange(configuration.ticks) * timing.period
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         for number, reach in enumerate(REACHES, 1):
+            # The motions are the same on every call, so that answers are reproducible.
             random = np.random.default_rng([number, 17])
             demands = {}
             for topic, field in demanded_channels(machine):
@@ -179,6 +182,7 @@ def _make_up(machine: Machine) -> Iterator[Recording]:
             path = Path(folder) / f"{number}.mcap"
             try:
                 run_machine(path, machine, f"multisine {number}", configuration, demands, number)
+            # A machine that diverges under these motions cannot be studied with them.
             except RigtwinError:
                 return
             yield reader.load(path)
@@ -241,6 +245,7 @@ class _Trial:
         self._size = np.ones((len(machine.rows), 1))
         moved = self._predict(self.plant)
         rms = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
+        # A signal that stays zero must not divide by zero.
         self._size = np.maximum(rms, 1e-12)
         # Refinements of dry friction have no effect without it, so friction is added first.
         for effect in machine.effects():

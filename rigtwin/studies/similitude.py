@@ -139,6 +139,7 @@ def pi_groups(units: Units, repeating: Sequence[str] = ()) -> tuple[Group, ...]:
     """
     _check_known(repeating, units)
     names = [*repeating, *(name for name in units if name not in repeating)]
+    # Repeating quantities come first, so that the reduction chooses them as pivots.
     rows, pivots = _reduce(_dimensions(names, units))
     if (rank := sum(pivot < len(repeating) for pivot in pivots)) < len(repeating):
         raise RigtwinError(
@@ -236,6 +237,7 @@ def largest_change(
     systems, or of opposite sign.
     """
     ratios = {name: changed[name] / original[name] for name in units if original[name] != 0.0}
+    # A quantity that appears from zero changes its groups without bound.
     appears = any(changed[name] != 0.0 for name in units if name not in ratios)
     if appears or any(ratio <= 0.0 for ratio in ratios.values()):
         return math.inf

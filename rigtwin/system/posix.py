@@ -101,6 +101,7 @@ def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
 
         yield ended
         return
+    # A handle refers to this process even if its number is used again.
     handle = os.pidfd_open(number)
     try:
         yield lambda seconds: bool(select.select([handle], [], [], seconds)[0])
@@ -145,6 +146,7 @@ def lock_memory() -> Grant:
     """Lock the memory of this program, so that no page has to be loaded from disk."""
     if sys.platform != "linux":
         return Grant(MEMORY, f"not known how on {sys.platform}")
+    # ctypes keeps errno per thread only with use_errno.
     if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         reason = os.strerror(ctypes.get_errno())
         return Grant(MEMORY, f"{reason}; raise it with: ulimit -l unlimited")

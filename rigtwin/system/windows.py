@@ -185,6 +185,7 @@ def raise_priority(priority: int) -> Grant:  # noqa: ARG001 - one class is all t
     Calls SetPriorityClass and SetThreadPriority, and timeBeginPeriod for a fine timer.
     """
     kernel, timers = _library("kernel32"), _library("winmm")
+    # By default a sleep may end up to 15.6 ms late.
     timers.timeBeginPeriod(_GRAIN)
     process = _handle(kernel.GetCurrentProcess())
     granted = kernel.SetPriorityClass(process, _REALTIME)

@@ -59,6 +59,8 @@ class Alarm:
     @property
     def component(self) -> str:
         """Component with the largest total probability of suspects; empty without suspects."""
+        # Effects of one component are often confounded; their component is more certain than each
+        # of them.
         places: dict[str, float] = {}
         for suspect in self.suspects:
             places[suspect.component] = places.get(suspect.component, 0.0) + suspect.probability

@@ -40,6 +40,7 @@ class Cusum:
         # log p₁/p₀ of n normal squares with variances 1 and R: ½ (1 − 1/R) Σx² − ½ n log R.
         step = 0.5 * (1.0 - 1.0 / RATIO) * power - 0.5 * count * math.log(RATIO)
         self.value = max(self.value + step, 0.0)
+        # The last time at zero is the estimate of when the change began.
         if self.value == 0.0:
             self.since = time
         return self.value

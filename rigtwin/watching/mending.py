@@ -29,6 +29,7 @@ def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
         recorded, shape (ticks,). In filled ticks, commands are held and signals interpolated.
     """
     steps = np.diff(recording.time)
+    # Nobody knows what the machine did in a long gap; only what follows is used.
     long = np.flatnonzero(np.abs(steps) > LONGEST)
     if len(long):
         recording = recording.between(float(recording.time[long[-1] + 1]), math.inf)
@@ -41,6 +42,7 @@ def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
     recorded[places] = True
     if recorded.all():
         return recording, recorded
+    # The last recorded tick at or before each tick.
     before = np.searchsorted(places, ticks, side="right") - 1
     columns = {
         topic: {

@@ -130,6 +130,7 @@ class Watch:
         self.note = ""
         self.recording, self.gap = window, find_gap(evidence)
         gap = self.gap
+        # At the end of a test nothing follows, so everything is judged.
         held = 0.0 if last or math.isinf(evidence.models[0].band) else HELD_BACK
         first, stop = np.searchsorted(gap.time, [self.judged, end - held])
         new = slice(int(first), max(int(stop), int(first)))
@@ -138,6 +139,7 @@ class Watch:
         names = evidence.names
         self.ratios = dict(zip(names, ratio(gap, new).tolist(), strict=True))
         self._judge(gap, new, names, end)
+        # The share of ticks at which at least one signal was judged.
         seen = float(np.mean(gap.counts[:, new].any(axis=0)))
         until = float(gap.time[new.stop - 1]) + evidence.lines[0].period
         self.seconds += seen * (until - self.judged)
@@ -150,6 +152,8 @@ class Watch:
         configuration = self.machine.configuration_of(window, self._base)
         require_fit(self.machine, window, configuration)
         counted = counts.astype(float)
+        # A test that began at rest without a ramp starts as the twin does; nothing needs to be
+        # forgotten.
         if window.transitions or window.time[0] > self._start + 0.5 * window.period:
             counted[~self._has_forgotten(window, configuration)] = 0.0
         return Evidence(self.machine, [window], [configuration], [counted])
@@ -171,6 +175,7 @@ class Watch:
         ]
         for share in (-KICK, KICK):
             kicked = model_of(self.machine, _kick(window, share), configuration, STEPS)
+            # A diverged twin predicts infinities, whose difference is NaN and never converges.
             with np.errstate(invalid="ignore"):
                 difference = np.abs(kicked.predict(plant) - predicted)
             converged = np.all(difference <= SAME * np.array(held)[:, None], axis=0)
@@ -193,6 +198,8 @@ class Watch:
                     power = float(np.sum(gap.power[row, number, block][counts]))
                     if freedom > 0.0:
                         cusum.add(power, freedom, time)
+                    # Only the first alarm is raised; later ones would be consequences of the same
+                    # gap.
                     if self.alarm is None and cusum.value >= LIMIT:
                         self.alarm = Alarm(end, cusum.since, name, BANDS[number])
 
@@ -218,9 +225,11 @@ class Watch:
         seen = self.judged - since
         if seen < max(SEEN, LOOKED * self._looked) and not (last and not self._looked):
             return False
+        # A gap older than the window adds no new evidence.
         if self._looked and seen > WINDOW - WARM - STEP:
             return False
         self._looked = seen
+        # The twin needs the time before the gap to settle.
         part = window.between(since - WARM, math.inf)
         from_here = part.time >= (since + SETTLED if since > self._start else since)
         try:

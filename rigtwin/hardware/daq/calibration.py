@@ -69,6 +69,7 @@ def measure_rest(rig: DrivenRig, ticks: int = REST_TICKS) -> tuple[RestReading, 
 
 def _count_repeats(column: Array) -> int:
     """Return the length of the longest run of equal values."""
+    # A run ends where the value changes; both ends of the record count as changes.
     changes = np.flatnonzero(np.diff(column) != 0.0)
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(column) - 1])))))
 
@@ -126,12 +127,14 @@ def set_spans(
                 signal.mean - line.scaling.offset,
                 references[line.name] - line.scaling.offset,
             )
+            # Near zero the span is a quotient of two small numbers.
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, which is noise; "
                     "place it at its reference"
                 )
             factor = wanted / moved
+            # A negative factor would be a wrong sign hidden in the scale.
             if factor <= 0.0:
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, the wrong way; "
@@ -171,6 +174,7 @@ def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuratio
     demands = np.zeros((3 * ticks, 3))
     for column, height in enumerate((stroke, stroke, force)):
         demands[column * ticks : (column + 1) * ticks, column] = height * bump
+    # Imposed motion with feedforward only: no loop can react to a sign that is wrong.
     settings = Settings(mode=Mode.IMPOSED, kp=0.0, ki=0.0, kff=1.0, preload=0.0, start=0.0)
     return Configuration(
         controller=settings, timing=Timing(duration=3 * BUMP, period=period)

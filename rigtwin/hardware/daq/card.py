@@ -85,6 +85,7 @@ def connect(address: str) -> grpc.Channel | None:
         ("grpc.keepalive_timeout_ms", 1000),
         ("grpc.http2.max_pings_without_data", 0),
     )
+    # The server is on the laboratory's own network; NI's server has no encryption by default.
     return grpc.insecure_channel(address, options=alive)
 
 
@@ -206,6 +207,7 @@ class Card:
                 )
             pressure.do_channels.add_do_chan(table.physical(table.power))
             if table.timing == "hardware":
+                # The buffer of 1000 samples covers a second in which the loop may be late.
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
                 )
@@ -291,6 +293,7 @@ class Card:
         A card that accepts no output is reset, which sets its outputs to zero. Errors are never
         raised: stopping goes on with whatever still works.
         """
+        # Without all three tasks the card was never started, and has nothing to stop.
         if len(self._tasks) == 3:
             zeros = self._to_volts([0.0] * len(self._outputs))
             for place in self._signals.released_places:
@@ -307,6 +310,7 @@ class Card:
                 refused = True
             if refused:
                 with suppress(Exception):
+                    # A reset is the last means: it ends every task on the card, not only these.
                     self._device().reset_device()
         for task in self._tasks:
             with suppress(Exception):
@@ -326,6 +330,7 @@ class Card:
             return None
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
+        # A new session must not silently take over the tasks of another program.
         new = SessionInitializationBehavior.INITIALIZE_SERVER_SESSION
         return GrpcSessionOptions(self._channel, name, initialization_behavior=new)
 

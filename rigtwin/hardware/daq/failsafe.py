@@ -42,6 +42,7 @@ class FailsafeOutputs:
 
     def prepare(self) -> None:
         """Attach to the owner's tasks once it has them. Raise CardFault if that fails."""
+        # Without a server there is nothing to attach to while the owner lives.
         if self._table.address:
             with translate_errors(f"card {self._table.device}: watching it"):
                 self._attach()
@@ -114,6 +115,7 @@ class FailsafeOutputs:
             outputs, pressure = (
                 Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names
             )
+        # Outputs and power only: the inputs are of no use any more.
         self._tasks = [outputs, pressure]
         for line in self._table.outputs:
             volts = line.scaling.range

@@ -46,6 +46,7 @@ class MachineTerminals:
         self._states = [start_transducer(model) for model in self._models]
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         self._random, self._place = np.random.default_rng([seed, 3]), AHEAD
+        # Each sensor's hum has a random phase of its own.
         self._phases, self._drawn = self._random.uniform(0.0, 2.0 * np.pi, len(rows)), 0
         self._noise: list[Array] = []
         self._written = np.zeros(len(outputs))
@@ -56,6 +57,7 @@ class MachineTerminals:
         """Advance by one period under held output voltages, shape (outputs,), and sample."""
         # Without power the brakes hold the machine: its state does not advance.
         if power:
+            # The actuators receive what the card's 16-bit converter makes of a voltage.
             to_bits(self._outputs, written, self._written)
             to_values(self._outputs, self._written, self._written)
             self._stepped.step(self._written.tolist())

@@ -124,6 +124,7 @@ def signals_of(machine: Machine) -> Signals:
         command, or if nothing can be commanded.
     """
     movers, pushers, components = list_movers(machine), list_pushers(machine), machine.components
+    # A prescribed motion is an input of the model, which no output of a card can impose.
     if prescribed := [name for name in movers if name not in pushers]:
         raise RigtwinError(
             f"{machine.name}: {prescribed[0]} prescribes a motion, which a card cannot command; "
@@ -134,6 +135,7 @@ def signals_of(machine: Machine) -> Signals:
             f"{machine.name}: nothing to command; expected at least one force actuator or servo"
         )
     sensors = list_sensors(machine)
+    # Components share /session with the session's own fields.
     for name in (*sensors, *pushers):
         if name in RESERVED:
             raise RigtwinError(

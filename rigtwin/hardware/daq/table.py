@@ -26,6 +26,7 @@ OUTPUTS = tuple(signal.name for signal in RIG.outputs)
 HEADROOM = 1.05
 """Factor by which a line's range must exceed the signal's limit. A signal that saturates at its
 limit could never be seen to exceed it."""
+# Names of the driver's lines, such as ai0, ao3 and port0/line2.
 _ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
 _DIGITAL = re.compile(r"port\d/line\d{1,2}")
 OLDEST = 10 * 365
@@ -98,6 +99,7 @@ class CardLine(NamedTuple):
     @property
     def reach(self) -> float:
         """Largest magnitude, in the signal's unit, that the line can carry in both directions."""
+        # An offset shifts the range, so one direction carries less.
         return self.scaling.range * self.scaling.scale - abs(self.scaling.offset)
 
 
@@ -201,6 +203,7 @@ def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTab
     inputs = _lines("inputs", tables.get("inputs", {}), signals.inputs)
     outputs = _lines("outputs", tables.get("outputs", {}), signals.outputs)
     taken: dict[str, str] = {}
+    # Two signals on one line would read, or overwrite, each other's values.
     for line in inputs + outputs:
         if line.line in taken:
             raise RigtwinError(
@@ -296,6 +299,7 @@ def _line(group: str, name: str, table: Any, unit: str) -> CardLine:
     scaling = _numbers(
         where, {key: value for key, value in table.items() if key not in texts}, LineScaling
     )
+    # The range in the annotation allows −1 to 1; a sign is one of its ends.
     if abs(scaling.sign) != 1.0:
         raise RigtwinError(f"{where}.sign = {scaling.sign:g}: expected 1 or -1")
     sign_checked = table.get("sign_checked", False)

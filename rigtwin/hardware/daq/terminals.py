@@ -94,6 +94,7 @@ class Terminals:
     """
 
     def __init__(self, configuration: Configuration, wiring: ChannelTable, seed: int) -> None:
+        # Without pressure the rig stands at zero, wherever the test will start.
         rest = configuration.controller._replace(start=0.0, preload=0.0)
         twin = Twin(
             configuration._replace(plant=without_bits(configuration.plant), controller=rest),

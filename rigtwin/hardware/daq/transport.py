@@ -105,6 +105,7 @@ class _CallHandler(grpc.GenericRpcHandler):
         self, handler_call_details: grpc.HandlerCallDetails
     ) -> grpc.RpcMethodHandler | None:
         service, _, call = handler_call_details.method.strip("/").partition("/")
+        # Messages are named after their call: CreateTaskRequest, CreateTaskResponse.
         request, response = (
             getattr(self._messages, call + ending, None) for ending in ("Request", "Response")
         )
@@ -140,6 +141,7 @@ def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     RigtwinError
         If the port is in use.
     """
+    # A refused call is an answer to the client, not an error of the server.
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
     server = grpc.server(
         ThreadPoolExecutor(max_workers=8),

@@ -139,7 +139,9 @@ class VirtualCard:
         self._volts = np.zeros(len(self._outputs))
         self._places = [int(line[2:]) for line in self._outputs]
         self._tasks: dict[str, _Task] = {}
+        # A ring of the latest samples; the oldest are overwritten as on the real card.
         self._samples: deque[list[float]] = deque(maxlen=BUFFERED)
+        # gRPC serves each call on a thread of its own.
         self._lock = threading.RLock()
         self._begun = False
 
@@ -230,6 +232,7 @@ class VirtualCard:
         return task
 
     def _GetSystemInfoAttributeUInt32(self, request: Message, response: Response) -> Message:
+        # Major and minor version of the driver.
         return response(value={0x1272: 26, 0x1923: 5}.get(request.attribute_raw, 0))
 
     def _GetSystemInfoAttributeString(self, _: Message, response: Response) -> Message:
@@ -277,6 +280,7 @@ class VirtualCard:
 
     def _CreateTask(self, request: Message, response: Response) -> Message:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"
+        # INITIALIZE wants a new session, ATTACH an existing one.
         new = name not in self._tasks
         if new and request.initialization_behavior == _ATTACH:
             raise DriverError(NO_TASK, f"No session of the name {name} to attach to.")
@@ -309,6 +313,7 @@ class VirtualCard:
 
     def _voltage(self, request: Message, allowed: tuple[float, ...]) -> None:
         """Raise DriverError if the requested range exceeds the card's."""
+        # The driver takes any range up to the largest, and uses the next that covers it.
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
             raise DriverError(
                 BAD_VALUE,
@@ -407,6 +412,7 @@ class VirtualCard:
 
     def _WriteDigitalLines(self, request: Message, response: Response) -> Message:
         task = self._task(request)
+        # Other digital lines exist, but nothing is connected to them.
         for line, level in zip(task.lines, request.write_array, strict=False):
             if line == self._power_line:
                 self.power = bool(level)

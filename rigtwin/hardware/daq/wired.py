@@ -31,6 +31,7 @@ class WiredTwin:
         self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
         count = len(table.outputs)
         self._values, self._commands = np.empty(len(table.inputs)), np.zeros(count)
+        # Before the first read the twin has not moved, and its sample is still fresh.
         self._held, self._power, self._fresh = np.zeros(count), False, True
 
     def start(self) -> None:

@@ -101,6 +101,7 @@ class FaultyBench:
                 self._held = float(acting[place])
             self._show(abs((acting[place] - self._held) * self._factor[place]) > SEEN_CYLINDER)
             acting[place] = self._held
+        # An open valve drives the cylinder at full voltage, in either direction.
         elif self._kind == "valve open":
             acting[place] = 10.0 * self._direction
             asked = self.written[min(self.tick, len(self.written) - 1), place] * self._factor[place]
@@ -115,9 +116,11 @@ class FaultyBench:
             volts[place] = 0.0
             self._show(not first)
         elif kind == "stuck":
+            # The value of the tick before is repeated for good.
             volts[place] = self._before[place]
             self._show(True)
         elif kind == "spike" and first:
+            # A spike lasts one tick and hits anywhere within the range.
             volts[place] += self._direction * span * self._random.uniform(0.1, 0.9)
         elif kind == "not a number":
             volts[place] = np.nan
@@ -147,6 +150,7 @@ class FaultyBench:
         The motor's voltage is zero for good, and the cylinders are held or without pressure.
         """
         last = min(self.tick, len(self.written))
+        # Safe is the state after the last voltage of the motor and the last motion under pressure.
         motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
         moving = (
             np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
@@ -155,7 +159,7 @@ class FaultyBench:
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 
     def peak_share(self, limits: Safety, since: int) -> float:
-        """Return the largest true position, travel or force relative to its limit, from a tick on."""
+        """Return the largest true position, travel or force relative to its limit, since a tick."""
         last = min(self.tick, len(self.truth))
         bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])
         return float(np.max(np.abs(self.truth[since:last]) / bounds)) if last > since else 0.0

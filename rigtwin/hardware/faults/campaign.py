@@ -232,6 +232,7 @@ def try_fault(
     virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
+    # Time is the virtual card's, so results do not depend on this computer's speed.
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
     interrupted: list[str] = []
@@ -345,7 +346,9 @@ def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> F
     # have been completed.
     harmless = cause == "completed"
     shown = fault.at if fault.kind.everywhere else bench.shown
+    # A fault that never showed and did no harm has no delay.
     late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
+    # A sensor's fault must be blamed on the right sensor, not only on the right cause.
     named = (
         fault.kind.place != "sensor"
         or cause not in ("jump", "stuck", "not_a_number")
@@ -380,4 +383,5 @@ def is_readable(path: Path) -> bool:
         recording = load(path)
     except RigtwinError as error:
         return "no ticks" in str(error) and bool(read_final_cause(path)[0])
+    # Reading must also give usable times.
     return bool(np.all(np.isfinite(recording.time)))

@@ -136,6 +136,7 @@ def _inject(
         _wait_until(
             lambda: hung.value > 0.0 or controller.exitcode is not None, "the controller to hang"
         )
+        # The process ended before its fault, so the attempt proves nothing.
         if hung.value == 0.0:
             raise FaultNotReached
         return float(hung.value)
@@ -168,11 +169,13 @@ def _control(test: Test, path: Path, fault: InjectedFault, hung: Synchronized[fl
 
     Messages of the process and its guardian are discarded; the recording has them.
     """
+    # The process and its guardian report the fault on standard error, which is expected here.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     period, channel = test.configuration.timing.period, connect(test.table.address)
     card = Card(test.table, period, channel, clock=_read_slow_clock)
     usual = guardian_settings(test, path, guarded=True)
     guardian = Guardian(
+        # The guardian's patience is slowed down by the same factor as the card.
         replace(usual, patience=DILATION * usual.patience, hold=DILATION * usual.hold)
     )
     ticks = 0

@@ -31,6 +31,7 @@ def digest(title: str, configuration: Configuration, demands: bytes, table: Chan
     str
         SHA-256 digest in hexadecimal.
     """
+    # Sorted keys make the digest independent of the order of settings.
     known = json.dumps([title, flatten(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(known.encode() + demands).hexdigest()
 

@@ -53,6 +53,7 @@ class Guardian:
         layout = settings.layout
         memory = context.RawArray("d", memory_size(layout))
         self._shared, self._ring = split_memory(memory, layout)
+        # Rare messages use the pipe; ticks use shared memory, which costs no system call.
         self._pipe, theirs = context.Pipe()
         arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
@@ -97,6 +98,7 @@ class Guardian:
     def ready(self) -> None:
         """Wait until the guardian could stop the rig. Raise RigtwinError if it cannot."""
         self._send("prepare")
+        # The flag is polled: the guardian sets it in shared memory.
         end = monotonic() + STARTED
         while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
             time.sleep(1e-3)
@@ -110,6 +112,8 @@ class Guardian:
             self._shared[BEAT] = monotonic()
             self._shared[GUARDED] = 1.0
         self._send("transition", transition)
+        # Guarding ends after the transition is sent: the guardian must know that the rig is at
+        # rest.
         if transition.after not in self._settings.phases:
             self._shared[GUARDED] = 0.0
 

@@ -78,6 +78,7 @@ def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, ow
     raise_priority(PRIORITY + 5)
     pipe.send("ready")
     died = _guard_loop(owner, shared, settings, keeper)
+    # The rig is made safe first; the recording is finished after that.
     if died is not None:
         keeper.stop_rig(died, shared)
     thread.join(1.0)
@@ -161,6 +162,7 @@ class _GuardianRecorder:
         while (first := int(shared[READ])) < (last := int(shared[WRITTEN])):
             # At most a block, and not beyond the ring's end, where the rows wrap around.
             last = min(last, first + BLOCK, (first // RING + 1) * RING)
+            # A copy, because the loop overwrites the ring as soon as READ moves on.
             rows = self._ring[first % RING : first % RING + last - first].copy()
             shared[READ] = float(last)
             self._recorder.block(rows)
@@ -221,6 +223,7 @@ class _GuardianRecorder:
         before = self._last.after if self._last is not None else Phase.IDLE
         cause = self._cause
         now = self._time if self._last is None else max(self._time, self._last.time)
+        # A recording's transitions must follow the permitted ways, also after a crash.
         if before != Phase.STOPPING:
             self._recorder.transition(Transition(now, before, Phase.STOPPING, cause))
         self._recorder.transition(Transition(now, Phase.STOPPING, Phase.FAULTED, cause))

@@ -39,6 +39,7 @@ def split_memory(memory: SharedMemory, layout: TickLayout) -> tuple[Array, Array
         Numbers before the ticks, shape (SAFE + outputs,), and the ring of ticks, shape
         (RING, numbers per tick).
     """
+    # Views share the memory; nothing is copied.
     whole, first = np.frombuffer(memoryview(memory)), SAFE + layout.outputs
     return whole[:first], whole[first:].reshape(RING, layout.row)
 

@@ -47,6 +47,7 @@ def open_live_view(port: int, fields: Mapping[str, Sequence[str]]) -> Callable[[
     channels: dict[str, Any] = {"server": server}
 
     def show(topic: str, rows: Array) -> None:
+        # A topic is announced with its first rows, because not every session has every topic.
         if topic not in channels:
             schema = foxglove.Schema(
                 name=type_name(topic),

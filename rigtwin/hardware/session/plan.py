@@ -96,6 +96,7 @@ def _parse_test(number: int, table: object, find: Callable[[str], Experiment]) -
     experiment, seed, pause = table.get("experiment"), table.get("seed", 0), table.get("pause", 0.0)
     if not isinstance(experiment, str):
         raise RigtwinError(f"{where}: experiment is missing")
+    # Raises an error for an unknown experiment.
     find(experiment)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"{where}: seed = {seed!r}; expected 0 or more")
@@ -150,6 +151,7 @@ def is_complete(path: Path, real: bool) -> bool:
         recording = load(path)
     except RigtwinError:
         return False
+    # A dry run's recording does not replace a test on the rig, nor the reverse.
     return recording.end == "completed" and real == (not recording.twin)
 
 
@@ -158,6 +160,7 @@ def move_aside(path: Path) -> Path | None:
     if not path.exists():
         return None
     number = 1
+    # Earlier attempts are kept, each under its own number.
     while (aside := path.with_suffix(f".{number}.mcap")).exists():
         number += 1
     return path.rename(aside)

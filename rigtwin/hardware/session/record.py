@@ -226,6 +226,7 @@ def record_in_real_time(
         grants = stack.enter_context(in_real_time(fifo))
         try:
             ended = supervise(rig, operation, guardian, stop, lateness, progress)
+        # The guardian must not outlive the session, whatever ended it.
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
             raise
@@ -238,6 +239,7 @@ def open_card(test: AnyTest) -> Card:
     """Open the card and inspect it. Raise CardFault; nothing moves."""
     period = test.period
     channel = connect(test.table.address)
+    # A card without its own clock is paced by this computer.
     pacer = Pacer(period) if test.table.timing == "software" else None
     card = Card(test.table, period, channel, pacer=pacer)
     card.inspect()

@@ -41,5 +41,6 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
 
             yield find_request
     finally:
+        # The program's own handlers are restored, so that Ctrl-C ends it again.
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -74,6 +74,7 @@ def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Rest
     finally:
         rig.stop()
     for signal in still:
+        # Noise makes every working sensor change from tick to tick.
         if signal.repeats >= table.plausible.stuck:
             raise RigtwinError(
                 f"{signal.name} gave {signal.repeats} times the same reading: "
@@ -125,6 +126,7 @@ def move_outputs(
         if ended.cause != COMPLETED:
             raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
         recording = load(path)
+    # A missed tick would shift the responses against the demands.
     if recording.ticks != len(demands):
         raise RigtwinError(
             f"{len(demands) - recording.ticks} ticks were missed; do it again, "

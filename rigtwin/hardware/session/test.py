@@ -186,6 +186,7 @@ class MachineTest:
     def operation(self) -> MachineOperation:
         """Return the operation of the test. Raise RigtwinError if a limit exceeds a line."""
         safety, signals = self.configuration.safety._asdict(), self.table.signals
+        # A line must carry the larger of both limits.
         limits = {
             s.name: (f"safety.{s.name}", max(abs(safety[s.name + LOW]), abs(safety[s.name + HIGH])))
             for s in (*signals.inputs, *signals.outputs)
@@ -193,6 +194,7 @@ class MachineTest:
         }
         require_reach(self.table, limits)
         demanded, outputs = self._plan()
+        # Demands are grouped by topic, as a controller takes them.
         columns: dict[str, dict[str, Array]] = {}
         for (topic, name), signal in demanded.items():
             columns.setdefault(topic, {})[name] = signal

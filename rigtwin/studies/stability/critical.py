@@ -143,6 +143,7 @@ def _crossings(function: Callable[[Array], Array], grid: Array) -> list[float]:
     def value_at(point: float) -> float:
         return float(function(np.array([point]))[0])
 
+    # The grid brackets simple crossings; pairs of crossings are found below.
     values = function(grid)
     signs = np.sign(values)
     brackets = [(grid[i], grid[i + 1]) for i in np.flatnonzero(signs[:-1] * signs[1:] < 0.0)]

@@ -32,9 +32,11 @@ def rightmost_delay_root(loop: Loop, delay: float) -> complex:
         Delay of one power of z, in s.
     """
     check_time("delay", delay)
+    # An oscillation at the bound's frequency needs about half a node per radian of phase.
     span = delay * order(loop)
     nodes = int(min(MIN_NODES + 0.5 * bound(loop) * span, MAX_NODES))
     eigenvalues = _generator_eigenvalues(loop, delay, nodes)
+    # Only the rightmost candidates are refined; Newton's method removes the discretisation's error.
     rightmost = eigenvalues[np.argsort(-eigenvalues.real)][:CANDIDATES]
     refined = (_refine(loop, delay, start) for start in rightmost)
     converged = [root for root in refined if root is not None]
@@ -66,6 +68,8 @@ def _generator_eigenvalues(loop: Loop, delay: float, nodes: int) -> Roots:
     # The first block row is the splicing condition: the delay equation itself at the present.
     generator[:degree] = 0.0
     generator[: degree - 1, 1:degree] = np.eye(degree - 1)
+    # The last block row is the delay equation: the highest derivative at present is a sum over past
+    # states, interpolated at each multiple of the delay.
     for power, polynomial in loop.items():
         coefficients = np.zeros(degree + 1)
         coefficients[: len(polynomial.coef)] = polynomial.coef

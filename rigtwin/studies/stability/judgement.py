@@ -86,6 +86,7 @@ def judge(vehicle: QuarterCar, tau: float, delay: bool) -> Stability:
         models[name] = ModelStability(
             real=pole.real,
             imaginary=abs(pole.imag),
+            # A pole on the axis within rounding counts as unstable, which is the safe side.
             stable=pole.real < -ROUNDING * abs(pole),
             critical_lag=lag.time if lag else None,
             critical_lag_frequency=lag.frequency if lag else None,

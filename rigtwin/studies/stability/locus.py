@@ -130,6 +130,7 @@ class Locus:
             middle = float(np.sqrt(low * high))
             return self._find_crossings(low, middle) + self._find_crossings(middle, high)
         before, after = self.poles_at(low), self.poles_at(high)
+        # One pole of each complex pair is enough; real poles do not cross with a frequency.
         after = after[after.imag > 0.0]
         # Poles are paired by distance, because eigenvalues come in no particular order.
         nearest = before[np.argmin(np.abs(after[:, None] - before[None, :]), axis=1)]

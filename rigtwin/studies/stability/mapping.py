@@ -96,6 +96,7 @@ def around(name: str, car: QuarterCar, lag: float, points: int = POINTS) -> Axis
     if nominal > 0.0:
         ends = np.log10(nominal / SPAN), np.log10(nominal * SPAN)
         return Axis(name, np.logspace(*ends, points))
+    # Critical damping is 2 sqrt(k m) of the mass that the damper acts on.
     mass = car.unsprung if name == "tyre_damping" else car.sprung
     return Axis(name, np.linspace(0.0, 2.0 * np.sqrt(mass.stiffness * mass.mass), points))
 
@@ -125,6 +126,7 @@ def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axi
     rows = [_change((validate(car), lag), up.name, float(value)) for value in up.values]
     settings = [_change(row, across.name, float(value)) for row in rows for value in across.values]
     if model in AS_RUN:
+        # A rate of decay is minus the real part of the slowest mode.
         rightmost = np.array([-AS_RUN[model](vehicle) for vehicle, _ in settings])
     else:
         dynamics = np.array([MODELS[model](*setting).A for setting in settings])

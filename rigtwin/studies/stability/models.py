@@ -138,6 +138,7 @@ def rig(car: QuarterCar, lags: Lags) -> StateSpace:
     for lag in lags:
         check_time("lag", lag)
     plate = _lag_row("plate", "body", lags.plate)
+    # Travel is measured between plate and wheel, then filtered: τ ẏ + y = plate − wheel.
     travel = {"plate": 1.0 / lags.travel, "wheel": -1.0 / lags.travel, "travel": -1.0 / lags.travel}
     # The velocity filter is fed the derivative of the plate's lagged position.
     velocity = {name: value / lags.velocity for name, value in plate.items()}
@@ -217,6 +218,7 @@ def _quarter_car(
     """Return the system of both masses (5.46, 5.47) under a suspension force."""
     validate(car)
     tyre = {"wheel": -car.tyre_stiffness, "wheel_velocity": -car.tyre_damping, GROUND: 1.0}
+    # The wheel feels the suspension's force and the tyre's; the sprung mass feels the reaction.
     wheel = {name: force.get(name, 0.0) + tyre.get(name, 0.0) for name in force | tyre}
     rows = {
         "wheel": {"wheel_velocity": 1.0},
@@ -230,6 +232,7 @@ def _quarter_car(
 def _system(rows: Rows, *outputs: str) -> StateSpace:
     """Assemble a state-space system from its rows, with the states' names."""
     states = list(rows)
+    # A state that a row does not name has the coefficient 0.
     dynamics = np.array([[row.get(state, 0.0) for state in states] for row in rows.values()])
     ground = np.array([[row.get(GROUND, 0.0)] for row in rows.values()])
     read = np.array([[float(state == output) for state in states] for output in outputs])

@@ -73,6 +73,8 @@ def decay(configuration: Configuration, plate: LinearLaw | None = None) -> float
     # Modes outside every loop, such as an observer's integrator, would hide the loop's own.
     reached = np.abs(matrix) > 0.0
     loop = np.flatnonzero(_reachable(reached.T, DRIVEN) & _reachable(reached, DRIVEN))
+    # The slowest mode of a sampled loop has the eigenvalue of largest magnitude; |λ| =
+    # e^{−decay·T}.
     largest = float(np.max(np.abs(np.linalg.eigvals(matrix[np.ix_(loop, loop)]))))
     return -math.log(largest) / configuration.timing.period if largest > 0.0 else math.inf
 
@@ -105,6 +107,7 @@ def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) ->
     sensing_a, sensing_b, sensing_c = (np.asarray(block_diag(*part)) for part in parts)
     sensing_d = np.diag([transducer[3] for transducer in transducers])
 
+    # The plate's compensator takes the model's demand and the measured plate.
     law = plate or set_up(configuration.controller, period).plate.law
     sizes = [len(a), sum(registers), len(sensing_a), SIZE, len(law.a)]
     starts = np.concatenate([[0], np.cumsum(sizes)])
@@ -123,16 +126,11 @@ def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) ->
     matrix = np.zeros((total, total))
     matrix[law_state] = np.outer(law.b[:, 0], wanted) + np.outer(law.b[:, 1], measured[0])
     matrix[law_state, law_state] += law.a
+    # Exact step of the linear plant over one tick.
     matrix[x, x] = expm(a * period)
     first = held.start
     for number, (delay, length) in enumerate(zip(late, registers, strict=True)):
-        # The tolerance keeps a delay of whole ticks from losing one to rounding.
-        whole = math.floor(delay / period + 1e-9)
-        part = max(delay - whole * period, 0.0)
-        entry = b[:, number]
-        now = _integrate_input(a, entry, period - part)
-        before = expm(a * (period - part)) @ _integrate_input(a, entry, part)
-        for change, age in ((now, whole), (before, whole + 1)):
+        for change, age in _delayed_input(a, b[:, number], delay, period):
             # Age 0 is the command of this tick; age n entered the register n ticks ago.
             source = commands[number] if age == 0 else _unit(total, first + age - 1)
             matrix[x] += np.outer(change, source)
@@ -145,6 +143,22 @@ def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) ->
     matrix[state] += by_sensors @ measured
     matrix[state, state] += by_state
     return matrix
+
+
+def _delayed_input(
+    a: Array, entry: Array, delay: float, period: float
+) -> tuple[tuple[Array, int], tuple[Array, int]]:
+    """Return the changes of the state over a tick by two delayed commands, with their ages in ticks.
+
+    A delay n T + f, in s, lets the command of age n + 1 act for the first f of a tick, and the
+    command of age n for the rest.
+    """
+    # The tolerance keeps a delay of whole ticks from losing one to rounding.
+    whole = math.floor(delay / period + 1e-9)
+    part = max(delay - whole * period, 0.0)
+    now = _integrate_input(a, entry, period - part)
+    before = expm(a * (period - part)) @ _integrate_input(a, entry, part)
+    return (now, whole), (before, whole + 1)
 
 
 def _unit(size: int, place: int) -> Array:
@@ -170,6 +184,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     """
     cylinder, motor = plant.structure_cylinder, plant.motor
     inner, entry, out = state_space(loop_of(cylinder))
+    # Nine states; see the constants above for their order.
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
     for number, (lag, gain, place) in enumerate(
@@ -181,6 +196,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
         a[CYLINDER, FED] = entry
     else:
         b[CYLINDER, 0] = entry * cylinder.gain
+    # The motor's force follows the voltage as a first-order lag.
     a[FORCE, FORCE] = -1.0 / motor.time_constant
     if motor.lag > 0.0:
         a[FORCE, VOLTS] = motor.constant / motor.time_constant
@@ -195,6 +211,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     # The tyre is linearised where it carries the preload.
     squeezed, step = initial_deflection(plant, preload), 1e-6
     around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
+    # A gas spring acts between plate and wheel, linearised at rest.
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0
     a[SPEED] = -cell + gas * plate
@@ -290,6 +307,8 @@ def linear_controller(
 
 def _affine(settings: Settings) -> Settings:
     """Return settings with which the controller is affine around rest."""
+    # A semi-active damper switches with the sign of a velocity, which is not linear; its minimum is
+    # the least damped case.
     if settings.skyhook == Skyhook.SEMI_ACTIVE:
         least = settings.suspension_damping + settings.damping_min
         settings = settings._replace(skyhook=Skyhook.NONE, suspension_damping=least)

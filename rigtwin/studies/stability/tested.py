@@ -81,6 +81,7 @@ def sized(configuration: Configuration) -> Configuration:
     """Return the test on a rig whose motor, amplifier and limits suit any vehicle."""
     plant, controller = configuration.plant, configuration.controller
     motor = plant.motor._replace(force_limit=ANY_FORCE, voltage_limit=ANY_VOLTAGE)
+    # Safety limits and saturation have no place in a linear study of stability.
     return without_limits(
         configuration._replace(
             plant=plant._replace(motor=motor),

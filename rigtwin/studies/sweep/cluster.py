@@ -125,6 +125,7 @@ class Cluster:
     def next(self, finished: SimpleQueue[Any]) -> Any:
         """Wait for the next finished job, and fetch the results of all finished jobs."""
         if not self._ready:
+            # At least one job must be finished before a batch is fetched.
             self._ready.append(self._wait(finished))
             with suppress(Empty):
                 while True:
@@ -143,6 +144,7 @@ class Cluster:
         while True:
             before = time.monotonic()
             try:
+                # The queue is polled, because a scheduler that dies wakes nobody.
                 return finished.get(timeout=2.0)
             except Empty:
                 pass

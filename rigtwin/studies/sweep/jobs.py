@@ -94,6 +94,7 @@ def iterate_results(
         waiting[future] = job
         future.add_done_callback(finished.put)
 
+    # Enough jobs are in transit that no worker waits, and no more: memory stays bounded.
     ahead = workers.ahead * workers.capacity
     try:
         for job in islice(coming, ahead):
@@ -103,6 +104,8 @@ def iterate_results(
             key, argument = waiting.pop(future)
             try:
                 result = future.result()
+            # A dead worker may be chance, such as a lack of memory, so the job gets further
+            # attempts.
             except workers.lost:
                 losses[key] += 1
                 if losses[key] >= MOST_LOSSES:

@@ -29,7 +29,9 @@ def _set_up(folder: str) -> None:
     one core, and puts temporary files where the parent deletes them.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A killed worker cannot clean up; the parent deletes the folder.
     tempfile.tempdir = folder
+    # The sweep already uses every core; threads of linear algebra would compete for them.
     threadpoolctl.threadpool_limits(1)
     parent = multiprocessing.parent_process()
 

@@ -21,6 +21,7 @@ def _encode(value: object) -> object:
     if isinstance(value, np.ndarray):
         stream = io.BytesIO()
         np.save(stream, value, allow_pickle=False)
+        # numpy's own format preserves every bit; decimal text would not guarantee it.
         return {"array": base64.b64encode(stream.getvalue()).decode()}
     if isinstance(value, np.generic):
         return value.item()
@@ -64,6 +65,7 @@ class Store:
                 self._base.execute(f"PRAGMA {line}")
             columns = "context TEXT, key TEXT, result TEXT, PRIMARY KEY (context, key)"
             self._base.execute(f"CREATE TABLE IF NOT EXISTS results ({columns})")
+            # Results of other sources would be wrong for this version, so they are dropped.
             self._context = source_digest() if context is None else context
             self._base.execute("DELETE FROM results WHERE context <> ?", (self._context,))
         except OSError as error:

@@ -119,6 +119,7 @@ def open_workers(workers: int | None = None, cluster: str | None = None) -> Work
     count = (os.cpu_count() or 1) if workers is None else workers
     if not 1 <= count <= MOST_WORKERS:
         raise RigtwinError(f"workers {count}: expected 1 to {MOST_WORKERS}")
+    # One worker needs no process of its own; errors then have a plain traceback.
     if count == 1:
         return SerialExecutor()
     from rigtwin.studies.sweep.processes import Processes

@@ -64,6 +64,7 @@ class Bench:
         return Run(
             machine=str(self.study.machine.path),
             experiment=self.study.experiment,
+            # The candidate is the controller, the scenario is the plant; all else is the study's.
             configuration=base._replace(controller=candidate, plant=scenario.plant),
             seed=scenario.seed,
             first=self.study.first,

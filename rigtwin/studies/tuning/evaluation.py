@@ -115,6 +115,7 @@ def median_interval(values: Array, confidence: float = 0.95) -> tuple[float, flo
     do not reach the confidence.
     """
     ordered, count = np.sort(values), len(values)
+    # P(median below the rank-th value) = P(B(n, 1/2) < rank).
     rank = int(binom.ppf((1.0 - confidence) / 2.0, count, 0.5))
     if rank < 1:
         return math.nan, math.nan

@@ -83,6 +83,7 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
     except OSError as error:
         raise RigtwinError(f"cannot write into {folder}: {error.strerror}") from None
     for name, figure in figures.items():
+        # The page contains the figures as SVG; the PNG files are for documents.
         save(figure, folder / f"{name}.png")
     _record(folder / BEST, result, twin)
     names = (*pages, *(f"{name}.png" for name in figures), BEST)
@@ -93,6 +94,7 @@ def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
     """Record a test with the tuned settings on the first held-out road."""
     experiment, machine = result.study.experiment, result.study.machine
     configuration = twin._replace(controller=result.settings)
+    # Seed APART is the first held-out road, which no run of the search has used.
     demands = experiment.demands(configuration, APART)
     if machine.structure is Structure.QUARTER_CAR:
         record(path, experiment.name, configuration, demands, APART, machine=machine.name)

@@ -76,6 +76,7 @@ class RigTrial(Trial):
     @property
     def tyre(self) -> Array:
         """Force of the tyre, in N."""
+        # Ground minus wheel, where the wheel stands at plate minus travel.
         deflection = self.sensed[:, 0] - self.sensed[:, 1] + self.sensed[:, 2]
         rate = np.gradient(deflection, self.period)
         return tyre_force(self.configuration.plant.tyre, deflection, rate)[self.first :]
@@ -85,6 +86,7 @@ class RigTrial(Trial):
         """Errors against the ideal vehicle (thesis Eq. 3.1 and 3.2)."""
         # Simulated from the start, so that the ideal vehicle is settled when measuring begins.
         target = simulate_ideal(self.configuration, self.commands[:, 0])
+        # The transient before `first` is no property of the settings.
         late = slice(self.first, None)
         motions = (target.structure[late], target.velocity[late], target.wheel[late])
         shown = Ideal(*motions, target.force[late], None)

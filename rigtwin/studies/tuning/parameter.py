@@ -54,6 +54,7 @@ class TuningParameter:
         """Return the value at a share of the way between the bounds, rounded to DIGITS."""
         value = self.low + share * (self.high - self.low)
         if self.logarithmic:
+            # Equal shares are equal ratios on a logarithmic scale.
             value = self.low * (self.high / self.low) ** share
         return min(max(float(f"{value:.{DIGITS - 1}e}"), self.low), self.high)
 

@@ -114,6 +114,7 @@ def tune(
     stage(f"tuning on the {rig.name}")
     search, front = _search(bench, rig, seed)
     chosen, points = _choose(search, front), _thin(front, study.budget.points)
+    # Tuned settings are compared with the baseline, and with settings tuned without the diagnosis.
     rivals = [(BEFORE, study.baseline_settings)]
     if posterior is not None:
         stage(f"tuning on the {NOMINAL.name}")
@@ -130,10 +131,7 @@ def tune(
     front_comparisons = []
     if len(study.goals.minimise) == 2:
         stage("evaluating the front")
-        scenarios = draw_scenarios(study, rig, study.budget.held_out, APART)
-        for number, point in enumerate(points, start=1):
-            after = (f"point {number}", settings_of(study, point))
-            front_comparisons.append(evaluate(bench, rig.name, scenarios, rivals[0], after))
+        front_comparisons = _compare_front(bench, rig, points, rivals[0])
     return TuningResult(
         study=study,
         seed=seed,
@@ -146,6 +144,16 @@ def tune(
         front_comparisons=tuple(front_comparisons),
         same_scenarios=_are_same(study, rig),
     )
+
+
+def _compare_front(
+    bench: Bench, rig: UncertainRig, points: tuple[Candidate, ...], baseline: tuple[str, Settings]
+) -> list[SettingsComparison]:
+    """Compare each point of a front with the baseline on held-out scenarios."""
+    study = bench.study
+    scenarios = draw_scenarios(study, rig, study.budget.held_out, APART)
+    named = [(f"point {n}", settings_of(study, point)) for n, point in enumerate(points, start=1)]
+    return [evaluate(bench, rig.name, scenarios, baseline, after) for after in named]
 
 
 def count_runs(study: Study, posterior: Posterior | None) -> int:

@@ -65,6 +65,7 @@ class Run:
             self.first,
             sorted(f"{measure.name} {measure.definition}" for measure in self.measures),
         ]
+        # Settings are hashed by value, so that equal runs of different studies share a result.
         return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -90,6 +91,7 @@ def run(job: Run) -> dict[str, float]:
 
 def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
     """Return the figures of a run of the suspension rig, as `run` does."""
+    # A margin of 0 is at the limit; the share reached is its complement.
     shares = (
         1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, job.configuration)
     )

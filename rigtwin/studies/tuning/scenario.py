@@ -97,6 +97,7 @@ def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> l
             amount = width * random.uniform(-1.0, 1.0)
             return configuration if key in rig.known else shift_within(configuration, key, amount)
 
+        # Tolerances come first and in a fixed order, so that each seed always draws the same rig.
         for tolerance in tolerances:
             width = study.variation.tolerances * tolerance.width(configuration.plant)
             configuration = shift(f"{tolerance.group}.{tolerance.parameter}", width)

@@ -120,6 +120,7 @@ class TuningSearch:
         lost = score.trips or float(not all(map(math.isfinite, score.figures.values())))
         beyond = []
         for constraint, bound in zip(goals.constraints, self.bounds, strict=True):
+            # The baseline's figure sets the scale of a violation, also where the bound is 0.
             usual = abs(self.baseline.figures[constraint.measure.name])
             beyond.append(excess(constraint.measure, score, bound, usual))
         return lost, score.limits - goals.limits, *beyond
@@ -324,6 +325,7 @@ def _minimise(search: TuningSearch, objective: Measure, evaluations: int) -> Can
         return best
     goals = search.study.goals
     names = ["trips", "limits", *(constraint.measure.name for constraint in goals.constraints)]
+    # The message names what the best candidate fails at, which shows the user what to relax.
     nearest = min(
         search.candidates.values(),
         key=lambda candidate: sum(max(0.0, violation) for violation in candidate.violations),

@@ -340,6 +340,8 @@ def _variation(table: object, configuration: Configuration) -> Variation:
     tolerances = _number("vary: tolerances", shares.pop("tolerances", 0.0), 0.0, 10.0)
     for key, value in shares.items():
         where = f"vary: {key}"
+        # Only the machine varies between scenarios; the controller's settings are the study's to
+        # choose.
         if key.partition(".")[0] not in configuration.plant._fields:
             expected = "expected component.parameter of the machine, or tolerances"
             raise RigtwinError(f"{where}: {expected}")

@@ -227,6 +227,7 @@ def toml(result: TuningResult, point: int | None = None) -> str:
         lines.append(f"# {difference.measure.title}: {median} [{interval}] held out")
     lines += [f"# but {line}" for line in (concerns(result) if point is None else ())]
     lines += [f"# {command(study, 'THIS.toml')}", "", "[controller]"]
+    # Only settings that differ are written, so that later defaults of the experiment still apply.
     before = {key: value for key, value, _ in parameters(study.experiment.configuration)}
     for name, value in settings_of(study, candidate)._asdict().items():
         if value != before[f"controller.{name}"]:
