@@ -55,10 +55,10 @@ def on_card(path: Path, **options: Any) -> rigtwin.Recording:
 
 def test_one_s_own_that_is_the_rig_s_commands_the_same(tmp_path: Path) -> None:
     plain = on_twin(tmp_path / "plain.mcap")
-    own = on_twin(tmp_path / "own.mcap", controller=Same)
+    recorded = on_twin(tmp_path / "own.mcap", controller=Same)
     for channel in plain.channels:
-        assert np.array_equal(own[channel], plain[channel])
-    assert set(own.controller) == {"own", "start", "preload"}
+        assert np.array_equal(recorded[channel], plain[channel])
+    assert set(recorded.controller) == {"own", "start", "preload"}
 
 
 def test_a_compensator_commands_on_the_card_what_it_does_on_the_twin(tmp_path: Path) -> None:

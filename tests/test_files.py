@@ -101,8 +101,8 @@ def test_pictures_of_odd_recordings(tmp_path):
     line, gap = np.arange(5.0), np.array([0.0, 1.0, 2.0, 7.0, 8.0])
     assert np.isnan(_part(gap, line, 1.0)[1]).tolist() == [False] * 3 + [True] + [False] * 2
     assert _part(line, line, 1.0)[0].tolist() == line.tolist()
-    many = recording_of(tmp_path / "m.mcap", np.ones((300, 25)), [f"c{n}" for n in range(25)])
-    draw(many, tmp_path / "m.svg")
+    wide = recording_of(tmp_path / "m.mcap", np.ones((300, 25)), [f"c{n}" for n in range(25)])
+    draw(wide, tmp_path / "m.svg")
     assert (tmp_path / "m.svg").stat().st_size > 0
 
 

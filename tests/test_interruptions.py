@@ -36,8 +36,8 @@ def test_the_one_that_starts_it_gets_it_behind():
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
 def test_another_thread_that_takes_it_changes_nothing():
     reached, over = [], threading.Event()
-    other = threading.Thread(target=over.wait)
-    other.start()
+    thread = threading.Thread(target=over.wait)
+    thread.start()
     try:
         with pytest.raises(KeyboardInterrupt), block_sigint():  # noqa: PT012
             os.kill(os.getpid(), signal.SIGINT)
@@ -45,7 +45,7 @@ def test_another_thread_that_takes_it_changes_nothing():
             reached.append(True)
     finally:
         over.set()
-        other.join()
+        thread.join()
     assert reached
 
 

@@ -127,13 +127,13 @@ def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
     study, folder = tmp_path / "study.toml", tmp_path / "out"
     study.write_text(STUDY)
     assert main(["tune", str(study), "--out", str(folder), "--workers", "2"]) == 0
-    told = capsys.readouterr().out
-    line = next(line for line in told.splitlines() if line.startswith("rigtwin run positioning"))
+    output = capsys.readouterr().out
+    line = next(line for line in output.splitlines() if line.startswith("rigtwin run positioning"))
     assert "emps.toml --config" in line
     before = rigtwin.run("emps", "positioning", settings=SETTINGS)
     tuned = rigtwin.run("emps", "positioning", settings=[SETTINGS, folder / "tuned.toml"])
-    for each in (load(folder / "best.mcap"), tuned):
-        assert np.std(error(each)) < 0.8 * np.std(error(before))
+    for recording in (load(folder / "best.mcap"), tuned):
+        assert np.std(error(recording)) < 0.8 * np.std(error(before))
 
 
 @pytest.mark.slow

@@ -154,11 +154,11 @@ def test_a_zero_stays_zero():
 
 def test_any_three_independent_scales_give_the_same():
     by_time = scaling(QUARTER_CAR, {"mass": 0.01, "stroke": 0.25, "time": 2.0})
-    others = scaling(
+    other_scaling = scaling(
         QUARTER_CAR,
         {name: by_time.factor(QUARTER_CAR[name]) for name in ("stiffness", "damping", "gravity")},
     )
-    assert others == pytest.approx(by_time, rel=1e-12)
+    assert other_scaling == pytest.approx(by_time, rel=1e-12)
 
 
 def test_parameters_of_the_rig_can_be_scaled():
@@ -170,18 +170,18 @@ def test_parameters_of_the_rig_can_be_scaled():
     }
     units = {name: unit for name, unit in units.items() if "V" not in unit}
     values = {name: getattr(Settings(), name) for name in units}
-    other = scale_values(
+    scaled = scale_values(
         values, units, scaling(units, {"sprung_mass": 4.0, "start": 2.0, "filter_force": 3.0})
     )
-    assert other["suspension_stiffness"] == pytest.approx(
+    assert scaled["suspension_stiffness"] == pytest.approx(
         4.0 / 9.0 * values["suspension_stiffness"]
     )
     ratio = [
         each["suspension_damping"] / math.sqrt(each["suspension_stiffness"] * each["sprung_mass"])
-        for each in (values, other)
+        for each in (values, scaled)
     ]
     assert ratio[1] == pytest.approx(ratio[0])
-    assert other["kp"] == values["kp"]
+    assert scaled["kp"] == values["kp"]
 
 
 def test_bad_scales_are_one_line():
@@ -252,17 +252,17 @@ def test_the_landing_comes_to_rest_under_its_weight():
 def test_what_the_study_finds_of_the_tables():
     """Table 3.3 does not follow from Table 3.2; it does from 500 kg and 0.559 m, but for one figure
     that was cut off."""
-    found = study.conclude({})
-    table = [entry for entry in found.entries if entry.where == "Table 3.3"]
+    conclusion = study.conclude({})
+    table = [entry for entry in conclusion.entries if entry.where == "Table 3.3"]
     assert [entry.agrees for entry in table if entry.what.endswith("200 kg and 0.589 m")] == [
         False
     ] * 5
     assert [entry.what for entry in table if "500 kg" in entry.what and not entry.agrees] == [
         "damping coefficient, 500 kg and 0.559 m"
     ]
-    assert all(entry.agrees for entry in found.entries if entry.where == "Table 3.1")
+    assert all(entry.agrees for entry in conclusion.entries if entry.where == "Table 3.1")
     assert all(
-        entry.agrees for entry in found.entries if entry.what.startswith("simulated landing")
+        entry.agrees for entry in conclusion.entries if entry.what.startswith("simulated landing")
     )
-    assert {entry.where for entry in found.entries} - {"§3.5"} == set(study.STUDY.covers)
-    assert all(entry.note for entry in found.entries if not entry.agrees)
+    assert {entry.where for entry in conclusion.entries} - {"§3.5"} == set(study.STUDY.covers)
+    assert all(entry.note for entry in conclusion.entries if not entry.agrees)

@@ -53,16 +53,16 @@ def states(path: Path) -> list[str]:
 
 @pytest.mark.parametrize(("before", "after"), list(itertools.product(Phase, Phase)))
 def test_only_the_ways_that_there_are(before, after):
-    told = []
-    supervisor = Supervisor(told.append)
+    messages = []
+    supervisor = Supervisor(messages.append)
     supervisor.phase = before
     if after in NEXT[before]:
         supervisor.go(after, COMPLETED, 1.0)
-        assert (told[0].before, told[0].after) == (before, after)
+        assert (messages[0].before, messages[0].after) == (before, after)
     else:
         with pytest.raises(RigtwinError, match="no way from"):
             supervisor.go(after, COMPLETED, 1.0)
-        assert (supervisor.phase, told) == (before, [])
+        assert (supervisor.phase, messages) == (before, [])
 
 
 def test_motion_is_reached_and_left_through_every_state_between():
@@ -193,7 +193,7 @@ def test_any_key_stops():
     import subprocess
     import sys
 
-    main, other = pty.openpty()
+    main, terminal = pty.openpty()
     code = (
         "import time\nfrom rigtwin.hardware.session.stops import stop_requests\n"
         "with stop_requests() as asked:\n print('ready', flush=True)\n"
@@ -201,7 +201,7 @@ def test_any_key_stops():
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],
-        stdin=other,
+        stdin=terminal,
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -244,9 +244,9 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
 
 
 def test_who_interrupts_a_campaign_fails_no_session(tmp_path, monkeypatch, capsys):
-    def interrupt(*given):
+    def interrupt(*arguments):
         os.kill(os.getpid(), signal.SIGINT)
-        return healthy(*given)
+        return healthy(*arguments)
 
     monkeypatch.setattr("rigtwin.hardware.session.test.update", interrupt)
     page = tmp_path / "faults.md"

@@ -148,7 +148,7 @@ def closed_loop(configuration: Configuration, plate: LinearLaw | None = None) ->
 def _delayed_input(
     a: Array, entry: Array, delay: float, period: float
 ) -> tuple[tuple[Array, int], tuple[Array, int]]:
-    """Return the changes of the state over a tick by two delayed commands, with their ages in ticks.
+    """Return the changes of the state over a tick by two delayed commands, and their ages in ticks.
 
     A delay n T + f, in s, lets the command of age n + 1 act for the first f of a tick, and the
     command of age n for the rest.
