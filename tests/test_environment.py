@@ -86,7 +86,7 @@ def test_each_episode_has_a_road_of_its_own_and_the_same_seed_the_same():
         env = made("active", seed=seed, interval=50)
         steps = []
         for _ in range(2):
-            step, reward = env.reset(), 0.0
+            step, total = env.reset(), 0.0
             while not step.last():
                 step = env.step(env.rest())
                 total += step.reward
@@ -136,7 +136,7 @@ def test_an_agent_can_do_something_about_it():
         env = Environment(
             short("passive", 3.0), find("passive").demands, reward=Reward(travel=np.inf)
         )
-        step, total = env.reset(), 0.0
+        step, reward = env.reset(), 0.0
         while not step.last():
             velocity = step.observation["controller"][4]
             step = env.step(np.array([50.0, np.clip(200.0 - gain * velocity, 100.0, 300.0)]))
