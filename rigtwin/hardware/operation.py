@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from rigtwin.hardware.daq.signals import Signals
 from rigtwin.hardware.supervisor import Cause
 
+# A session is independent of the machine, so these types are opaque to it.
 Sample = Any
 """Sample: `controllers.Measurements` of the rig, or a tuple of another machine's inputs."""
 Commands = Any

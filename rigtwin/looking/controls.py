@@ -40,6 +40,8 @@ class Controls:
         self._look, self._changed = look, changed
         # viser calls handlers on threads of its own; `set` runs on the predicting thread.
         self._lock = threading.RLock()
+        # A dictionary serves as an ordered set: effects stay in the order in which they were
+        # chosen.
         self._ticked: dict[str, None] = {}
         self._values = {
             name: [slider.nominal if n == 0 else slider.start for n, slider in enumerate(sliders)]
@@ -65,6 +67,7 @@ class Controls:
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
         """Return each folder's title, effects, and whether it is open."""
+        # Effects of the diagnosis come first, in an open folder.
         folders = [("found", list(first), True)] if first else []
         by_component: dict[str, list[str]] = {}
         for name, effect in self._look.effects.items():

@@ -185,6 +185,7 @@ class LivePage:
         period = float(gap.time[1] - gap.time[0])
         measured = find_positions(watch.machine, recording, period)
         predicted = find_positions(watch.machine, recording, period, gap.predicted)
+        # One assignment, so the drawing thread never sees half an update.
         self._positions = gap.time, measured, predicted
         # At the first alarm the plot shows its signal; afterwards the user's choice stays.
         if watch.alarm is not None and not self._alarmed:

@@ -67,6 +67,7 @@ class Look:
         # Faults of the data are reported before the model is built, which takes seconds.
         require_fit(machine, recording, configuration)
         self.machine, self.recording = machine, recording
+        # The same evidence as a diagnosis: its band, its weights and its noise.
         self._evidence = Evidence(machine, [recording], [configuration])
         self._fitter = Fitter(self._evidence)
         self.effects = {effect.name: effect for effect in machine.effects() if effect.searched}
@@ -202,6 +203,7 @@ class Look:
         RigtwinError
             As `plant` does.
         """
+        # One recording, so one prediction.
         signals = self._evidence.predict(self.plant(values))[0]
         return judge(self.sensors, self._evidence.lines[0], signals)
 
@@ -230,6 +232,7 @@ class Look:
         alone = [self._fitter.fit_one(self._fitter.screen(effect)) for effect in effects]
         start = [fit.values[0] for fit in alone]
         together = alone[0] if len(alone) == 1 else self._fitter.refine(effects, start)
+        # Tolerances of other components widen the standard deviations.
         return self._fitter.refit_with_tolerances(together)
 
     def save(self, path: str | Path, values: Mapping[str, Sequence[float]]) -> Path:

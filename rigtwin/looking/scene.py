@@ -29,6 +29,7 @@ class Scene:
         server.initial_camera.look_at = centre
         server.initial_camera.fov = angle
         self._machine = _add(server, "/machine", shapes)
+        # What cannot move would only cover itself.
         moving = [shape for shape in shapes if shape.moves]
         self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}
 
@@ -67,6 +68,7 @@ def _add(
     """Add all bodies that have shapes, and return their frames by the body's number."""
     frames: dict[int, viser.FrameHandle] = {}
     for number, shape in enumerate(shapes):
+        # Shapes hang on their body's frame, so a motion moves few objects.
         if shape.body not in frames:
             frames[shape.body] = server.scene.add_frame(f"{name}/{shape.body}", show_axes=False)
         opacity = shape.opacity if colour is None else SEEN_THROUGH

@@ -51,6 +51,7 @@ def from_alarm(alarm: Alarm, look: Look) -> StartingPoint:
     StartingPoint
         The likeliest effect; no effect if there are no suspects.
     """
+    # Suspects are rivals, not parts of one explanation, so only the first is shown.
     likeliest = {s.effect: s for s in alarm.suspects[:1] if s.effect in look.effects}
     return StartingPoint(
         str(alarm),

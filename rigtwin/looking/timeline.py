@@ -120,5 +120,6 @@ def _window(time: Array, now: float, length: float) -> slice:
     if length >= time[-1] - time[0]:
         return slice(0, len(time))
     start = min(max(now - 0.5 * length, float(time[0])), float(time[-1]) - length)
+    # At least two ticks, or there would be no line to draw.
     first, last = np.searchsorted(time, [start, start + length])
     return slice(int(first), max(int(last), int(first) + 2))

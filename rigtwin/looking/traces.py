@@ -59,6 +59,7 @@ def mark(time: Array, traces: Sequence[Array], now: float) -> tuple[Array, ...]:
         Times, traces, and the line as a further trace. It lies at the lowest value of all traces,
         and rises to the highest at `now`.
     """
+    # The line is inserted at its place in time, because a plot's times must ascend.
     place = int(np.searchsorted(time, now))
     low = min(float(np.min(trace)) for trace in traces)
     high = max(float(np.max(trace)) for trace in traces)

@@ -65,6 +65,7 @@ def channels_of(columns: Mapping[str, Mapping[str, object]]) -> list[Channel]:
     present = [(topic, name) for topic, names in columns.items() for name in names]
     rig = any(topic == "/sensor" and name in Measurements._fields for topic, name in present)
     known = [c for c in CHANNELS if rig and (c.topic, c.name) in present]
+    # Channels beyond the table follow without unit and meaning.
     named = {(channel.topic, channel.name) for channel in known}
     return known + [
         Channel(topic, name, "", "") for topic, name in present if (topic, name) not in named

@@ -150,6 +150,7 @@ def _protobuf(
     except (KeyError, TypeError, DecodeError) as error:
         raise RigtwinError(f"{path}: schema {schema.name!r} cannot be read: {error}") from None
     names = [item.name for item in kind.fields]
+    # Other types have other lengths; they are decoded one by one.
     doubles = all(item.type == item.TYPE_DOUBLE for item in kind.fields)
     message_class = message_factory.GetMessageClass(kind)
 

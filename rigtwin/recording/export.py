@@ -54,6 +54,7 @@ def _csv(recording: Recording) -> bytes:
 def _mat(recording: Recording) -> bytes:
     for channel in recording.columns.values():
         for name in channel:
+            # MATLAB cannot read a field of such a name.
             if not MATLAB_NAME.fullmatch(name):
                 raise RigtwinError(
                     f"channel {name!r:.60} cannot be a field in MATLAB: expected at most "

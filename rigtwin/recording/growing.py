@@ -91,6 +91,7 @@ class GrowingRecording:
 
     def _take_one(self) -> bool:
         """Process the next record if it is complete. Return whether it was."""
+        # A file may be caught before its magic bytes are complete.
         if not self._begun:
             if not self._rest.startswith(MCAP0_MAGIC[: len(self._rest)]):
                 raise RigtwinError(f"{self.path} is not an MCAP file")

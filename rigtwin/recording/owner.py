@@ -33,6 +33,7 @@ def open_alone(path: Path) -> BinaryIO:
     OSError
         If the file cannot be written.
     """
+    # Windows would otherwise translate line ends.
     binary = getattr(os, "O_BINARY", 0)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | binary, 0o666)
     try:

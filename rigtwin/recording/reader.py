@@ -206,6 +206,7 @@ class FileContent:
             self._lost.append(record)
         elif isinstance(record, Messages):
             times, data = self._raw.setdefault(record.channel_id, ([], []))
+            # Lists grow in place: a long test has millions of messages.
             times += record.times
             data += record.data
         elif isinstance(record, Message):
@@ -228,6 +229,7 @@ class FileContent:
     def forget(self, before: float) -> None:
         """Drop all messages before a time in s."""
         for times, data in self._raw.values():
+            # Messages are in order of time, so a prefix is dropped.
             first = bisect_left(times, round(before * 1e9))
             del times[:first], data[:first]
 
@@ -391,6 +393,7 @@ def _moment(transition: Mapping[str, str]) -> float:
 
 def _period(path: Path, about: Mapping[str, str]) -> float:
     """Return the recorded period in s. Raise RigtwinError if format or period is wrong."""
+    # A later format may mean something else by the same names, so it is refused.
     if about.get("format") != WRITTEN_FORMAT:
         raise RigtwinError(
             f"{path}: format {about.get('format')!r}; this version reads {WRITTEN_FORMAT!r}"
@@ -409,6 +412,7 @@ def _period(path: Path, about: Mapping[str, str]) -> float:
 def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
     """Return the recorded settings of the controller."""
     try:
+        # Other programs may write recordings without settings.
         config = json.loads(about.get("config", "{}"))
         controller = config.get("controller", {})
         if not isinstance(controller, dict):

@@ -153,6 +153,7 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
     seen: dict[int, int] = {}
     passed, wait = 0, 0
     while at < length:
+        # Every record starts with its opcode and length, so unknown kinds can be skipped.
         opcode, size = _PREFIX.unpack_from(data, at)
         begin = at + _PREFIX.size
         at = begin + size
@@ -245,6 +246,7 @@ def seal(values: Mapping[str, str]) -> dict[str, str]:
 
 def unseal(values: Mapping[str, str]) -> tuple[dict[str, str], bool]:
     """Return metadata without their checksum, and whether it is right or absent."""
+    # The checksum covers all entries but itself.
     bare = {name: value for name, value in values.items() if name != _CHECKSUM}
     return bare, values.get(_CHECKSUM, _checksum(bare)) == _checksum(bare)
 

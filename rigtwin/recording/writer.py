@@ -214,6 +214,7 @@ class Writer:
         ticks = len(sequence)
         if ticks == 0:
             return
+        # Numbers may leave gaps where ticks were missed.
         self._next = int(sequence[-1]) + 1
         self._ticks += ticks
         self._put_messages(
@@ -249,6 +250,7 @@ class Writer:
         ticks = len(times)
         for topic in columns:
             self._counts[topic] = self._counts.get(topic, 0) + ticks
+        # All messages of a topic have one length, so each topic is one rectangular array.
         encoded = {topic: encode_rows(values) for topic, values in columns.items()}
         layout = np.dtype(
             [
@@ -280,6 +282,7 @@ class Writer:
         # A checksum of 0 means none: each chunk has its own.
         self._put(_encode(DataEnd(data_section_crc=0)))
         start = self._offset
+        # The summary lets readers find channels and chunks without reading the whole file.
         summary = bytearray()
         offsets = bytearray()
         groups: list[tuple[Opcode, list[McapRecord]]] = [
@@ -410,6 +413,7 @@ class Writer:
             return
         filling = _encode(Metadata(name=_RESERVE, metadata={"": " " * rest}))
         with suppress(OSError):
+            # The end of the file is full, but its beginning can still be overwritten.
             self._file.seek(place)
             self._file.write(record + filling)
         self._room = (place + len(record), end)

@@ -119,6 +119,7 @@ def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
     A command and a sensor of the same name share a panel.
     """
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
+    # The twin's true signals are left out: a rig does not have them.
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
     return tuple(
         Panel(
@@ -262,6 +263,7 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
             borderpad=0.1,
         )
         axis.margins(x=0)
+    # Titles of the panels share one vertical line whatever their numbers' width.
     figure.align_ylabels(axes)
     axes[-1].set_xlabel("time, s", fontsize=style.text)
     if not style.titled:

@@ -49,6 +49,7 @@ class Style:
     @contextmanager
     def used(self) -> Iterator[None]:
         """Apply the style to everything that is drawn and saved inside this context."""
+        # matplotlib's settings are global; the context restores them afterwards.
         with context(dict(self.settings)):
             yield
 

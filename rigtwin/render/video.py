@@ -99,6 +99,7 @@ def film(
     traces = _Traces(_curves(recording, machine), recording.time, ticks)
     beams = _beams(recording, machine)
     bent = None if beams is None else magnify * beams[ticks]
+    # Frames have equal distances in time; each shows the next recorded tick.
     shown = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     # Rounding may place the last frame behind the end.
     frames = np.minimum(shown, len(time) - 1)
@@ -209,6 +210,7 @@ def _context() -> Any:
     try:
         context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
         context.make_current()
+    # MuJoCo's back ends raise errors of their own types.
     except Exception as error:  # each kind raises its own
         raise RigtwinError(f"{NO_RENDERING} ({kind}: {type(error).__name__})") from None
     return context
@@ -342,6 +344,7 @@ class _Traces:
     def at(self, time: float) -> Image:
         """Return the plots with the mark at a time in s."""
         picture = self._picture.copy()
+        # The mark is two pixels wide, drawn into a copy of the finished picture.
         column = int(self._left + self._width * (time - self._start) / self._span)
         picture[self._rows, max(column - 1, 0) : column + 1] = (20, 20, 20)
         return picture

@@ -25,6 +25,7 @@ STOP_SIGNALS: tuple[int, ...] = (
     signal.SIGTERM,
     signal.SIGHUP,
     signal.SIGQUIT,
+    # Ctrl-Z would suspend the loop while the rig moves.
     signal.SIGTSTP,
 )
 RENDERER = "egl" if sys.platform == "linux" else "glfw"

@@ -248,6 +248,7 @@ class VirtualCard:
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
         return response(
+            # The driver returns lists as one text.
             value=", ".join(
                 f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])
             )
@@ -402,6 +403,7 @@ class VirtualCard:
                 f"{len(request.write_array)} values written to {len(task.lines)} channels",
             )
         for line, volts in zip(task.lines, request.write_array, strict=True):
+            # Written so that NaN is refused.
             if not abs(volts) <= 10.0:
                 raise DriverError(
                     BAD_VALUE,

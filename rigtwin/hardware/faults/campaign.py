@@ -128,6 +128,7 @@ def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> li
     moving, ending = 1000.0 * (LOOKING + ARMED), BEFORE + 1000.0 * DURATION
     faults = []
     for number in range(count):
+        # The kinds take turns, so that each is tried equally often.
         kind = kinds[number % len(kinds)]
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]

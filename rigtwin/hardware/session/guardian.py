@@ -97,6 +97,7 @@ class Guardian:
 
     def ready(self) -> None:
         """Wait until the guardian could stop the rig. Raise RigtwinError if it cannot."""
+        # Attaching takes long, and is possible only after the loop has opened its tasks.
         self._send("prepare")
         # The flag is polled: the guardian sets it in shared memory.
         end = monotonic() + STARTED
