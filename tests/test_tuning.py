@@ -253,7 +253,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         ({"set": {"duration": 2.0}}, "set: duration = 2.0: expected group.name"),
         ({"judge": {"odd": 3}}, "judge: odd = 3: expected a table"),
         ({"vary": {"rail.viscous": 0.5}}, "it is 0 in this machine"),
-        ({"minimise": ["ride", "ride"]}, "one objective, or two others"),
+        ({"minimise": ["ride", "ride"]}, "one objective, or two different ones"),
     ],
 )
 def test_mistakes_in_a_study_are_one_line(changes, says):
